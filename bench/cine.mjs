@@ -1,5 +1,5 @@
-// A beating ventricle with papillary muscles as cine MR shows it, of the paper's size: that of the core's tests
-// (`tests/common/cine.rs`), but for the numbers its noise is made of.
+// A beating ventricle with papillary muscles, as in cine MR, of the paper's size. The same as in the core's tests
+// (`tests/common/cine.rs`), except for the random numbers of its noise.
 import { Volume } from '../pkg/index.js';
 import { randomNumbers } from './random.mjs';
 
@@ -7,31 +7,31 @@ const DIMS = [156, 192, 25];
 const SPACING = [1.67, 1.67, 5];
 export const FRAMES = 25;
 const FRAME_SECONDS = 0.04;
-/** Intensities before noise, and its standard deviation. */
+/** Intensities before noise, and the standard deviation of the noise. */
 const [BLOOD, MUSCLE, LUNG, NOISE] = [200, 90, 45, 11];
 const MIDDLE = DIMS.map((n, k) => ((n - 1) / 2) * SPACING[k]);
 
-/** Around the cavity in all frames, in the world. */
+/** A box around the cavity in all frames, in world units. */
 export const BOX = {
   min: [-33, -33, -50].map((reach, k) => MIDDLE[k] + reach),
   max: [33, 33, 30].map((reach, k) => MIDDLE[k] + reach),
 };
 
-/** Of the shares of a slice that a thick one is the mean of. */
+/** Number of layers that a thick slice is averaged over. */
 const LAYERS = 5;
-/** Edge of the cubes that the true cavity is counted in, mm. */
+/** Edge length of the cubes that measure the true cavity's volume, in mm. */
 const CUBE = 1;
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-/** 0 in diastole, 1 in systole. */
+/** Returns the contraction: 0 in diastole, 1 in systole. */
 function contraction(frame) {
   const phase = frame / FRAMES;
   const rise = (x) => 0.5 - 0.5 * Math.cos(Math.PI * clamp(x, 0, 1));
   return rise(phase / 0.35) - 0.92 * rise((phase - 0.35) / 0.3) - 0.08 * rise((phase - 0.65) / 0.35);
 }
 
-/** Signed distance to an ellipsoid around the origin, about. */
+/** Returns the approximate signed distance to an ellipsoid around the origin. */
 function ellipsoid(x, y, z, across, along) {
   const [a, b, c] = [x / across, y / across, z / along];
   const unit = Math.sqrt(a * a + b * b + c * c);
@@ -39,18 +39,21 @@ function ellipsoid(x, y, z, across, along) {
   return gradient > 0 ? (unit * (unit - 1)) / gradient : -Math.min(across, along);
 }
 
-/** The larger of two, rounded where they meet. */
+/** Returns the maximum of two values, smoothed where they are nearly equal. */
 function smoothMax(a, b, width) {
   const h = Math.max(width - Math.abs(a - b), 0) / width;
   return Math.max(a, b) + h * h * width * 0.25;
 }
 
-/** What gives signed distances, about, of the cavity and of the heart: negative inside, places from the middle. */
+/**
+ * Returns functions for the approximate signed distances to the cavity and the heart, negative inside. Points are
+ * relative to the volume's centre.
+ */
 function shapes(systole) {
   const [wide, long] = [25 * (1 - 0.34 * systole), 42 * (1 - 0.1 * systole)];
   const base = 20 - 6 * systole;
   const thick = 9 + 4 * systole;
-  // Away from the wall but for their foot; the gap closes in systole.
+  // Away from the wall except at their base; the gap closes in systole.
   const away = wide - 9 + 4.5 * systole;
   const muscles = [0.7, 3].map((angle) => [away * Math.cos(angle), away * Math.sin(angle)]);
   return {
@@ -63,18 +66,18 @@ function shapes(systole) {
   };
 }
 
-/** Of a place before noise, its edges as soft as a pixel is wide. */
+/** Returns the intensity at a point before noise; edges are blurred over one pixel. */
 function shade(cavity, heart) {
   const share = (distance) => clamp(0.5 - distance / SPACING[0], 0, 1);
   const around = LUNG + (MUSCLE - LUNG) * share(heart);
   return around + (BLOOD - around) * share(cavity);
 }
 
-/** Of one voxel before noise. */
+/** Returns the intensity of a voxel before noise. */
 function clean({ cavity, heart }, x, y, z) {
   const [inner, outer] = [cavity(x, y, z), heart(x, y, z)];
   if (Math.min(Math.abs(inner), Math.abs(outer)) > SPACING[2]) return shade(inner, outer);
-  // Slices are thick: what is above and below is in them.
+  // Slices are thick, so the intensity is averaged over their height.
   let sum = 0;
   for (let k = 0; k < LAYERS; k++) {
     const height = z + SPACING[2] * ((k + 0.5) / LAYERS - 0.5);
@@ -83,13 +86,13 @@ function clean({ cavity, heart }, x, y, z) {
   return sum / LAYERS;
 }
 
-/** Rician, as magnitudes of MR are. */
+/** Adds Rician noise, as in MR magnitude images. */
 function noisy(value, random) {
   const [length, angle] = [NOISE * Math.sqrt(-2 * Math.log(random())), 2 * Math.PI * random()];
   return clamp(Math.round(Math.hypot(value + length * Math.cos(angle), length * Math.sin(angle))), 0, 255);
 }
 
-/** All frames, with noise. */
+/** Returns the volume with all frames and noise. */
 export function cine() {
   const random = randomNumbers(17);
   const [nx, ny, nz] = DIMS;
@@ -105,7 +108,7 @@ export function cine() {
   return new Volume({ data, dims: [...DIMS, FRAMES], spacing: SPACING, frameSeconds: FRAME_SECONDS });
 }
 
-/** What the cavity encloses in a frame, mm³. */
+/** Returns the volume that the cavity encloses in a frame, in mm³. */
 function enclosed(frame) {
   const { cavity } = shapes(contraction(frame));
   const [low, high] = [BOX.min, BOX.max].map((corner) => corner.map((value, k) => value - MIDDLE[k]));
@@ -118,5 +121,5 @@ function enclosed(frame) {
   return count * CUBE ** 3;
 }
 
-/** True volumes of the cavity by frame, mm³. */
+/** Returns the true volume of the cavity in each frame, in mm³. */
 export const volumes = () => Array.from({ length: FRAMES }, (_, frame) => enclosed(frame));

@@ -1,23 +1,23 @@
-// The measured work: a head by marching cubes and by the deformable model, a CT and a phantom. Runs in Node and in a page.
+// Times the deformable model and marching cubes on two heads, a CT and a phantom. Runs in Node and in a page.
 import init, { DeformableModel, Mesh, Volume, version } from '../pkg/index.js';
 import { headPhantom, ISO as PHANTOM_ISO } from './phantom.mjs';
 
-/** Bone, in the scan's intensities. */
+/** Iso value of bone, in the scan's intensities. */
 export const ISO = 95;
 const LEVELS = 2;
 const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.2 };
 const PHANTOM_PARAMS = { iso: PHANTOM_ISO, isoForce: -1, rigidity: 0.4 };
-/** A model that has not come to rest by then is reported as such. */
+/** A model that has not converged after this many iterations is reported as such. */
 const MOST_ITERATIONS = 3000;
 
-/** The value of `work` and the milliseconds it took. */
+/** Returns the result of `work` and the milliseconds it took. */
 function timed(work) {
   const started = performance.now();
   const value = work();
   return { value, milliseconds: performance.now() - started };
 }
 
-/** Of several runs the one that took least: the others were disturbed. */
+/** Returns the fastest of several runs; the others were disturbed. */
 function best(repeats, work) {
   const runs = Array.from({ length: repeats }, work);
   return runs.reduce((least, run) => (run.milliseconds < least.milliseconds ? run : least));
@@ -30,7 +30,7 @@ function marchingCubes(volume, iso) {
   return { milliseconds, vertices, triangles };
 }
 
-/** One whole run of the model, from making it to rest. */
+/** Runs the model once, from its construction until it converges. */
 function wholeRun(volume, params) {
   const parts = {};
   const started = performance.now();
@@ -54,14 +54,17 @@ function summary(model, { iteration, done, vertices, triangles, components, eule
   return { ...counts, area, volume, closed, oriented, selfIntersections };
 }
 
-/** Marching cubes alone, as often as it takes to find a moment when nothing else disturbs so short a time. */
+/** Times marching cubes alone, repeated often enough to find a run that nothing disturbed. */
 export async function measureCubes(bytes, repeats) {
   await init();
   const volume = Volume.parse(bytes);
   return best(repeats, () => marchingCubes(volume, ISO));
 }
 
-/** Milliseconds, counts, and the ratio of the model's time to that of marching cubes on the same volume in the same run. */
+/**
+ * Returns milliseconds, counts, and the ratio of the model's time to that of marching cubes on the same volume in the
+ * same run.
+ */
 function compare(volume, params, repeats) {
   const cubes = best(repeats, () => marchingCubes(volume, params.iso));
   const model = best(repeats, () => wholeRun(volume, params));
@@ -69,14 +72,14 @@ function compare(volume, params, repeats) {
   return { version: version(), dims: volume.dims, levels: LEVELS, params, cubes, model, ratio };
 }
 
-/** Measures everything on the bytes of the scan. */
+/** Runs the bench on the bytes of the scan. */
 export async function measure(bytes, repeats) {
   await init();
   const { value: volume, milliseconds: parse } = timed(() => Volume.parse(bytes));
   return { parse, ...compare(volume, PARAMS, repeats) };
 }
 
-/** The same on a phantom of the size that the paper's tomography has. */
+/** Runs the bench on a phantom of the same size as the paper's CT. */
 export async function measurePhantom(repeats) {
   await init();
   return compare(headPhantom(), PHANTOM_PARAMS, repeats);

@@ -1,9 +1,10 @@
-// How long a surface of 20,000 vertices whose connectivity changes in every frame takes in each host: the live pages of the
-// built app, with a torus of our own instead of their models. Drawing is in software here, and counts as long as the page waits.
+// Times updates of a surface of 20,000 vertices whose connectivity changes in every frame, in each host: the live pages
+// of the built app, with a computed torus instead of their models. Rendering is in software, and is timed as long as it
+// blocks the page.
 import { launchChromium } from '../scripts/chromium.mjs';
 import { serve } from '../scripts/serve.mjs';
 
-/** How each page draws, at once. */
+/** Expression that makes each page render immediately. */
 const DRAW = {
   three: 'render()',
   niivue: 'nv.drawScene()',
@@ -12,11 +13,11 @@ const DRAW = {
   itk: 'render()',
 };
 
-/** Frames of each kind that are timed, after a few that are not. */
+/** Number of timed frames, and of frames before them that are not timed. */
 const FRAMES = 30;
 const FIRST = 5;
 
-/** For each host milliseconds a frame, in the middle of all: to take it over, and to draw. */
+/** Returns the median milliseconds per frame for each host: of the update, and of rendering. */
 export async function measure(folder) {
   const server = await serve(folder);
   const browser = await launchChromium();
@@ -31,13 +32,13 @@ export async function measure(folder) {
 }
 
 async function measureHost(browser, address, name) {
-  // Waiting for a condition is code in a string, which the pages do not allow.
+  // Waiting for a condition evaluates a string, which the pages' policy forbids.
   const page = await browser.newPage({ viewport: { width: 800, height: 640 }, bypassCSP: true });
   await page.goto(`${address}embed/${name}.html`);
   await page.waitForFunction('window.surface && window.model.mesh.topologyVersion > 1', undefined, {
     timeout: 120_000,
   });
-  // Without its model the page stops.
+  // Freeing the model stops the page's own run.
   await page.evaluate('model.free()');
   await page.waitForSelector('[data-state=error]');
   const measured = await page.evaluate(`(${inPage})(${FRAMES}, ${FIRST}, () => ${DRAW[name]})`);
@@ -45,9 +46,9 @@ async function measureHost(browser, address, name) {
   return measured;
 }
 
-/** Run in the page. */
+/** Runs in the page. */
 async function inPage(frames, first, draw) {
-  /** A torus of `around` by `along` vertices, as a mesh that says when it has changed. */
+  /** Returns a torus of `around` × `along` vertices as a mesh with version counters. */
   function torus(around, along) {
     const [positions, normals, indices] = [[], [], []];
     for (let u = 0; u < around; u++) {

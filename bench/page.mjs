@@ -1,18 +1,18 @@
-// The measured page: how long it takes to start, what holds it up while models run, how fast the view turns, what it keeps in
-// memory and how often a mesh is copied. In Chromium, which draws in software, on the built app.
+// Measures the built app in Chromium, which renders in software: start-up, long tasks while models run, frame rate of
+// the view, memory, and how often a mesh is copied.
 import { launchChromium } from '../scripts/chromium.mjs';
 import { serve } from '../scripts/serve.mjs';
 import { watchPage, watchWorker } from './watch.mjs';
 
 const VIEWPORT = { width: 1280, height: 800 };
-/** Loads before a start counts as warm: browsers keep compiled code of what was loaded twice. */
+/** Loads before a start counts as warm: browsers keep the compiled code of scripts that were loaded twice. */
 const WARMING = 2;
-/** Milliseconds that a run is watched, where it does not end before, and that the view is turned. */
+/** Longest time in milliseconds for which a run is watched, and the time for which the view is turned. */
 const WATCHED = 12_000;
 const TURNED = 5_000;
 const PATIENCE = 180_000;
 
-/** What runs while long tasks are counted. */
+/** Labs and examples that run while long tasks are counted. */
 const RUNS = [
   { name: 'head, bone', hash: '#extract' },
   { name: 'head, skin', hash: '#extract?example=head-skin' },
@@ -27,7 +27,7 @@ const RUNS = [
 
 const middle = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
 
-/** A page on which everything is watched from the start. */
+/** Opens a page that is watched from the start. */
 async function open(browser, address) {
   const context = browser.contexts()[0] ?? (await browser.newContext({ viewport: VIEWPORT }));
   const page = await context.newPage();
@@ -39,8 +39,8 @@ async function open(browser, address) {
 }
 
 /**
- * Milliseconds from the address to something on the screen, to the engine's first answer, to a model that can be played,
- * and to the first surface.
+ * Returns the milliseconds from navigation to the first paint, the engine's first answer, a model that can be run, and
+ * the first surface.
  */
 async function startOnce(browser, address) {
   const page = await open(browser, address);
@@ -69,7 +69,7 @@ async function warmStart(browser, address, repeats) {
   return middles(starts.slice(WARMING));
 }
 
-/** Long tasks of the main thread from the first step of a model on. */
+/** Returns the long tasks of the main thread, from a model's first step on. */
 async function longTasks(browser, address, { name, hash }) {
   const page = await open(browser, address + hash);
   await page.waitForSelector('[data-state=running], [data-state=done]');
@@ -93,16 +93,16 @@ async function longTasks(browser, address, { name, hash }) {
   };
 }
 
-/** Frames a second and the length of the middle one while a pointer turns the view. */
+/** Returns frames per second and the median frame time while a pointer turns the view. */
 async function turn(page) {
   const box = await page.locator('.view > canvas').boundingBox();
   return page.evaluate(turnInPage, [box.x + 90, box.y + box.height - 60, TURNED]);
 }
 
-/** In the page. A pointer that moves a little with each animation frame. */
+/** Runs in the page: drags a pointer that moves a little with each animation frame. */
 async function turnInPage([x, y, milliseconds]) {
   const canvas = document.querySelector('.view > canvas');
-  // There is no such pointer that could be captured.
+  // Synthetic pointers cannot be captured.
   canvas.setPointerCapture = () => undefined;
   canvas.releasePointerCapture = () => undefined;
   const fire = (type, clientX) => {
@@ -126,7 +126,10 @@ async function turnInPage([x, y, milliseconds]) {
   };
 }
 
-/** How fast the view of the head turns: as it is, with nothing but the slices, and while the model runs. */
+/**
+ * Returns the frame rates while the view of the head is turned: with the surface, with slices only, and while the model
+ * runs.
+ */
 async function motion(browser, address) {
   const page = await open(browser, `${address}#extract`);
   await page.waitForSelector('[data-state=running]');
@@ -144,7 +147,10 @@ async function motion(browser, address) {
   return { triangles, renderer, canvas, resting, without, running };
 }
 
-/** Bytes that the page, its worker and the GPU hold when the head is done, and how the frames of the mesh came there. */
+/**
+ * Returns the bytes that the page, its worker and the GPU hold when the head is done, and how many were sent, copied
+ * and uploaded.
+ */
 async function memory(browser, address) {
   const page = await open(browser, `${address}#extract`);
   await page.waitForSelector('[data-state=done]');
@@ -170,7 +176,7 @@ async function memory(browser, address) {
   };
 }
 
-/** All of it, of the app in a folder. */
+/** Measures everything, of the app in a folder. */
 export async function measure(folder, repeats) {
   const server = await serve(folder);
   const { address } = server;

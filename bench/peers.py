@@ -1,27 +1,26 @@
-"""Times other people's software on the data of our own bench, and prints what came of it as JSON.
+"""Times other software on the data of our own benches, and prints the results as JSON.
 
     python3 bench/peers.py <job.json>
 
-`npm run bench -- peers` writes the job, runs this and puts our own figures of the same run beside it. Nothing is installed
-here: a package that is not there is skipped with a word. All of them together:
+`npm run bench -- peers` writes the job, runs this script and prints our own figures of the same run beside its results. It installs
+nothing: packages that are missing are skipped with a message. To install all of them:
 
     pip install vtk scikit-image SimpleITK scipy pymeshlab cgal numpy
 
-How far things can be compared:
+Limits of the comparison:
 
-- All of these are native code. Ours is WebAssembly, where it is not said to be native.
-- Ours has one thread. So have these here: VTK, ITK, OpenMP and BLAS are told so before they start.
+- All of these packages are native code. Ours is WebAssembly, unless it is said to be native.
+- Ours has one thread. So have these: VTK, ITK, OpenMP and BLAS are limited to one thread before they start.
 - Reading files and converting arrays is not timed, on either side.
-- Flying edges and marching cubes take the same voxels and the same value. Those of scikit-image make normals, too.
+- Flying edges and marching cubes use the same voxels and the same iso value. Those of scikit-image compute normals as well.
 - A level set is not a mesh, and may stop farther from the object: it is done when the root mean square of its changes falls
-  below ITK's own default. It is given a start 5 mm around the object, ours finds its way from outside the head. No surface
-  is made of its result in the time that counts, and one run of it has to do.
-- SciPy solves exactly, and with a matrix of all pairs; ours iterates to a residual. With neighbors= it solves nothing as a
-  whole, but a small system for each place asked about, and what comes out has steps: here it is asked about the vertices
-  of our surface only.
-- The two remeshers do three rounds, as in CGAL's example (MeshLab's usual ten take three times as long), then stop, whether
-  the edges are in bounds or not; ours goes on until they are. Neither looks whether the surface crosses itself. Reprojection and
-  flips are on in all of them; MeshLab keeps what it takes for sharp edges.
+  below ITK's own default. It starts 5 mm around the object; our model starts outside the head. Extracting a surface from its result
+  is not timed, and it runs only once.
+- SciPy solves exactly, with a dense matrix; ours iterates to a residual. With neighbors= it does not solve one system but a small
+  one for each evaluation point, and the result is discontinuous: here it is evaluated only at the vertices of our surface.
+- The two remeshers do three rounds, as in CGAL's example (MeshLab's default of ten takes three times as long), then stop, whether
+  the edges are in bounds or not; ours continues until they are. Neither checks for self-intersections. Reprojection and flips are
+  on in all of them; MeshLab keeps edges that it considers sharp.
 """
 
 import gzip
@@ -41,7 +40,7 @@ ONE_THREAD = {
     "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS": "1",
     "VTK_SMP_BACKEND_IN_USE": "Sequential",
 }
-# Millimetres around the object where the level set starts.
+# Distance from the object at which the level set starts, in millimetres.
 AROUND = 5
 LEVEL_SET_ITERATIONS = 500
 REMESHING_ROUNDS = 3
@@ -49,7 +48,7 @@ NEIGHBORS = 50
 
 
 def best(repeats, work):
-    """The least milliseconds of several runs, and what the last one gave."""
+    """Returns the shortest time of several runs in milliseconds, and the result of the last one."""
     least = float("inf")
     for _ in range(repeats):
         started = perf_counter()
@@ -59,7 +58,7 @@ def best(repeats, work):
 
 
 def read_volume(path):
-    """Voxels of a gzipped NIfTI-1 file of bytes as a numpy array, x fastest, and their spacing."""
+    """Returns the voxels of a gzipped NIfTI-1 file of bytes as a numpy array, z first, and their spacing."""
     import numpy
 
     data = gzip.decompress(Path(path).read_bytes())
@@ -72,7 +71,7 @@ def read_volume(path):
 
 
 def flying_edges(voxels, spacing, iso):
-    """A function that extracts the iso-surface of an array of voxels, z first, with VTK."""
+    """Returns a function that extracts the iso-surface of an array of voxels, z first, with VTK."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
@@ -116,7 +115,7 @@ def simple_itk(job):
 
     sitk.ProcessObject.SetGlobalDefaultNumberOfThreads(1)
     scan = sitk.ReadImage(job["scan"])
-    # Above the object's value speed goes on growing, so that the brightest bone is not outside again.
+    # The speed keeps growing above the iso value, so that the brightest bone is not outside again.
     level_set = sitk.ThresholdSegmentationLevelSetImageFilter()
     level_set.SetLowerThreshold(job["iso"])
     level_set.SetUpperThreshold(job["iso"] + 2 * (255 - job["iso"]))
@@ -128,7 +127,7 @@ def simple_itk(job):
         return level_set.Execute(distance - AROUND, sitk.Cast(scan, sitk.sitkFloat32))
 
     milliseconds, found = best(1, segment)
-    # As in the distance it started from, what is inside is below zero.
+    # Negative inside, as in the distance map that it started from.
     inside = sitk.GetArrayViewFromImage(found) < 0
     x, y, z = scan.GetSpacing()
     ended = {
@@ -168,7 +167,7 @@ def pymeshlab(job):
     import pymeshlab as meshlab
 
     for mesh in job["meshes"]:
-        # A new set for each run: the filter changes the mesh it is given.
+        # A new set for each run, because the filter changes its mesh.
         sets = [meshlab.MeshSet() for _ in range(job["repeats"])]
         for one in sets:
             one.load_new_mesh(mesh["file"])
@@ -195,7 +194,7 @@ def cgal(job):
 
         def remesh():
             one, facets = next(run)
-            # The rounds have to be given: without them these bindings do next to nothing.
+            # The rounds must be given: without them these bindings do next to nothing.
             isotropic_remeshing(facets, mesh["edge"], one, REMESHING_ROUNDS)
             return one
 
@@ -204,7 +203,7 @@ def cgal(job):
 
 
 def arrays_of(polyhedron):
-    """Positions and triangles; CGAL's own files have five digits."""
+    """Returns positions and triangles; CGAL's own files have five digits only."""
     positions = []
     for index, vertex in enumerate(polyhedron.vertices()):
         vertex.set_id(index)
@@ -216,7 +215,7 @@ def arrays_of(polyhedron):
 
 
 def remeshed(package, mesh, milliseconds, positions, triangles):
-    """The result, and the files it is looked at in."""
+    """Returns the result of remeshing, and writes its mesh to files for the measurements of its quality."""
     import numpy
 
     name = f"{mesh['file']}.{package}-{mesh['factor']}"
@@ -239,7 +238,7 @@ PEERS = {
 
 
 def measure(package, job):
-    """What one package comes to. One that is not there, or fails half-way, says so, and what it had done before stays."""
+    """Returns the results of one package. If it is missing or fails, the last result says so and earlier ones are kept."""
     results = []
     try:
         about = {"package": package, "version": version(package)}
@@ -253,10 +252,10 @@ def measure(package, job):
 
 
 def in_its_own_process(package, job):
-    """So that none finds the memory or the threads of another, and a crash takes only one with it."""
+    """Measures a package in a separate process, so that packages share no memory or threads and a crash loses only one."""
     command = [sys.executable, __file__, job, package]
     done = subprocess.run(command, env={**os.environ, **ONE_THREAD}, capture_output=True, text=True)
-    # Some packages print things, too; ours is the last line.
+    # Some packages print lines as well; the result is the last line.
     printed = done.stdout.strip().splitlines()
     if done.returncode == 0 and printed:
         return json.loads(printed[-1])

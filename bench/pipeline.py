@@ -1,12 +1,12 @@
-"""Times how one would get a mesh with even triangles without us: VTK's flying edges, then MeshLab's isotropic remeshing.
+"""Times the alternative to this library for a mesh with even triangles: VTK's flying edges, then MeshLab's isotropic remeshing.
 
     python3 bench/pipeline.py <job.json>
 
-`npm run real -- FOLDER --pipeline` writes the job, runs this and prints the figures below our own. pip install vtk pymeshlab numpy
+`npm run real -- FOLDER --pipeline` writes the job, runs this and prints the figures below our own. It needs `pip install vtk pymeshlab numpy`.
 
 - Native code with one thread each; ours is WebAssembly.
 - The same voxels, the same iso value, and the mean edge of our surface as target.
-- MeshLab makes ten rounds, its default. Three, as in CGAL's example, are timed, too, and not measured otherwise.
+- MeshLab makes ten rounds, its default. Three, as in CGAL's example, are timed as well, but their result is not measured.
 - Reading files and converting arrays is not timed.
 - Flying edges leaves the surface open where the object crosses the border of the volume, and remeshing may open it elsewhere: edges with
   one triangle, and with more than two, are counted.
@@ -19,17 +19,17 @@ from pathlib import Path
 
 from peers import ONE_THREAD, best, flying_edges
 
-# Read by packages when they are loaded, which is below.
+# Packages read these when they are imported, which happens below.
 os.environ.update(ONE_THREAD)
 
 ROUNDS = 10
 FEW_ROUNDS = 3
-# Points of the contour at which its distance from the result is measured.
+# Number of points of the contour at which its distance from the result is measured.
 SAMPLES = 200_000
 
 
 def contour(row):
-    """The iso-surface: milliseconds, positions and triangles."""
+    """Returns the iso-surface: milliseconds, positions and triangles."""
     import numpy
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -40,7 +40,7 @@ def contour(row):
 
 
 def remesh(positions, triangles, edge, rounds):
-    """Milliseconds, and a set of meshes with the result as its current one."""
+    """Returns the milliseconds, and a mesh set whose current mesh is the result."""
     import pymeshlab
 
     meshes = pymeshlab.MeshSet()
@@ -52,7 +52,7 @@ def remesh(positions, triangles, edge, rounds):
 
 
 def edges_by_triangles(triangles):
-    """The number of edges with one triangle, and of those with more than two."""
+    """Returns the number of edges with one triangle, and of those with more than two."""
     import numpy
 
     edges = numpy.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -71,7 +71,7 @@ def smallest_angle(positions, triangles):
 
 
 def recall(meshes, positions, triangles, reach):
-    """The share of the area of the contour within `reach` of the current mesh."""
+    """Returns the fraction of the contour's area within `reach` of the current mesh."""
     import pymeshlab
 
     result = meshes.current_mesh_id()

@@ -1,14 +1,14 @@
-// The measured work: points of a torus to a surface, few and many. Runs in Node and in a page.
+// Times the implicit surface of few and of many points of a torus. Runs in Node and in a page.
 import init, { ImplicitSurface, version } from '../pkg/index.js';
 
-/** Points, beside which one for ten is placed outside. */
+/** Numbers of points; one exterior point is added for every ten. */
 export const FEW = 3000;
 export const MANY = 20_000;
-/** The torus in a box of side 2, in cells of a 128th of it. */
+/** Extraction cell: a 128th of the box of side 2 that contains the torus. */
 const CELL = 2 / 128;
 const [RING, TUBE] = [0.65, 0.35];
 
-/** Numbers in [0, 1), the same ones each time. */
+/** Returns a generator of reproducible random numbers in [0, 1). */
 function randomNumbers() {
   let state = 7;
   return () => {
@@ -17,7 +17,7 @@ function randomNumbers() {
   };
 }
 
-/** As many to an area everywhere, packed. */
+/** Returns uniformly distributed points of a torus as packed xyz. */
 function torus(count) {
   const random = randomNumbers();
   const points = [];
@@ -30,7 +30,7 @@ function torus(count) {
   return Float32Array.from(points);
 }
 
-/** Milliseconds of each phase to the end, and the last report. */
+/** Runs a surface to the end; returns the milliseconds of each phase and the last report. */
 function phases(surface) {
   const times = {};
   let report;
@@ -43,7 +43,7 @@ function phases(surface) {
   return { times, report };
 }
 
-/** The constraints of a surface, and the vertices that come of them: for others to do the same with. */
+/** Returns constraints, and the vertices of the resulting surface, as input for other packages. */
 export async function example(count) {
   await init();
   const surface = new ImplicitSurface({ points: torus(count), params: { cell: CELL } });
@@ -54,7 +54,7 @@ export async function example(count) {
   return { points, exterior, vertices };
 }
 
-/** One surface from its points on, and then with one point more by hand. */
+/** Reconstructs a surface from its points, then again with one point added by hand. */
 function wholeRun(count) {
   const surface = new ImplicitSurface({ points: torus(count), params: { cell: CELL } });
   try {
@@ -69,7 +69,10 @@ function wholeRun(count) {
   }
 }
 
-/** Several runs: the first one, when code is still being compiled, and the least time of each phase over all of them. */
+/**
+ * Returns the times of the first run, in which code is still being compiled, and the shortest time of each phase over
+ * all runs.
+ */
 function runs(count, repeats) {
   const all = Array.from({ length: repeats }, () => wholeRun(count));
   const least = (which, phase) => Math.min(...all.map((run) => run[which][phase]));
@@ -86,8 +89,8 @@ function runs(count, repeats) {
 }
 
 /**
- * Milliseconds, counts, the memory that the module has taken by the end, in bytes, and as a ratio the time for each
- * constraint with many points to that with few.
+ * Returns milliseconds, counts, the memory of the module at the end in bytes, and the ratio of the time per constraint
+ * with many points to that with few.
  */
 export async function measure(repeats) {
   const { memory } = await init();

@@ -1,6 +1,6 @@
-// Random numbers for made data.
+// Random numbers for synthetic data.
 
-/** Numbers in (0, 1), the same ones each time (Mulberry32). */
+/** Returns a generator of reproducible random numbers in (0, 1) (Mulberry32). */
 export function randomNumbers(seed) {
   let state = seed;
   return () => {

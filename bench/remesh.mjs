@@ -1,10 +1,9 @@
-// Times remeshing of a torus of uneven triangles, and of a surface of marching cubes: figures only. Runs as it is in Node and
-// in a page.
+// Times remeshing of a torus with elongated triangles and of a marching-cubes surface. Runs in Node and in a page.
 import init, { Mesh, Volume, version } from '../pkg/index.js';
 
 const [RING, TUBE] = [3, 1];
 
-/** A torus of triangles four times as long as wide. */
+/** Returns a torus whose triangles are four times as long as wide. */
 function torus(n, m) {
   const positions = new Float32Array(3 * n * m);
   const indices = [];
@@ -20,7 +19,7 @@ function torus(n, m) {
   return Mesh.fromArrays(positions, Uint32Array.from(indices));
 }
 
-/** A gyroid in a ball, as marching cubes give it. */
+/** Returns the marching-cubes surface of a gyroid in a ball. */
 function gyroid(size) {
   const data = new Float32Array(size ** 3);
   const middle = (size - 1) / 2;
@@ -37,7 +36,10 @@ function gyroid(size) {
   return Mesh.marchingCubes(new Volume({ data, dims: [size, size, size] }), 0);
 }
 
-/** The least milliseconds of several runs for one length of edges, in the mean edge, and what came of it. */
+/**
+ * Returns the shortest time of several runs with a target edge length relative to the mean edge, and figures of the
+ * result.
+ */
 function timed(mesh, factor, repeats) {
   const aim = factor * mesh.info().edge.mean;
   let milliseconds = Infinity;
@@ -57,16 +59,16 @@ function timed(mesh, factor, repeats) {
   return { factor, milliseconds, before, triangles, minAngleDegrees, selfIntersections, distance };
 }
 
-/** Lengths that edges are to have, in the mean edge. */
+/** Target edge lengths, relative to the mean edge. */
 export const FACTORS = [0.5, 1, 3];
 
-/** What is remeshed, by name. */
+/** Returns the input meshes by name. */
 export async function meshes() {
   await init();
   return { torus: torus(400, 50), gyroid: gyroid(64) };
 }
 
-/** For each mesh and factor: milliseconds, counts, the smallest angle, and the distance in edges. */
+/** Returns milliseconds, counts, the smallest angle and the distance in edge lengths, for each mesh and factor. */
 export async function measure(repeats) {
   const rows = Object.entries(await meshes()).flatMap(([name, mesh]) =>
     FACTORS.map((factor) => ({ name, ...timed(mesh, factor, repeats) })),

@@ -1,5 +1,5 @@
-// Times frames of the multiresolution model while its ellipsoids move: a lava lamp, and a bust whose head is pulled about.
-// Figures only. Runs as it is in Node and in a page.
+// Times frames of the multiresolution model while its ellipsoids move: a lava lamp, and a bust whose head is moved.
+// Runs in Node and in a page.
 import init, { Mesh, MultiresolutionModel, version } from '../pkg/index.js';
 
 const upright = (center, [a, b, c]) => ({
@@ -12,7 +12,7 @@ const upright = (center, [a, b, c]) => ({
 });
 const ball = (center, radius) => upright(center, [radius, radius, radius]);
 
-/** Three blobs that swim, at a frame. */
+/** Returns the three moving blobs of the lamp at a frame. */
 function lamp(frame) {
   const wave = (size, period) => size * Math.sin(frame / period);
   return [
@@ -22,7 +22,7 @@ function lamp(frame) {
   ];
 }
 
-/** Crown, head, neck and chest of the bust, the first two pulled up and forward and back again. */
+/** Returns crown, head, neck and chest of the bust at a frame; the first two move up and forward, and back again. */
 function bust(frame) {
   const way = 15 * (1 - Math.cos(frame / 5));
   const crown = [
@@ -40,7 +40,7 @@ function bust(frame) {
 
 const middle = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
 
-/** Milliseconds of the middle frame and of the longest, and what parts of one take in the middle. */
+/** Returns the median, mean and longest time of a frame, and the median time of each of its parts. */
 function timed(model, pose, frames) {
   const milliseconds = [];
   const parts = {};
@@ -61,13 +61,16 @@ function timed(model, pose, frames) {
   };
 }
 
-/** Bounds of edges for so many triangles on an area. */
+/** Returns edge bounds that give about the wanted number of triangles on a surface of the given area. */
 function bounds(area, triangles) {
   const edge = Math.sqrt(((area / triangles) * 4) / Math.sqrt(3));
   return { edgeMin: 0.65 * edge, edgeMax: 1.45 * edge };
 }
 
-/** Frames of both scenes at several numbers of triangles; `bytes` are of the bust's file, `repeats` times 20 frames. */
+/**
+ * Times frames of both scenes at several triangle counts; `bytes` is the bust's file, and 20 × `repeats` frames are
+ * timed.
+ */
 export async function measure(bytes, repeats) {
   await init();
   const rows = [];

@@ -1,17 +1,23 @@
-// The measured work: steps of the deformable model while every vertex moves, at several sizes. Runs in Node and in a page.
+// Times steps of the deformable model while every vertex moves, at several mesh sizes. Runs in Node and in a page.
 // examples/step_figures.rs does the same natively.
 import init, { DeformableModel, Volume, version } from '../pkg/index.js';
 
-/** Voxels along each side, the radius of the ball in the middle and of the sphere that closes in on it. */
+/**
+ * Voxels along each side of the volume, and, in voxels, the radius of the ball at its centre and of the sphere that
+ * shrinks onto it.
+ */
 const SIDE = 256;
 const BALL = 96;
 const SPHERE = 112;
-/** Mean edges. The spheres have 7,000, 66,000 and 1.7 million vertices: sizes go in steps of three. */
+/**
+ * Mean edge lengths in voxels. The spheres have 7,000, 66,000 and 1.7 million vertices: edges shrink in steps of about
+ * three.
+ */
 const EDGES = [4.6, 1.6, 0.46];
-/** Steps that are not counted, while the sphere takes up speed, and steps that are. */
+/** Number of steps that are not timed, while the sphere accelerates, and of steps that are. */
 const BEFORE = 4;
 const COUNTED = 6;
-/** Runs of each size: steps of the small ones are soon over, and something else may run meanwhile. */
+/** Number of runs for each size: steps of the small ones are short, and other processes may disturb them. */
 const RUNS = [6, 3, 1];
 const PARAMS = { iso: 128, isoForce: -1, rigidity: 0.2 };
 
@@ -26,7 +32,10 @@ function ball() {
   return new Volume({ data, dims: [SIDE, SIDE, SIDE] });
 }
 
-/** Nanoseconds of a step for each vertex, and milliseconds of its topology: the best of all counted steps. */
+/**
+ * Returns the shortest times of all timed steps of one run: nanoseconds per vertex, and milliseconds of the topology
+ * part.
+ */
 function row(volume, edge) {
   const middle = (SIDE - 1) / 2;
   const start = { seeds: Float32Array.of(middle, middle, middle), radius: SPHERE };
@@ -48,11 +57,11 @@ function row(volume, edge) {
   }
 }
 
-/** A row for each size. */
+/** Returns a row for each size. */
 export async function measure() {
   await init();
   const volume = ball();
-  // Code is compiled while it runs, by other threads: a second of it does not count.
+  // Warm-up: code is compiled in the background while it runs, so the first second is not timed.
   row(volume, EDGES[1]);
   return { version: version(), rows: EDGES.map((edge, k) => best(volume, edge, RUNS[k])) };
 }

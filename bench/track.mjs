@@ -1,21 +1,21 @@
-// Times the tracker on a beating ventricle of the paper's size, from thick slices to a surface in every frame. Runs in Node
-// and in a page.
+// Times the tracker on a beating ventricle of the paper's size, from thick slices to a surface in every frame. Runs in
+// Node and in a page.
 import init, { Mesh, SurfaceTracker, version } from '../pkg/index.js';
 import { BOX, cine, FRAMES, volumes } from './cine.mjs';
 
-/** Between the step to the muscle and that from muscle to lung. */
+/** Edge threshold, between the step from blood to muscle and that from muscle to lung. */
 const THRESHOLD = 70;
-/** Between blood and muscle, for marching cubes. */
+/** Iso value between blood and muscle, for marching cubes. */
 const ISO = 145;
 
-/** The value of `work` and the milliseconds it took. */
+/** Returns the result of `work` and the milliseconds it took. */
 function timed(work) {
   const started = performance.now();
   const value = work();
   return { value, milliseconds: performance.now() - started };
 }
 
-/** Of several runs the one that took least: the others were disturbed. */
+/** Returns the fastest of several runs; the others were disturbed. */
 function best(repeats, work) {
   const runs = Array.from({ length: repeats }, work);
   return runs.reduce((least, run) => (run.milliseconds < least.milliseconds ? run : least));
@@ -24,10 +24,10 @@ function best(repeats, work) {
 const middle = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
 const sum = (values) => values.reduce((total, value) => total + value, 0);
 
-/** The largest volume's share that leaves until the smallest. */
+/** Returns the ejection fraction: the difference of the largest and the smallest volume, relative to the largest. */
 const ejected = (list) => 1 - Math.min(...list) / Math.max(...list);
 
-/** The surfaces of all frames by marching cubes, which is what any other way is compared with. */
+/** Extracts the surfaces of all frames by marching cubes, the reference for the timings. */
 function marchingCubes(volume) {
   const frames = Array.from({ length: FRAMES }, (_, frame) => frame);
   return timed(() => {
@@ -35,7 +35,7 @@ function marchingCubes(volume) {
   });
 }
 
-/** Milliseconds of each step, by what was done in it. */
+/** Runs a tracker to the end; returns the milliseconds of each part of its steps, as lists by name. */
 function steps(tracker) {
   const parts = {};
   for (let report; !report?.done; ) {
@@ -45,7 +45,7 @@ function steps(tracker) {
   return parts;
 }
 
-/** What came out, looked at afterwards. */
+/** Returns the measures and checks of the resulting surfaces. */
 function summary(tracker) {
   const meshes = Array.from({ length: FRAMES }, (_, frame) => tracker.meshAt(frame));
   const checks = meshes.map((mesh) => mesh.check());
@@ -60,7 +60,7 @@ function summary(tracker) {
   };
 }
 
-/** One whole run, from thick slices to the closed cycle. */
+/** Runs the tracker once, from thick slices to the closed cycle. */
 function wholeRun(volume) {
   const started = performance.now();
   const enriched = timed(() => volume.enrichSlices());
@@ -88,7 +88,7 @@ function wholeRun(volume) {
 }
 
 /**
- * Milliseconds by part, what came out beside the truth, the memory that the module has taken by the end, in bytes, and the
+ * Returns milliseconds by part, the results beside the truth, the memory of the module at the end in bytes, and the
  * ratio of the whole run's time to that of marching cubes on all frames of the same volume in the same run.
  */
 export async function measure(repeats) {

@@ -1,9 +1,9 @@
-// What is put into the page and its workers before anything of theirs runs, to watch them from outside. Each is one function
-// that needs nothing around it, as it is sent there as text.
+// Functions that are injected into the page and its workers before their own scripts run, to measure them from outside.
+// Each is self-contained, because it is sent as text.
 
-/** Notes in `window.watched` when things happen first, long tasks, and what goes to the GPU. */
+/** Records in `window.watched` the times of first events, long tasks, and uploads to the GPU. */
 export function watchPage() {
-  /** Draws of fewer corners are letters, boxes and slices; copies of fewer bytes are no meshes. */
+  /** Draw calls with fewer indices are text, boxes and slices; copies of fewer bytes are no meshes. */
   const [MANY, LARGE] = [1000, 20_000];
   const watched = { marks: {}, long: [], drawn: 0, frames: 0, triangles: 0, gpu: 0, copied: 0, largestCopy: 0 };
   watched.uploads = { bytes: 0, made: 0, refilled: 0 };
@@ -84,19 +84,19 @@ export function watchPage() {
     new MutationObserver(() => {
       if (['paused', 'running', 'done'].includes(lab.dataset.state)) mark('interactive');
     }).observe(lab, { attributeFilter: ['data-state'] });
-    // The parameters are the engine's own: they come with its first answer.
+    // The parameters come from the engine, with its first answer.
     new MutationObserver(() => {
       if (lab.querySelector('[data-param]')) mark('engine');
     }).observe(lab, { childList: true, subtree: true });
   });
 }
 
-/** Notes in `self.watched` how large the module's memory is, and whether meshes are handed over or copied. */
+/** Records in `self.watched` the size of the module's memory, and whether meshes are transferred or copied. */
 export function watchWorker() {
   const LARGE = 20_000;
   const watched = { wasm: 0, frames: 0, handedOver: 0, cloned: 0 };
   self.watched = watched;
-  // Whoever looks into the module's memory shows which it is.
+  // Any access to the module's memory reveals the memory object.
   const { get } = Object.getOwnPropertyDescriptor(WebAssembly.Memory.prototype, 'buffer');
   let memory;
   Object.defineProperty(WebAssembly.Memory.prototype, 'buffer', {
@@ -119,7 +119,7 @@ export function watchWorker() {
     postMessage.call(self, message, ...rest);
     watched.wasm = memory ? get.call(memory).byteLength : 0;
     if (large.length > 0) watched.frames += 1;
-    // What was handed over is empty here afterwards.
+    // Transferred arrays are empty afterwards.
     for (const { array, bytes } of large) watched[array.byteLength === 0 ? 'handedOver' : 'cloned'] += bytes;
   };
 }

@@ -8,7 +8,7 @@ use common::shapes;
 use std::time::Instant;
 use vesicle::io::{MeshFormat, parse_mesh, write_mesh};
 use vesicle::math::Vec3;
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::remesh::{EdgeBounds, remesh};
 use vesicle::spatial::surface_distance;
 
@@ -80,7 +80,7 @@ fn main() {
                 continue;
             }
         };
-        let was = count_crossings(&input);
+        let was = count_self_intersections(&input);
         let before = measure(&input);
         if let Ok(folder) = std::env::var("INPUTS") {
             std::fs::write(format!("{folder}/{name}.ply"), write_mesh(&input, MeshFormat::Ply).unwrap())
@@ -102,7 +102,7 @@ fn main() {
             let ok = mesh.check();
             let out = mesh.to_triangles();
             let after = measure(&out);
-            let crossings = count_crossings(&out);
+            let self_intersections = count_self_intersections(&out);
             let distance = surface_distance(&out, &input).unwrap().hausdorff;
             let dense = surface_distance(&finer(&out, 2), &finer(&input, 1)).unwrap().hausdorff;
             let sharp = out.corners().filter(|&c| smallest(c) < 30.0).count();
@@ -112,7 +112,7 @@ fn main() {
             let long = lengths.iter().filter(|&&l| l > bounds.max).count();
             all_angles.push(after.min_angle_degrees);
             println!(
-                "{name:28} {factor:5.2} {:7} {:7} {:6.2} {crossings:5} {was:5} {:6.1} {sharp:6} {:6.3} {:6.3} {short:5} {long:5} {:6} {}",
+                "{name:28} {factor:5.2} {:7} {:7} {:6.2} {self_intersections:5} {was:5} {:6.1} {sharp:6} {:6.3} {:6.3} {short:5} {long:5} {:6} {}",
                 before.triangles,
                 after.triangles,
                 best * 1e6 / after.triangles as f64,

@@ -26,8 +26,8 @@ const SPHERE: f64 = 112.0;
 const EDGES: [f64; 3] = [4.6, 1.6, 0.46];
 
 /// Number of steps that are not timed, while the sphere accelerates, and of steps that are.
-const BEFORE: usize = 4;
-const COUNTED: usize = 6;
+const WARM_UP_STEPS: usize = 4;
+const TIMED_STEPS: usize = 6;
 
 /// Number of runs for each size.
 const RUNS: [usize; 3] = [6, 3, 1];
@@ -62,11 +62,11 @@ fn row(volume: &Volume, edge: f64) -> Row {
     let mut model = DeformableModel::new(volume, options).unwrap();
     model.set_clock(milliseconds);
     let mut row = Row { vertices: 0, step: f64::INFINITY, topology: f64::INFINITY };
-    for step in 0..BEFORE + COUNTED {
+    for step in 0..WARM_UP_STEPS + TIMED_STEPS {
         let began = milliseconds();
         let report = model.step().unwrap();
         let spent = milliseconds() - began;
-        if step < BEFORE {
+        if step < WARM_UP_STEPS {
             continue;
         }
         let topology = report.times.0.iter().find(|(part, _)| *part == "topology").map_or(0.0, |p| p.1);

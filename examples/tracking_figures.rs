@@ -18,7 +18,7 @@ use common::cine::Cine;
 use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
-use vesicle::mesh::{count_crossings, measure};
+use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
@@ -59,7 +59,7 @@ fn left_out_error(given: &Volume, volume: &Volume, method: Enrichment) -> f64 {
 }
 
 /// Prints the errors of enrichment by optical flow and by linear interpolation.
-fn tell_enrichment(given: &Volume, truth: &Volume) {
+fn print_enrichment(given: &Volume, truth: &Volume) {
     let began = Instant::now();
     let flow = left_out_error(given, truth, Enrichment::Flow);
     let took = began.elapsed().as_secs_f64();
@@ -99,7 +99,7 @@ fn track(cine: &Cine) {
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
-    let mut all = Worst::default();
+    let mut all = ErrorSummary::default();
     while !tracker.is_done() {
         let began = Instant::now();
         tracker.step().unwrap();
@@ -112,10 +112,10 @@ fn track(cine: &Cine) {
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
-        let crossings = count_crossings(mesh);
+        let self_intersections = count_self_intersections(mesh);
         let folds = 100.0 * facts.folded as f64 / facts.triangles as f64;
         println!(
-            "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
+            "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, self-intersections {}",
             took * 1e3,
             facts,
             a.volume / 1000.0,
@@ -127,30 +127,30 @@ fn track(cine: &Cine) {
             off.hausdorff,
             folds,
             a.euler,
-            crossings
+            self_intersections
         );
         all.mean = all.mean.max(off.mean);
         all.p95 = all.p95.max(off.p95);
         all.folds = all.folds.max(folds);
         all.areas.push(100.0 * (a.area / b.area - 1.0));
-        all.crossings += crossings;
+        all.self_intersections += self_intersections;
         all.steps += facts.steps / tracker.frames() as f64;
         all.volumes.push([a.volume, b.volume]);
         all.times.push(took);
     }
-    all.tell();
+    all.print();
     println!("closes with {:.3} mm", tracker.cycle_closure_error().unwrap_or(f64::NAN));
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
 /// The largest errors of all frames.
 #[derive(Default)]
-struct Worst {
+struct ErrorSummary {
     mean: f64,
     p95: f64,
     folds: f64,
     areas: Vec<f64>,
-    crossings: usize,
+    self_intersections: usize,
     /// Mean number of steps per frame.
     steps: f64,
     /// Measured and true volume of each frame.
@@ -159,8 +159,8 @@ struct Worst {
     votes: f64,
 }
 
-impl Worst {
-    fn tell(mut self) {
+impl ErrorSummary {
+    fn print(mut self) {
         let ends = |list: &[f64]| list.iter().fold([f64::MAX, f64::MIN], |[a, b], &x| [a.min(x), b.max(x)]);
         let [small, large] = ends(&self.areas);
         let ejected = |k: usize| {
@@ -169,11 +169,11 @@ impl Worst {
         };
         self.times.sort_by(f64::total_cmp);
         println!(
-            "worst: mean {:.2}, p95 {:.2}, folds {:.2} %, area {small:+.1} to {large:+.1} %, crossings {}; ejected {:.1} of {:.1} %; steps {:.1}; votes {:.2} s, frames {:.0} ms in the middle, {:.0} at most",
+            "worst: mean {:.2}, p95 {:.2}, folds {:.2} %, area {small:+.1} to {large:+.1} %, self-intersections {}; ejected {:.1} of {:.1} %; steps {:.1}; votes {:.2} s, frames {:.0} ms in the middle, {:.0} at most",
             self.mean,
             self.p95,
             self.folds,
-            self.crossings,
+            self.self_intersections,
             ejected(0),
             ejected(1),
             self.steps,
@@ -185,7 +185,7 @@ impl Worst {
 }
 
 /// Tracks the surface nearest to a voxel, in a box that extends `reach` world units from it on all sides.
-fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
+fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
     let affine = volume.affine();
     let center = affine.transform_point3(voxel);
     let number = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
@@ -220,14 +220,14 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
         let (Some(mesh), None) = (tracker.meshes().last(), tracker.cycle_closure_error()) else { continue };
         let (m, facts) = (measure(mesh), tracker.statistics()[tracker.frame()]);
         println!(
-            "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, crossings {}, folds {:.2} %, {:?}",
+            "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, self-intersections {}, folds {:.2} %, {:?}",
             tracker.frame(),
             began.elapsed().as_secs_f64() * 1e3,
             m.triangles,
             m.volume / 1000.0,
             m.area / 100.0,
             m.euler,
-            count_crossings(mesh),
+            count_self_intersections(mesh),
             100.0 * facts.folded as f64 / facts.triangles as f64,
             facts
         );
@@ -251,18 +251,18 @@ fn main() {
         let numbers: Vec<f64> = center.split(',').map(|x| x.parse().unwrap()).collect();
         for file in std::env::args().skip(1) {
             let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
-            follow_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
+            track_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
         }
         return;
     }
     let full = Cine { frames: 4, ..Cine::full() };
     let (noisy, clean) = (full.volume(), Cine { noise: 0.0, ..full }.volume());
-    tell_enrichment(&noisy, &noisy);
-    tell_enrichment(&noisy, &clean);
-    tell_enrichment(&clean, &clean);
+    print_enrichment(&noisy, &noisy);
+    print_enrichment(&noisy, &clean);
+    print_enrichment(&clean, &clean);
     for file in std::env::args().skip(1) {
         let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
         println!("{file}: {:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
-        tell_enrichment(&volume, &volume);
+        print_enrichment(&volume, &volume);
     }
 }

@@ -1,4 +1,4 @@
-import { invalid, knownOnly, list, number } from './check.js';
+import { checkProperties, denseCopy, invalid, number } from './check.js';
 import { type Mesh, meshHandle } from './mesh.js';
 import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
@@ -19,10 +19,10 @@ import { RawAnimation } from './vesicle.js';
  *   out of range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`.
  */
 export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {
-  const { frameSeconds = 0.1 } = knownOnly('options', options, ['frameSeconds']);
+  const { frameSeconds = 0.1 } = checkProperties('options', options, ['frameSeconds']);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
-  const meshes = list('frames', frames);
-  if (meshes.length === 0) throw invalid('frames', 'there are none; at least one Mesh is needed');
+  const meshes = denseCopy('frames', frames);
+  if (meshes.length === 0) throw invalid('frames', 'must contain at least one Mesh');
   const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
   const animation = call(() => new RawAnimation());
   try {

@@ -8,7 +8,7 @@ export function invalid(parameter: string, problem: string): VesicleError {
 }
 
 /** Formats a value for an error message. */
-function shown(value: unknown): string {
+function format(value: unknown): string {
   if (typeof value === 'string') return `'${value}'`;
   if (value !== null && typeof value === 'object') return `${value.constructor?.name ?? 'object'}`;
   return String(value);
@@ -23,22 +23,22 @@ interface Bounds {
 /** Returns `value` if it is a finite number within the bounds, else throws `invalid-argument`. */
 export function number(parameter: string, value: unknown, { min = -Infinity, max = Infinity }: Bounds = {}): number {
   if (typeof value === 'number' && Number.isFinite(value) && value >= min && value <= max) return value;
-  throw invalid(parameter, `${shown(value)}; ${wanted('a finite number', min, max)} is needed`);
+  throw invalid(parameter, `must be ${describeBounds('a finite number', min, max)}, got ${format(value)}`);
 }
 
 /** Returns `value` if it is a finite number above 0, else throws `invalid-argument`. */
 export function positive(parameter: string, value: unknown): number {
   if (number(parameter, value) > 0) return value as number;
-  throw invalid(parameter, `${shown(value)}; a number above 0 is needed`);
+  throw invalid(parameter, `must be > 0, got ${format(value)}`);
 }
 
 /** Returns `value` if it is an integer within the bounds (default 0 to 2^32 - 1), else throws `invalid-argument`. */
-export function whole(parameter: string, value: unknown, { min = 0, max = 0xffffffff }: Bounds = {}): number {
+export function integer(parameter: string, value: unknown, { min = 0, max = 0xffffffff }: Bounds = {}): number {
   if (Number.isInteger(value) && (value as number) >= min && (value as number) <= max) return value as number;
-  throw invalid(parameter, `${shown(value)}; ${wanted('a whole number', min, max)} is needed`);
+  throw invalid(parameter, `must be ${describeBounds('an integer', min, max)}, got ${format(value)}`);
 }
 
-function wanted(kind: string, min: number, max: number): string {
+function describeBounds(kind: string, min: number, max: number): string {
   if (min > -Infinity && max < Infinity) return `${kind} from ${min} to ${max}`;
   if (min > -Infinity) return `${kind} of at least ${min}`;
   return max < Infinity ? `${kind} of at most ${max}` : kind;
@@ -47,7 +47,7 @@ function wanted(kind: string, min: number, max: number): string {
 /** Returns `value` if it is one of `choices`, else throws `invalid-argument`. */
 export function choice<T extends string>(parameter: string, value: unknown, choices: readonly T[]): T {
   if (choices.includes(value as T)) return value as T;
-  throw invalid(parameter, `${shown(value)}; one of ${choices.map(shown).join(', ')} is needed`);
+  throw invalid(parameter, `must be one of ${choices.map(format).join(', ')}, got ${format(value)}`);
 }
 
 /**
@@ -57,7 +57,7 @@ export function choice<T extends string>(parameter: string, value: unknown, choi
 export function numbers(parameter: string, value: unknown, ...lengths: number[]): Float64Array<ArrayBuffer> {
   const list = value as ArrayLike<number>;
   if (value === null || typeof value !== 'object' || !lengths.includes(list.length)) {
-    throw invalid(parameter, `${lengths.join(' or ')} numbers are needed, not ${shown(value)}${lengthOf(value)}`);
+    throw invalid(parameter, `must be ${lengths.join(' or ')} numbers, got ${format(value)}${lengthOf(value)}`);
   }
   return Float64Array.from(list, (entry) => number(parameter, entry));
 }
@@ -74,21 +74,20 @@ function lengthOf(value: unknown): string {
  * Returns `value` if it is a readable typed array of class `kind` with a length that is a multiple of `stride`, else
  * throws `invalid-argument`.
  */
-export function typed<T extends { readonly length: number }>(
+export function typedArray<T extends { readonly length: number }>(
   parameter: string,
   value: unknown,
   kind: new (length: number) => T,
   stride = 1,
 ): T {
-  if (!(value instanceof kind)) throw invalid(parameter, `${shown(value)}; a ${kind.name} is needed`);
-  if (isGone(value))
-    throw invalid(parameter, 'its memory was transferred or has shrunk; an array that can be read is needed');
+  if (!(value instanceof kind)) throw invalid(parameter, `must be a ${kind.name}, got ${format(value)}`);
+  if (isDetached(value)) throw invalid(parameter, 'the array is detached or out of bounds; pass a readable array');
   if (value.length % stride === 0) return value;
-  throw invalid(parameter, `length ${value.length} is not a multiple of ${stride}`);
+  throw invalid(parameter, `the length must be a multiple of ${stride}, got ${value.length}`);
 }
 
 /** Whether a typed array is detached or out of bounds; its length is then 0, as if it were only empty. */
-function isGone(array: { readonly length: number }): boolean {
+function isDetached(array: { readonly length: number }): boolean {
   try {
     if (array.length === 0 && ArrayBuffer.isView(array)) (array as unknown as Uint8Array).at(0);
     return false;
@@ -102,42 +101,41 @@ function isGone(array: { readonly length: number }): boolean {
  * `invalid-argument`.
  */
 export function finite(parameter: string, value: unknown, stride: number): Float32Array {
-  const array = typed(parameter, value, Float32Array, stride);
+  const array = typedArray(parameter, value, Float32Array, stride);
   const wrong = array.findIndex((entry) => !Number.isFinite(entry));
   if (wrong < 0) return array;
-  throw invalid(parameter, `${array[wrong]} at index ${wrong}; all numbers must be finite`);
+  throw invalid(parameter, `all numbers must be finite, got ${array[wrong]} at index ${wrong}`);
 }
 
 /**
  * Returns `value` if it is an object without properties other than `names`, and `{}` if it is undefined; else throws
  * `invalid-argument`, so that misspelled options are found.
  */
-export function knownOnly<T extends object>(
+export function checkProperties<T extends object>(
   parameter: string,
   value: T | undefined,
   names: readonly string[],
 ): Partial<T> {
   if (value === undefined) return {};
-  if (value === null || typeof value !== 'object') throw invalid(parameter, `${shown(value)}; an object is needed`);
+  if (value === null || typeof value !== 'object') throw invalid(parameter, `must be an object, got ${format(value)}`);
   for (const name of Object.keys(value)) {
-    if (!names.includes(name))
-      throw invalid(name, `${parameter} has no property of this name; there are ${names.join(', ')}`);
+    if (!names.includes(name)) throw invalid(name, `unknown property of ${parameter}; known: ${names.join(', ')}`);
   }
   return value;
 }
 
 /** Copies an array; holes become `undefined`, so that `map` visits them, too. */
-export function list<T>(parameter: string, value: readonly T[]): readonly T[] {
+export function denseCopy<T>(parameter: string, value: readonly T[]): readonly T[] {
   if (Array.isArray(value)) return Array.from(value);
-  throw invalid(parameter, `${shown(value)}; an array is needed`);
+  throw invalid(parameter, `must be an array, got ${format(value)}`);
 }
 
 /**
  * Returns a shallow copy of an options object, so that getters and proxies run their code here and not during a call
  * into the WebAssembly module.
  */
-export function plain<T extends object>(parameter: string, value: T): T {
+export function shallowCopy<T extends object>(parameter: string, value: T): T {
   if (value === null || typeof value !== 'object' || Array.isArray(value))
-    throw invalid(parameter, 'an object is needed');
+    throw invalid(parameter, 'must be an object');
   return { ...value };
 }

@@ -1,4 +1,4 @@
-import { knownOnly } from './check.js';
+import { checkProperties } from './check.js';
 import { checkListener, checkSignal } from './stepper.js';
 import type { Vec3 } from './volume.js';
 
@@ -36,7 +36,7 @@ export interface CoverageOptions {
 
 /** Validates the options of a coverage measurement; throws `invalid-argument`. */
 export function checkedCoverage(given: CoverageOptions | undefined): CoverageOptions {
-  const options = knownOnly<CoverageOptions>('options', given, ['signal', 'onProgress']);
+  const options = checkProperties<CoverageOptions>('options', given, ['signal', 'onProgress']);
   checkSignal(options.signal);
   checkListener('onProgress', options.onProgress);
   return options;

@@ -1,8 +1,19 @@
-import { finite, invalid, knownOnly, list, number, plain, positive, typed, vec3, whole } from './check.js';
+import {
+  checkProperties,
+  denseCopy,
+  finite,
+  integer,
+  invalid,
+  number,
+  positive,
+  shallowCopy,
+  typedArray,
+  vec3,
+} from './check.js';
 import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
-import { inSlices, Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
+import { Runner, type RunOptions, runInSlices, type Stepper, type StepReport } from './stepper.js';
 import { RawDeformable, RawStart } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
@@ -140,7 +151,7 @@ export class DeformableModel implements Stepper {
    */
   constructor(given: DeformableOptions) {
     const { volume, frame = 0, start = 'contour', levels = 0, edge, params: some = {} } = checked(given);
-    const params = plain('params', some);
+    const params = shallowCopy('params', some);
     const image = volumeHandle('volume', volume as Volume);
     this.#handle = new Handle('DeformableModel', () =>
       image.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
@@ -178,7 +189,7 @@ export class DeformableModel implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the entry.
    */
   setAttractors(attractors: Attractor[]): void {
-    const packed = list('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
+    const packed = denseCopy('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
     this.#handle.use((raw) => raw.setAttractors(Float64Array.from(packed)));
   }
 
@@ -189,7 +200,7 @@ export class DeformableModel implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress.
    */
   step(iterations = 1): StepReport {
-    whole('iterations', iterations, { min: 1 });
+    integer('iterations', iterations, { min: 1 });
     this.#runner.refuseWhileRunning('step');
     return this.#step(iterations);
   }
@@ -240,7 +251,7 @@ export class DeformableModel implements Stepper {
       return share < 1 ? undefined : survey.use((raw) => raw.finish() as Coverage);
     };
     try {
-      return await inSlices(advance, signal);
+      return await runInSlices(advance, signal);
     } finally {
       survey.free();
     }
@@ -253,7 +264,7 @@ export class DeformableModel implements Stepper {
    *   of range; nothing has changed then.
    */
   setParams(params: DeformableParams): void {
-    const values = plain('params', params);
+    const values = shallowCopy('params', params);
     this.#handle.use((raw) => raw.setParams(values));
   }
 
@@ -277,7 +288,7 @@ export class DeformableModel implements Stepper {
    *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
-    typed('state', state, Uint8Array);
+    typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
   }
@@ -295,10 +306,10 @@ export class DeformableModel implements Stepper {
 }
 
 function checked(given: DeformableOptions): Partial<DeformableOptions> {
-  const known = knownOnly('options', given, OPTIONS);
+  const known = checkProperties('options', given, OPTIONS);
   const { frame, levels, edge } = known;
-  if (frame !== undefined) whole('frame', frame);
-  if (levels !== undefined) whole('levels', levels);
+  if (frame !== undefined) integer('frame', frame);
+  if (levels !== undefined) integer('levels', levels);
   if (edge !== undefined) positive('edge', edge);
   return known;
 }
@@ -310,15 +321,15 @@ function rawStart(start: DeformableStart): RawStart {
   if (start instanceof Mesh) return meshHandle('start', start).use((raw) => RawStart.mesh(raw));
   if (start === null || typeof start !== 'object') throw unknownStart();
   if ('bubbles' in start) {
-    const { bubbles } = knownOnly('start', start, ['bubbles']);
-    return RawStart.bubbles(whole('bubbles', bubbles, { min: 1 }));
+    const { bubbles } = checkProperties('start', start, ['bubbles']);
+    return RawStart.bubbles(integer('bubbles', bubbles, { min: 1 }));
   }
   if ('marchingCubes' in start) {
-    const { marchingCubes } = knownOnly('start', start, ['marchingCubes']);
+    const { marchingCubes } = checkProperties('start', start, ['marchingCubes']);
     return RawStart.marchingCubes(number('marchingCubes', marchingCubes));
   }
   if ('seeds' in start) {
-    const { seeds, radius } = knownOnly('start', start, ['seeds', 'radius']);
+    const { seeds, radius } = checkProperties('start', start, ['seeds', 'radius']);
     return RawStart.seeds(finite('seeds', seeds, 3), positive('radius', radius));
   }
   throw unknownStart();
@@ -327,12 +338,16 @@ function rawStart(start: DeformableStart): RawStart {
 function unknownStart(): Error {
   return invalid(
     'start',
-    "one of 'contour', 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh is needed",
+    "must be one of 'contour', 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh",
   );
 }
 
 function numbersOf(attractor: Attractor, index: number): number[] {
-  const { point, strength, radius } = knownOnly(`attractors[${index}]`, attractor, ['point', 'strength', 'radius']);
+  const { point, strength, radius } = checkProperties(`attractors[${index}]`, attractor, [
+    'point',
+    'strength',
+    'radius',
+  ]);
   return [
     ...vec3(`attractors[${index}].point`, point),
     number(`attractors[${index}].strength`, strength),

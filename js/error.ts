@@ -39,7 +39,7 @@ export class VesicleCrash extends Error {
   constructor(what: string, options?: ErrorOptions) {
     super(
       `${what}. This is a fault in vesicle: every volume, mesh and model made so far is lost. ` +
-        'Call init() again to go on with new ones, and please report it.',
+        'Call init() to create new ones, and please report the error.',
       options,
     );
     this.name = 'VesicleCrash';

@@ -1,4 +1,4 @@
-import { finite, knownOnly, list, numbers, plain, typed, whole } from './check.js';
+import { checkProperties, denseCopy, finite, integer, numbers, shallowCopy, typedArray } from './check.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { call, Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -120,7 +120,7 @@ export function parsePoints(bytes: Uint8Array): {
   normals?: Float32Array;
   colors?: Float32Array;
 } {
-  typed('bytes', bytes, Uint8Array);
+  typedArray('bytes', bytes, Uint8Array);
   return call(() => {
     const raw = RawPoints.parse(bytes);
     const [points, normals, colors] = [raw.points(), raw.normals(), raw.colors()];
@@ -211,7 +211,7 @@ export class ImplicitSurface implements Stepper {
    *   {@link ImplicitSurface.run} is in progress. The last surface stays, and other parameters may be set.
    */
   step(iterations = 1): StepReport {
-    whole('iterations', iterations, { min: 1 });
+    integer('iterations', iterations, { min: 1 });
     this.#runner.refuseWhileRunning('step');
     return this.#step(iterations);
   }
@@ -238,7 +238,7 @@ export class ImplicitSurface implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the parameter; nothing has changed then.
    */
   setParams(params: ImplicitParams): void {
-    const values = plain('params', params);
+    const values = shallowCopy('params', params);
     this.#handle.use((raw) => raw.setParams(values));
   }
 
@@ -261,11 +261,11 @@ export class ImplicitSurface implements Stepper {
    *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
    */
   setEdits(edits: PointEdits): void {
-    const known = knownOnly('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
+    const known = checkProperties('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
     const { added = new Float32Array(), removed = new Uint32Array(), exterior = new Float32Array() } = known;
     finite('added', added, 3);
     finite('exterior', exterior, 3);
-    typed('removed', removed, Uint32Array);
+    typedArray('removed', removed, Uint32Array);
     this.#handle.use((raw) => raw.setEdits(added, removed, exterior));
   }
 
@@ -319,7 +319,7 @@ export class ImplicitSurface implements Stepper {
    *   `too-large`.
    */
   toVolume(dims: Vec3): Volume {
-    const sizes = Uint32Array.from(numbers('dims', dims, 3), (size) => whole('dims', size, { min: 2, max: 4096 }));
+    const sizes = Uint32Array.from(numbers('dims', dims, 3), (size) => integer('dims', size, { min: 2, max: 4096 }));
     return wrapVolume(() => this.#handle.use((raw) => raw.toVolume(sizes)));
   }
 
@@ -347,7 +347,7 @@ export class ImplicitSurface implements Stepper {
    *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
-    typed('state', state, Uint8Array);
+    typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
   }
@@ -365,26 +365,31 @@ export class ImplicitSurface implements Stepper {
 }
 
 function checked(given: ImplicitOptions): ImplicitOptions {
-  const known = knownOnly('options', given, OPTIONS) as ImplicitOptions;
+  const known = checkProperties('options', given, OPTIONS) as ImplicitOptions;
   finite('points', known.points, 3);
   if (known.normals !== undefined) finite('normals', known.normals, 3);
   if (known.confidence !== undefined) finite('confidence', known.confidence, 1);
   if (known.colors !== undefined) finite('colors', known.colors, 3);
   if (known.exterior !== undefined) finite('exterior', known.exterior, 3);
-  if (known.maxPoints !== undefined) whole('maxPoints', known.maxPoints);
-  if (known.keepComponents !== undefined) whole('keepComponents', known.keepComponents, { min: 1 });
-  return { ...known, cameras: checkedCameras(known.cameras ?? []), params: plain('params', known.params ?? {}) };
+  if (known.maxPoints !== undefined) integer('maxPoints', known.maxPoints);
+  if (known.keepComponents !== undefined) integer('keepComponents', known.keepComponents, { min: 1 });
+  return { ...known, cameras: checkedCameras(known.cameras ?? []), params: shallowCopy('params', known.params ?? {}) };
 }
 
 function checkedCameras(cameras: readonly Camera[]): Camera[] {
-  return list('cameras', cameras).map((camera, index) => {
+  return denseCopy('cameras', cameras).map((camera, index) => {
     const at = `cameras[${index}]`;
-    const { projection, width, height, image } = knownOnly(at, camera, ['projection', 'width', 'height', 'image']);
-    if (image !== undefined) typed(`${at}.image`, image, Uint8ClampedArray);
+    const { projection, width, height, image } = checkProperties(at, camera, [
+      'projection',
+      'width',
+      'height',
+      'image',
+    ]);
+    if (image !== undefined) typedArray(`${at}.image`, image, Uint8ClampedArray);
     return {
       projection: numbers(`${at}.projection`, projection, 12),
-      width: whole(`${at}.width`, width, { min: 1 }),
-      height: whole(`${at}.height`, height, { min: 1 }),
+      width: integer(`${at}.width`, width, { min: 1 }),
+      height: integer(`${at}.height`, height, { min: 1 }),
       ...(image && { image }),
     };
   });

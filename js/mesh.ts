@@ -1,4 +1,16 @@
-import { choice, finite, invalid, knownOnly, list, number, plain, positive, typed, vec3, whole } from './check.js';
+import {
+  checkProperties,
+  choice,
+  denseCopy,
+  finite,
+  integer,
+  invalid,
+  number,
+  positive,
+  shallowCopy,
+  typedArray,
+  vec3,
+} from './check.js';
 import { call, Handle } from './runtime.js';
 import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
@@ -146,13 +158,13 @@ export class Mesh {
     wrapMesh = (handle, live = false) => new Mesh(handle, live);
     meshHandle = (parameter, mesh) => {
       if (mesh instanceof Mesh) return mesh.#handle;
-      throw invalid(parameter, 'a Mesh is needed');
+      throw invalid(parameter, 'must be a Mesh');
     };
   }
 
   private constructor(handle: Handle<RawMesh>, live: boolean) {
     if (!(handle instanceof Handle)) {
-      throw invalid('Mesh', 'made by icosphere, fromArrays, parse or marchingCubes, not by `new`');
+      throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
     this.#handle = handle;
     this.#live = live;
@@ -184,11 +196,11 @@ export class Mesh {
     indices: Uint32Array,
     extra: { uvs?: Float32Array; texture?: MeshTexture } = {},
   ): Mesh {
-    const { uvs, texture } = knownOnly('extra', extra, ['uvs', 'texture']);
+    const { uvs, texture } = checkProperties('extra', extra, ['uvs', 'texture']);
     const vertices = finite('positions', positions, 3).length / 3;
-    checkIndices(typed('indices', indices, Uint32Array, 3), vertices);
+    checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
     if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
-      throw invalid('uvs', `length ${uvs.length}; two numbers a vertex are needed, ${2 * vertices}`);
+      throw invalid('uvs', `must have two numbers per vertex, ${2 * vertices}, got ${uvs.length}`);
     }
     if (texture !== undefined && uvs === undefined) throw invalid('texture', 'needs texture coordinates, uvs');
     checkTexture(texture);
@@ -207,8 +219,8 @@ export class Mesh {
    *   texture coordinates; `too-large`; `invalid-argument`.
    */
   static parse(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): Mesh {
-    typed('bytes', bytes, Uint8Array);
-    const { texture } = knownOnly('options', options, ['texture']);
+    typedArray('bytes', bytes, Uint8Array);
+    const { texture } = checkProperties('options', options, ['texture']);
     checkTexture(texture);
     return made(() => RawMesh.parse(bytes, rawTexture(texture)));
   }
@@ -221,9 +233,9 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
   static marchingCubes(volume: Volume, iso: number, options: { frame?: number } = {}): Mesh {
-    const { frame = 0 } = knownOnly('options', options, ['frame']);
+    const { frame = 0 } = checkProperties('options', options, ['frame']);
     number('iso', iso);
-    whole('frame', frame);
+    integer('frame', frame);
     const handle = volumeHandle('volume', volume);
     return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame)));
   }
@@ -273,8 +285,8 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument` if `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
-    if (out === undefined) throw invalid('out', 'undefined; an object with positions, normals and indices is needed');
-    knownOnly('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
+    if (out === undefined) throw invalid('out', 'must be an object with positions, normals and indices, got undefined');
+    checkProperties('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
     const arrays = this.#handle.use((raw) => raw.arrays());
     try {
       return call(() => copyArrays(arrays, out));
@@ -333,7 +345,7 @@ export class Mesh {
    */
   restructure(edge: { min: number; max: number }, passes: readonly RestructurePass[] = RESTRUCTURE_PASSES): number {
     const [min, max] = edgeBounds(edge);
-    const codes = list('passes', passes).map((pass) =>
+    const codes = denseCopy('passes', passes).map((pass) =>
       RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES)),
     );
     return this.#handle.use((raw) => raw.restructure(min, max, Uint8Array.from(codes)));
@@ -400,7 +412,7 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument`: there is no such vertex.
    */
   geodesic(fromVertex: number): Float32Array {
-    whole('fromVertex', fromVertex);
+    integer('fromVertex', fromVertex);
     return this.#handle.use((raw) => raw.geodesic(fromVertex));
   }
 
@@ -474,10 +486,10 @@ export class Mesh {
 }
 
 function edgeBounds(edge: { min: number; max: number }): [number, number] {
-  const { min, max } = knownOnly('edge', plain('edge', edge), ['min', 'max']);
+  const { min, max } = checkProperties('edge', shallowCopy('edge', edge), ['min', 'max']);
   positive('edge.min', min);
   if (number('edge.max', max) > 2 * (min as number)) return [min as number, max as number];
-  throw invalid('edge.max', `${max}; more than twice edge.min, ${min}, is needed`);
+  throw invalid('edge.max', `must be more than twice edge.min, ${min}, got ${max}`);
 }
 
 function made(make: () => RawMesh): Mesh {
@@ -492,9 +504,9 @@ function checkIndices(indices: Uint32Array, vertices: number): void {
 
 function checkTexture(texture: MeshTexture | undefined): void {
   if (texture === undefined) return;
-  const { type, bytes } = knownOnly('texture', texture, ['type', 'bytes']);
+  const { type, bytes } = checkProperties('texture', texture, ['type', 'bytes']);
   choice('texture.type', type, TEXTURES);
-  typed('texture.bytes', bytes, Uint8Array);
+  typedArray('texture.bytes', bytes, Uint8Array);
 }
 
 /** Copies a texture into the module, which takes ownership. */
@@ -504,7 +516,7 @@ function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
 
 function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64Array<ArrayBuffer> {
   if (vector.some((entry) => entry !== 0)) return vector;
-  throw invalid(parameter, 'has no length');
+  throw invalid(parameter, 'must not be the zero vector');
 }
 
 function copyArrays(from: RawArrays, out: MeshArrays): { vertices: number; triangles: number } {

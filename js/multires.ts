@@ -1,4 +1,4 @@
-import { invalid, knownOnly, list, plain, typed, vec3, whole } from './check.js';
+import { checkProperties, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -95,9 +95,9 @@ export class MultiresolutionModel implements Stepper {
    *   vertices.
    */
   constructor(given: MultiresOptions) {
-    const known = knownOnly('options', given, OPTIONS) as MultiresOptions;
+    const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
     const packed = packedEllipsoids(known.ellipsoids);
-    const params = plain('params', known.params ?? {});
+    const params = shallowCopy('params', known.params ?? {});
     this.#handle = new Handle('MultiresolutionModel', () => {
       const [detail, base] = [triangles('detail', known.detail), triangles('base', known.base)];
       return new RawMultires(detail, base, packed, params);
@@ -191,7 +191,7 @@ export class MultiresolutionModel implements Stepper {
    *   `invalid-argument` while a {@link MultiresolutionModel.run} is in progress.
    */
   step(iterations = 1): StepReport {
-    whole('iterations', iterations, { min: 1 });
+    integer('iterations', iterations, { min: 1 });
     this.#runner.refuseWhileRunning('step');
     return this.#step(iterations);
   }
@@ -233,7 +233,7 @@ export class MultiresolutionModel implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the parameter, `too-large`; nothing has changed then.
    */
   setParams(params: MultiresParams): void {
-    const values = plain('params', params);
+    const values = shallowCopy('params', params);
     this.#handle.use((raw) => raw.setParams(values));
   }
 
@@ -252,7 +252,7 @@ export class MultiresolutionModel implements Stepper {
    *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
-    typed('state', state, Uint8Array);
+    typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
   }
@@ -274,11 +274,11 @@ function triangles(parameter: string, mesh: Mesh | undefined): TriangleCopy | un
 }
 
 function packedEllipsoids(ellipsoids: readonly ControlEllipsoid[]): Float64Array<ArrayBuffer> {
-  const numbers = list('ellipsoids', ellipsoids).flatMap((ellipsoid, index) => {
+  const numbers = denseCopy('ellipsoids', ellipsoids).flatMap((ellipsoid, index) => {
     const at = `ellipsoids[${index}]`;
-    const { center, axes } = knownOnly(at, ellipsoid, ['center', 'axes']);
-    const vectors = [center, ...list(`${at}.axes`, axes ?? [])];
-    if (vectors.length !== 4) throw invalid(`${at}.axes`, `${vectors.length - 1} given; three are needed`);
+    const { center, axes } = checkProperties(at, ellipsoid, ['center', 'axes']);
+    const vectors = [center, ...denseCopy(`${at}.axes`, axes ?? [])];
+    if (vectors.length !== 4) throw invalid(`${at}.axes`, `must be three vectors, got ${vectors.length - 1}`);
     return vectors.flatMap((vector, k) => [...vec3(k === 0 ? `${at}.center` : `${at}.axes[${k - 1}]`, vector)]);
   });
   return Float64Array.from(numbers);

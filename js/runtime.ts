@@ -1,6 +1,6 @@
 // The WebAssembly instance: loading, translation of errors, and handles of objects inside it.
 import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
-import { ownModule } from './module.js';
+import { defaultModule } from './module.js';
 import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
 /** Sources of the WebAssembly module: its address, a response, its bytes, or the compiled module. */
@@ -40,7 +40,7 @@ export function initSync(options: { module: BufferSource | WebAssembly.Module })
 }
 
 async function begin(source: InitInput | Promise<InitInput> | undefined): Promise<unknown> {
-  const module = await compile((await source) ?? (await ownModule()));
+  const module = await compile((await source) ?? (await defaultModule()));
   instance ??= await load({ module_or_path: module });
   return instance;
 }
@@ -110,7 +110,7 @@ export class Handle<Raw extends { free(): void }> {
   /** Calls `work` with the raw object. Throws `freed` if it was freed, or lost in a crash. */
   use<T>(work: (raw: Raw) => T): T {
     const raw = this.#raw;
-    if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and cannot be used any more`);
+    if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and can no longer be used`);
     if (crash === undefined && this.#generation !== generation) {
       throw new VesicleError('freed', `this ${this.#name} was lost when the library crashed; make a new one`);
     }

@@ -1,4 +1,4 @@
-import { invalid, knownOnly, positive, whole } from './check.js';
+import { checkProperties, integer, invalid, positive } from './check.js';
 import type { Mesh } from './mesh.js';
 
 /** State of a method after one step, or several together, and the events during them. */
@@ -73,12 +73,12 @@ export interface Stepper {
 }
 
 /** Default duration of a slice of work before yielding to the event loop, milliseconds. */
-const SLICE = 12;
+const DEFAULT_BUDGET_MS = 12;
 
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
 /** Yields to the event loop by posting a message to itself, which is faster than timers, which browsers throttle. */
-class Pause {
+class EventLoopYield {
   readonly #channel = new MessageChannel();
 
   wait(): Promise<void> {
@@ -95,12 +95,12 @@ class Pause {
 }
 
 /** Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason`. */
-export async function inSlices<T extends object>(
+export async function runInSlices<T extends object>(
   work: () => T | undefined,
   signal: AbortSignal | undefined,
-  budgetMs = SLICE,
+  budgetMs = DEFAULT_BUDGET_MS,
 ): Promise<T> {
-  const pause = new Pause();
+  const pause = new EventLoopYield();
   try {
     let sliceEnd = performance.now() + budgetMs;
     for (;;) {
@@ -123,7 +123,7 @@ export class Runner {
 
   /** Throws `invalid-argument` during a run; guards methods that would interfere with it. */
   refuseWhileRunning(what: string): void {
-    if (this.#running) throw invalid(what, 'a run of this model is under way: abort it, or wait for it to end');
+    if (this.#running) throw invalid(what, 'not allowed during a run of this model: abort it, or wait for its end');
   }
 
   /** Steps until the model is done, the run is aborted, or `maxIterations` is reached. See {@link RunOptions}. */
@@ -140,7 +140,7 @@ export class Runner {
       return report.done || left === 0 ? report : undefined;
     };
     try {
-      return await inSlices(next, signal, budgetMs);
+      return await runInSlices(next, signal, budgetMs);
     } finally {
       this.#running = false;
     }
@@ -149,9 +149,9 @@ export class Runner {
 
 /** Validates the options of a run; throws `invalid-argument`. */
 export function checkedRun(given: RunOptions | undefined): RunOptions {
-  const run = knownOnly<RunOptions>('options', given, OPTIONS);
+  const run = checkProperties<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)
-    whole('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
+    integer('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
   if (run.budgetMs !== undefined) positive('budgetMs', run.budgetMs);
   checkSignal(run.signal);
   checkListener('onStep', run.onStep);
@@ -160,10 +160,10 @@ export function checkedRun(given: RunOptions | undefined): RunOptions {
 
 /** Throws `invalid-argument` unless `signal` is an AbortSignal or undefined. */
 export function checkSignal(signal: unknown): void {
-  if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'an AbortSignal is needed');
+  if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'must be an AbortSignal');
 }
 
 /** Throws `invalid-argument` unless `listener` is a function or undefined. */
 export function checkListener(parameter: string, listener: unknown): void {
-  if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'a function is needed');
+  if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'must be a function');
 }

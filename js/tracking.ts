@@ -1,4 +1,4 @@
-import { invalid, knownOnly, plain, typed, vec3, whole } from './check.js';
+import { checkProperties, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -123,11 +123,11 @@ export class SurfaceTracker implements Stepper {
    *   the box or much finer than its voxels; `not-closed`, `self-intersecting` for a start that is.
    */
   constructor(given: TrackingOptions) {
-    const known = knownOnly('options', given, OPTIONS) as TrackingOptions;
+    const known = checkProperties('options', given, OPTIONS) as TrackingOptions;
     const image = volumeHandle('volume', known.volume);
     const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
-    if (box && voxels) throw invalid('voxels', 'box cannot be given together with it: it says the same');
-    const params = plain('params', known.params ?? {});
+    if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
+    const params = shallowCopy('params', known.params ?? {});
     this.#frameSeconds = image.use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
     this.#handle = new Handle('SurfaceTracker', () =>
       image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), params)),
@@ -198,7 +198,7 @@ export class SurfaceTracker implements Stepper {
    *   progress. `too-large`.
    */
   step(iterations = 1): StepReport {
-    whole('iterations', iterations, { min: 1 });
+    integer('iterations', iterations, { min: 1 });
     this.#runner.refuseWhileRunning('step');
     return this.#step(iterations);
   }
@@ -225,7 +225,7 @@ export class SurfaceTracker implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the parameter; nothing has changed then.
    */
   setParams(params: TrackingParams): void {
-    const values = plain('params', params);
+    const values = shallowCopy('params', params);
     this.#handle.use((raw) => raw.setParams(values));
   }
 
@@ -239,7 +239,7 @@ export class SurfaceTracker implements Stepper {
    */
   boundary(frame?: number): Float32Array {
     const [frames, bounded] = this.#counts();
-    const at = frame === undefined ? Math.max(bounded - 1, 0) : whole('frame', frame, { max: frames - 1 });
+    const at = frame === undefined ? Math.max(bounded - 1, 0) : integer('frame', frame, { max: frames - 1 });
     return this.#handle.use((raw) => raw.boundary(at));
   }
 
@@ -250,8 +250,8 @@ export class SurfaceTracker implements Stepper {
    */
   meshAt(frame: number): Mesh {
     const [frames, , done] = this.#counts();
-    if (whole('frame', frame, { max: frames - 1 }) >= done) {
-      throw invalid('frame', `${frame} is not done; ${done} of ${frames} frames have their surface`);
+    if (integer('frame', frame, { max: frames - 1 }) >= done) {
+      throw invalid('frame', `${frame} is not tracked yet; ${done} of ${frames} frames are`);
     }
     return wrapMesh(
       new Handle('Mesh', () => this.#handle.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
@@ -289,7 +289,7 @@ export class SurfaceTracker implements Stepper {
    *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
-    typed('state', state, Uint8Array);
+    typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
   }
@@ -308,20 +308,20 @@ export class SurfaceTracker implements Stepper {
 
 function corners(box: TrackingOptions['box']): Float64Array | undefined {
   if (box === undefined) return undefined;
-  const { min, max } = knownOnly('box', box, ['min', 'max']);
+  const { min, max } = checkProperties('box', box, ['min', 'max']);
   return Float64Array.of(...vec3('box.min', min), ...vec3('box.max', max));
 }
 
 function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
   if (voxels === undefined) return undefined;
-  const { min, max } = knownOnly('voxels', voxels, ['min', 'max']);
+  const { min, max } = checkProperties('voxels', voxels, ['min', 'max']);
   const indices = [...vec3('voxels.min', min), ...vec3('voxels.max', max)];
-  return Uint32Array.from(indices, (index) => whole('voxels', index));
+  return Uint32Array.from(indices, (index) => integer('voxels', index));
 }
 
 function point(component: TrackingOptions['component']): Float64Array | undefined {
   if (component === undefined || component === 'largest') return undefined;
-  if (typeof component === 'string') throw invalid('component', `'${component}'; 'largest' or a point is needed`);
+  if (typeof component === 'string') throw invalid('component', `must be 'largest' or a point, got '${component}'`);
   return vec3('component', component);
 }
 

@@ -1,4 +1,15 @@
-import { choice, invalid, knownOnly, list, number, numbers, positive, typed, vec3, whole } from './check.js';
+import {
+  checkProperties,
+  choice,
+  denseCopy,
+  integer,
+  invalid,
+  number,
+  numbers,
+  positive,
+  typedArray,
+  vec3,
+} from './check.js';
 import { Handle } from './runtime.js';
 import { RawFrames, RawVolume } from './vesicle.js';
 
@@ -64,7 +75,7 @@ export class Volume {
     wrapVolume = wrap;
     volumeHandle = (parameter, volume) => {
       if (volume instanceof Volume) return volume.#handle;
-      throw invalid(parameter, 'a Volume is needed');
+      throw invalid(parameter, 'must be a Volume');
     };
   }
 
@@ -87,9 +98,9 @@ export class Volume {
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
    */
   static parse(bytes: Uint8Array, options: { data?: Uint8Array } = {}): Volume {
-    const { data } = knownOnly('options', options, ['data']);
-    typed('bytes', bytes, Uint8Array);
-    if (data !== undefined) typed('data', data, Uint8Array);
+    const { data } = checkProperties('options', options, ['data']);
+    typedArray('bytes', bytes, Uint8Array);
+    if (data !== undefined) typedArray('data', data, Uint8Array);
     return wrap(() => RawVolume.parse(bytes, data));
   }
 
@@ -101,9 +112,9 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
    */
   static fromFrames(frames: Volume[], options: { frameSeconds?: number } = {}): Volume {
-    const { frameSeconds } = knownOnly('options', options, ['frameSeconds']);
+    const { frameSeconds } = checkProperties('options', options, ['frameSeconds']);
     if (frameSeconds !== undefined) positive('frameSeconds', frameSeconds);
-    const handles = list('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
+    const handles = denseCopy('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
     return wrap(() => {
       const collected = new RawFrames();
       for (const handle of handles) handle.use((raw) => collected.push(raw));
@@ -159,8 +170,8 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: no bins, or no such frame.
    */
   histogram(bins: number, frame = 0): Uint32Array {
-    whole('bins', bins, { min: 1 });
-    whole('frame', frame);
+    integer('bins', bins, { min: 1 });
+    integer('frame', frame);
     return this.#handle.use((raw) => raw.histogram(bins, frame));
   }
 
@@ -171,7 +182,7 @@ export class Volume {
    */
   sample(world: Vec3, frame = 0): number {
     const point = vec3('world', world);
-    whole('frame', frame);
+    integer('frame', frame);
     return this.#handle.use((raw) => raw.sample(point, frame));
   }
 
@@ -181,9 +192,9 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: no such axis, slice or frame.
    */
   slice(axis: 0 | 1 | 2, index: number, frame = 0): Float32Array {
-    whole('axis', axis, { max: 2 });
-    whole('index', index);
-    whole('frame', frame);
+    integer('axis', axis, { max: 2 });
+    integer('index', index);
+    integer('frame', frame);
     return this.#handle.use((raw) => raw.slice(axis, index, frame));
   }
 
@@ -193,7 +204,7 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
   intensities(frame = 0): Float32Array {
-    whole('frame', frame);
+    integer('frame', frame);
     return this.#handle.use((raw) => raw.intensities(frame));
   }
 
@@ -206,8 +217,8 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows.
    */
   pyramid(levels: number, options: { factor?: number } = {}): Volume[] {
-    const { factor = Math.sqrt(3) } = knownOnly('options', options, ['factor']);
-    whole('levels', levels, { min: 1 });
+    const { factor = Math.sqrt(3) } = checkProperties('options', options, ['factor']);
+    integer('levels', levels, { min: 1 });
     number('factor', factor);
     return this.#handle.use((raw) => raw.pyramid(levels, factor)).map((level) => wrap(() => level));
   }
@@ -221,7 +232,7 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: a factor out of range, or beyond the volume; `too-large`.
    */
   binned(factors: Vec3): Volume {
-    const counts = Uint32Array.from(numbers('factors', factors, 3), (factor) => whole('factors', factor, { min: 1 }));
+    const counts = Uint32Array.from(numbers('factors', factors, 3), (factor) => integer('factors', factor, { min: 1 }));
     return wrap(() => this.#handle.use((raw) => raw.binned(counts)));
   }
 
@@ -234,8 +245,8 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
-    const { factor, method = 'flow' } = knownOnly('options', options, ['factor', 'method']);
-    if (factor !== undefined) whole('factor', factor, { min: 1 });
+    const { factor, method = 'flow' } = checkProperties('options', options, ['factor', 'method']);
+    if (factor !== undefined) integer('factor', factor, { min: 1 });
     choice('method', method, ['flow', 'linear']);
     return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
   }
@@ -257,10 +268,10 @@ function wrap(make: () => RawVolume): Volume {
 }
 
 function fromInit(init: VolumeInit): RawVolume {
-  const given = knownOnly('init', init, INIT);
+  const given = checkProperties('init', init, INIT);
   const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
-    throw invalid('data', `a typed array is needed: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
+    throw invalid('data', `must be a typed array: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
   }
   return new RawVolume(
     data,
@@ -275,14 +286,14 @@ function fromInit(init: VolumeInit): RawVolume {
 
 function dims(given: unknown): Uint32Array {
   const sizes = numbers('dims', given, 3, 4);
-  for (const size of sizes) whole('dims', size, { min: 1 });
+  for (const size of sizes) integer('dims', size, { min: 1 });
   return Uint32Array.from([...sizes, 1].slice(0, 4));
 }
 
 function affine({ affine, spacing, origin }: Partial<VolumeInit>): Float64Array {
   if (affine === undefined) return placed(spacing, origin);
   if (spacing !== undefined || origin !== undefined) {
-    throw invalid('affine', 'spacing and origin cannot be given together with it: it says both');
+    throw invalid('affine', 'give either affine, or spacing and origin');
   }
   return numbers('affine', affine, 16);
 }

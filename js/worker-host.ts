@@ -25,19 +25,19 @@ import {
   isReference,
   lookUp,
   MEMBERS,
+  mapObjects,
   type Reference,
   type Reply,
   type Report,
   type Request,
   STATICS,
-  swapped,
   type Task,
 } from './worker-protocol.js';
-import type { ClassName, FunctionName, Library, Own } from './worker-types.js';
+import type { ClassName, FunctionName, Library, LibraryObject } from './worker-types.js';
 
 type Post = (reply: Reply, transfer: ArrayBuffer[]) => void;
 type Call = Extract<Task, { type: 'call' }>;
-type Made = { object: Own } | { failed: unknown };
+type Entry = { object: LibraryObject } | { failed: unknown };
 
 const LIBRARY: Pick<Library, ClassName | FunctionName> = {
   ...{ Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel },
@@ -47,13 +47,13 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
 /** Abort reason of tasks aborted by the page; the page knows the real reason. */
-const ABORTED = new VesicleError('aborted', 'the run was called off');
+const ABORTED = new VesicleError('aborted', 'the run was aborted');
 
 /** Handles the page's requests in order; runs continue between them. */
 class Host {
   readonly #post: Post;
-  readonly #made = new Map<number, Made>();
-  readonly #running = new Map<number, AbortController>();
+  readonly #objects = new Map<number, Entry>();
+  readonly #controllers = new Map<number, AbortController>();
   #last = 0;
 
   constructor(post: Post) {
@@ -61,7 +61,7 @@ class Host {
   }
 
   receive(request: Request): void {
-    if (request.type === 'abort') this.#running.get(request.id)?.abort(ABORTED);
+    if (request.type === 'abort') this.#controllers.get(request.id)?.abort(ABORTED);
     else if (request.type === 'free') this.#free(request.object);
     else void this.#answer(request.id, request);
   }
@@ -85,11 +85,11 @@ class Host {
   #make({ vesicle: at, class: name }: Reference, args: unknown[]): void {
     lookUp(MEMBERS, name);
     try {
-      const Class = LIBRARY[name] as unknown as new (...args: unknown[]) => Own;
-      this.#made.set(at, { object: new Class(...this.#incoming(args)) });
+      const Class = LIBRARY[name] as unknown as new (...args: unknown[]) => LibraryObject;
+      this.#objects.set(at, { object: new Class(...this.#incoming(args)) });
     } catch (failed) {
       // All later requests for this object fail with the same error.
-      this.#made.set(at, { failed });
+      this.#objects.set(at, { failed });
       throw failed;
     }
   }
@@ -112,13 +112,14 @@ class Host {
     return { kind: lookUp<string>(MEMBERS[classOf(object)], name), target: record(object) };
   }
 
-  #object({ vesicle: at, part }: Reference): Own {
-    const made = this.#made.get(at);
-    if (!made) throw new VesicleError('freed', 'this object was freed and cannot be used any more');
-    if ('failed' in made) throw made.failed;
-    if (part === undefined) return made.object;
-    if (lookUp<string>(MEMBERS[classOf(made.object)], part) === 'live') return record(made.object)[part] as Own;
-    throw new VesicleError('invalid-argument', `${part}: this is no object`);
+  #object({ vesicle: at, part }: Reference): LibraryObject {
+    const entry = this.#objects.get(at);
+    if (!entry) throw new VesicleError('freed', 'this object was freed and can no longer be used');
+    if ('failed' in entry) throw entry.failed;
+    if (part === undefined) return entry.object;
+    if (lookUp<string>(MEMBERS[classOf(entry.object)], part) === 'live')
+      return record(entry.object)[part] as LibraryObject;
+    throw new VesicleError('invalid-argument', `${part}: not an object`);
   }
 
   /** Copies the mesh into the page's buffers, which were transferred with the request and are transferred back. */
@@ -131,26 +132,26 @@ class Host {
   async #abortable(id: number, { on, name, args: [options], reports }: Call): Promise<unknown> {
     const { target } = this.#find(on, name);
     const abort = new AbortController();
-    this.#running.set(id, abort);
+    this.#controllers.set(id, abort);
     const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
-    const heard = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
+    const listeners = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
     try {
       const work = target[name] as (options: object) => Promise<unknown>;
-      return await work.call(target, { ...(options as object), signal: abort.signal, ...heard });
+      return await work.call(target, { ...(options as object), signal: abort.signal, ...listeners });
     } finally {
-      this.#running.delete(id);
+      this.#controllers.delete(id);
     }
   }
 
   #free(at: number): void {
-    const made = this.#made.get(at);
-    this.#made.delete(at);
-    if (made && 'object' in made) made.object.free();
+    const entry = this.#objects.get(at);
+    this.#objects.delete(at);
+    if (entry && 'object' in entry) entry.object.free();
   }
 
   #incoming(args: unknown[]): unknown[] {
     return args.map((arg) =>
-      swapped('', arg, (_, value) => {
+      mapObjects('', arg, (_, value) => {
         if (isReference(value)) return this.#object(value);
         return isBinary(value) ? value : undefined;
       }),
@@ -163,17 +164,17 @@ class Host {
    */
   #outgoing(result: unknown): [unknown, ArrayBuffer[]] {
     const buffers = new Set<ArrayBuffer>();
-    const value = swapped('', result, (_, found) => {
+    const value = mapObjects('', result, (_, found) => {
       if (ArrayBuffer.isView(found)) buffers.add(found.buffer as ArrayBuffer);
       if (isBinary(found)) return found;
-      return CLASSES.some((name) => found instanceof LIBRARY[name]) ? this.#keep(found as Own) : undefined;
+      return CLASSES.some((name) => found instanceof LIBRARY[name]) ? this.#keep(found as LibraryObject) : undefined;
     });
     return [value, [...buffers]];
   }
 
-  #keep(object: Own): Reference {
+  #keep(object: LibraryObject): Reference {
     this.#last -= 1;
-    this.#made.set(this.#last, { object });
+    this.#objects.set(this.#last, { object });
     return { vesicle: this.#last, class: classOf(object) };
   }
 }
@@ -182,7 +183,7 @@ const isBinary = (value: object): boolean => ArrayBuffer.isView(value) || value 
 
 const record = (value: object) => value as Record<string, unknown>;
 
-function classOf(object: Own): ClassName {
+function classOf(object: LibraryObject): ClassName {
   return CLASSES.find((name) => object instanceof LIBRARY[name]) as ClassName;
 }
 

@@ -181,7 +181,7 @@ export const FUNCTIONS: Names<FunctionName> = {
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
   if (found !== undefined) return found;
-  throw new VesicleError('invalid-argument', `${name}: there is no such thing in the worker`);
+  throw new VesicleError('invalid-argument', `${name}: no such member`);
 }
 
 /** Whether a value is a reference to an object in the worker. */
@@ -200,13 +200,13 @@ export function isPlain(value: object): boolean {
  * Greatest depth of nested objects in a message. Arguments and results of the library are shallower; cyclic values
  * exceed it.
  */
-const DEEPEST = 8;
+const MAX_DEPTH = 8;
 
 /**
  * Copies nested arrays and objects with replacements: `swap` returns the replacement of an object or function, or
  * undefined to descend into it. `path` is the location of the value, for error messages.
  */
-export function swapped(
+export function mapObjects(
   path: string,
   value: unknown,
   swap: (path: string, value: object) => unknown,
@@ -215,8 +215,8 @@ export function swapped(
   if ((typeof value !== 'object' && typeof value !== 'function') || value === null) return value;
   const other = swap(path, value);
   if (other !== undefined) return other;
-  if (depth === DEEPEST) throw new VesicleError('invalid-argument', `${path}: too many objects inside each other`);
-  const inside = (at: string, entry: unknown) => swapped(at, entry, swap, depth + 1);
+  if (depth === MAX_DEPTH) throw new VesicleError('invalid-argument', `${path}: objects are nested too deeply`);
+  const inside = (at: string, entry: unknown) => mapObjects(at, entry, swap, depth + 1);
   if (Array.isArray(value))
     return value.map((entry, index) => (isSimple(entry) ? entry : inside(`${path}[${index}]`, entry)));
   const named = (name: string) => (depth === 0 ? name : `${path}.${name}`);

@@ -1,5 +1,5 @@
 // The page's proxies of the objects in the worker.
-import { invalid, knownOnly } from './check.js';
+import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
 import type { MeshArrays } from './mesh.js';
@@ -9,17 +9,17 @@ import {
   isPlain,
   isReference,
   MEMBERS,
+  mapObjects,
   type Reference,
   type Report,
   STATICS,
-  swapped,
   type Task,
 } from './worker-protocol.js';
 import type { Session } from './worker-session.js';
 import { currentSession } from './worker-start.js';
 import type { ClassName, FunctionName, RemoteClass, RemoteFunction } from './worker-types.js';
 
-const handedOver = new WeakSet<object>();
+const markedForTransfer = new WeakSet<object>();
 
 /**
  * Marks a typed array, or all typed arrays inside an object, to be transferred to the worker without a copy when next
@@ -28,13 +28,13 @@ const handedOver = new WeakSet<object>();
  * @returns The value itself.
  */
 export function transfer<T extends object>(value: T): T {
-  if (value === null || typeof value !== 'object') throw invalid('value', 'a typed array or an object is needed');
-  handedOver.add(value);
+  if (value === null || typeof value !== 'object') throw invalid('value', 'must be a typed array or an object');
+  markedForTransfer.add(value);
   return value;
 }
 
 /** Identity and state of a remote object: its reference, the session it belongs to, and whether it was freed. */
-class Place {
+class RemoteState {
   freed = false;
 
   constructor(
@@ -47,33 +47,34 @@ class Place {
   ) {}
 }
 
-let placeOf: (remote: Remote) => Place;
+let stateOf: (remote: Remote) => RemoteState;
 
-const garbage = new FinalizationRegistry<Place>(release);
+const finalizers = new FinalizationRegistry<RemoteState>(release);
 
-function release(place: Place): void {
-  place.freed = true;
-  place.session?.free(place.reference.vesicle);
+function release(state: RemoteState): void {
+  state.freed = true;
+  state.session?.free(state.reference.vesicle);
 }
 
 /** Base class of the page's proxies of objects in the worker. */
 class Remote {
-  readonly #place: Place;
+  readonly #state: RemoteState;
   readonly #parts = new Map<string, Remote>();
 
   static {
-    placeOf = (remote) => remote.#place;
+    stateOf = (remote) => remote.#state;
   }
 
-  constructor(place: Place) {
-    this.#place = place;
-    if (!place.owner) garbage.register(this, place, place);
+  constructor(state: RemoteState) {
+    this.#state = state;
+    if (!state.owner) finalizers.register(this, state, state);
   }
 
   /** Returns the proxy of a live mesh, always the same. */
   part(name: string): Remote {
-    const { reference, session, failed } = this.#place;
-    const made = () => new classes.Mesh(new Place({ ...reference, class: 'Mesh', part: name }, session, failed, this));
+    const { reference, session, failed } = this.#state;
+    const made = () =>
+      new classes.Mesh(new RemoteState({ ...reference, class: 'Mesh', part: name }, session, failed, this));
     const part = this.#parts.get(name) ?? made();
     this.#parts.set(name, part);
     return part;
@@ -81,9 +82,9 @@ class Remote {
 
   free(): void {
     // A live mesh is freed with its model.
-    if (this.#place.owner || this.#place.freed) return;
-    garbage.unregister(this.#place);
-    release(this.#place);
+    if (this.#state.owner || this.#state.freed) return;
+    finalizers.unregister(this.#state);
+    release(this.#state);
   }
 
   [Symbol.dispose](): void {
@@ -96,10 +97,10 @@ class Remote {
  * ended.
  */
 function sessionOf(remote: Remote): Session {
-  const { failed, session, reference, owner } = placeOf(remote);
+  const { failed, session, reference, owner } = stateOf(remote);
   if (failed !== undefined) throw failed;
-  const { freed } = owner ? placeOf(owner) : placeOf(remote);
-  if (freed) throw new VesicleError('freed', `this ${reference.class} was freed and cannot be used any more`);
+  const { freed } = owner ? stateOf(owner) : stateOf(remote);
+  if (freed) throw new VesicleError('freed', `this ${reference.class} was freed and can no longer be used`);
   if (session === currentSession()) return session;
   throw new VesicleError('freed', `this ${reference.class} was lost when its worker ended; make a new one`);
 }
@@ -107,28 +108,28 @@ function sessionOf(remote: Remote): Session {
 /** Returns the reference of a usable object; throws as `sessionOf`. */
 function referenceOf(remote: Remote): Reference {
   sessionOf(remote);
-  return placeOf(remote).reference;
+  return stateOf(remote).reference;
 }
 
 /**
  * Prepares arguments for posting: references instead of proxies, copies of typed arrays unless marked by `transfer`,
  * and the buffers to transfer.
  */
-function packed(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuffer[] } {
+function serialize(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuffer[] } {
   const buffers = new Set<ArrayBuffer>();
   const pack = (path: string, value: object, moved: boolean): unknown => {
     if (value instanceof Remote) return referenceOf(value);
-    const moves = moved || handedOver.has(value);
+    const moves = moved || markedForTransfer.has(value);
     if (ArrayBuffer.isView(value)) {
-      const sent = moves ? whole(path, value) : copied(path, value);
+      const sent = moves ? transferable(path, value) : copyOfView(path, value);
       buffers.add(sent.buffer as ArrayBuffer);
       return sent;
     }
     if (!Array.isArray(value) && !isPlain(value)) throw unsendable(path, value);
-    // Nested values are packed one by one, and are transferred, too.
-    return moves && !moved ? swapped(path, value, (at, inner) => pack(at, inner, true)) : undefined;
+    // Nested values are serialised one by one, and are transferred, too.
+    return moves && !moved ? mapObjects(path, value, (at, inner) => pack(at, inner, true)) : undefined;
   };
-  const sent = args.map((arg, k) => swapped(`argument ${k + 1}`, arg, (path, value) => pack(path, value, false)));
+  const sent = args.map((arg, k) => mapObjects(`argument ${k + 1}`, arg, (path, value) => pack(path, value, false)));
   return { args: sent, transfer: [...buffers] };
 }
 
@@ -139,40 +140,40 @@ function unsendable(path: string, value: object): VesicleError {
 }
 
 /** Returns an array to be transferred with its buffer; throws `invalid-argument` for shared memory. */
-function whole(path: string, array: ArrayBufferView): ArrayBufferView {
-  if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'memory that is shared cannot be handed over');
-  return array.byteLength > 0 ? array : copied(path, array);
+function transferable(path: string, array: ArrayBufferView): ArrayBufferView {
+  if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'shared memory cannot be transferred');
+  return array.byteLength > 0 ? array : copyOfView(path, array);
 }
 
 /** Copies the visible part of an array's buffer. */
-function copied(path: string, array: ArrayBufferView): ArrayBufferView {
+function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
   try {
     // Works for all typed arrays, and copies also where a subclass's slice returns a view.
     return Uint8Array.prototype.slice.call(array);
   } catch {
-    throw invalid(path, 'is no typed array, or was handed over before');
+    throw invalid(path, 'not a typed array, or already transferred');
   }
 }
 
 /** Replaces the references in a result by proxies. */
-function received(value: unknown, session: Session): unknown {
-  return swapped('', value, (_, found) => {
-    if (isReference(found)) return new classes[found.class](new Place(found, session));
+function deserialize(value: unknown, session: Session): unknown {
+  return mapObjects('', value, (_, found) => {
+    if (isReference(found)) return new classes[found.class](new RemoteState(found, session));
     return ArrayBuffer.isView(found) ? found : undefined;
   });
 }
 
 /** Posts a call on an object, on a class, or of a free function, and resolves with its result. */
-async function ask(
+async function post(
   session: Session,
   on: Remote | ClassName | undefined,
   name: string,
   args: unknown[],
 ): Promise<unknown> {
   const target = on instanceof Remote ? referenceOf(on) : on;
-  const sent = packed(args);
-  const { answer } = session.ask({ type: 'call', on: target, name, args: sent.args }, { ...sent, asked: on });
-  return received(await answer, session);
+  const sent = serialize(args);
+  const { answer } = session.post({ type: 'call', on: target, name, args: sent.args }, { ...sent, target: on });
+  return deserialize(await answer, session);
 }
 
 async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
@@ -201,9 +202,9 @@ async function abortable(
   signal?.throwIfAborted();
   const session = sessionOf(remote);
   const stop = new AbortController();
-  const onReport = listener && ((report: Report) => tell(listener, report, stop));
+  const onReport = listener && ((report: Report) => notify(listener, report, stop));
   const task: Task = { type: 'call', on: referenceOf(remote), name, args: [options], reports: !!listener };
-  const { id, answer } = session.ask(task, { asked: remote, onReport });
+  const { id, answer } = session.post(task, { target: remote, onReport });
   const abort = () => stop.abort(signal?.reason);
   signal?.addEventListener('abort', abort);
   stop.signal.addEventListener('abort', () => session.abort(id));
@@ -220,7 +221,7 @@ async function abortable(
 }
 
 /** Calls a listener; if it throws, the task is aborted, though the worker may be some steps ahead. */
-function tell(listener: Listener, report: Report, stop: AbortController): void {
+function notify(listener: Listener, report: Report, stop: AbortController): void {
   if (stop.signal.aborted) return;
   try {
     listener(report);
@@ -231,11 +232,11 @@ function tell(listener: Listener, report: Report, stop: AbortController): void {
 
 /** Implements `Mesh.copyTo`: the buffers of `out` are transferred to the worker and back. */
 async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
-  const { uvs, colors, ...given } = knownOnly('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
+  const { uvs, colors, ...given } = checkProperties('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
   const session = sessionOf(remote);
-  const sent = packed([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) })]);
+  const sent = serialize([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) })]);
   const task: Task = { type: 'call', on: referenceOf(remote), name: 'copyTo', args: sent.args };
-  const { answer } = session.ask(task, { ...sent, asked: remote });
+  const { answer } = session.post(task, { ...sent, target: remote });
   // Transferred arrays cannot be sent again until they are back.
   Object.assign(out, { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() });
   for (const name of ['uvs', 'colors'] as const) delete out[name];
@@ -245,15 +246,15 @@ async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
 }
 
 /** Requests the creation of an object; an error is kept and thrown by every later use of the object. */
-function make(name: ClassName, args: readonly unknown[]): { place: Place; made: Promise<unknown> } {
+function make(name: ClassName, args: readonly unknown[]): { state: RemoteState; created: Promise<unknown> } {
   try {
     const session = currentSession();
-    const reference = { vesicle: session.number(), class: name };
-    const sent = packed(args);
-    const { answer } = session.ask({ type: 'make', as: reference, args: sent.args }, sent);
-    return { place: new Place(reference, session), made: answer };
+    const reference = { vesicle: session.nextId(), class: name };
+    const sent = serialize(args);
+    const { answer } = session.post({ type: 'make', as: reference, args: sent.args }, sent);
+    return { state: new RemoteState(reference, session), created: answer };
   } catch (error) {
-    return { place: new Place({ vesicle: 0, class: name }, undefined, error), made: Promise.reject(error) };
+    return { state: new RemoteState({ vesicle: 0, class: name }, undefined, error), created: Promise.reject(error) };
   }
 }
 
@@ -264,18 +265,18 @@ function remoteClass(name: ClassName): Class {
   const named = {
     [name]: class extends Remote {
       constructor(...args: unknown[]) {
-        super(args[0] instanceof Place ? args[0] : silently(make(name, args)));
+        super(args[0] instanceof RemoteState ? args[0] : ignoreRejection(make(name, args)));
       }
     },
   };
-  const made = named[name] as unknown as Class;
+  const proxy = named[name] as unknown as Class;
   for (const method of Object.keys(STATICS[name])) {
-    define(made, method, { value: async (...args: unknown[]) => ask(currentSession(), name, method, args) });
+    define(proxy, method, { value: async (...args: unknown[]) => post(currentSession(), name, method, args) });
   }
-  for (const [member, kind] of Object.entries(MEMBERS[name])) define(made.prototype, member, memberOf(member, kind));
+  for (const [member, kind] of Object.entries(MEMBERS[name])) define(proxy.prototype, member, memberOf(member, kind));
   // Meshes are created by static methods only.
-  if (name !== 'Mesh') define(made, 'create', { value: creator(made, name) });
-  return made;
+  if (name !== 'Mesh') define(proxy, 'create', { value: creator(proxy, name) });
+  return proxy;
 }
 
 const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
@@ -283,14 +284,14 @@ const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unkn
 function memberOf(name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;
   const call = async (remote: Remote, args: unknown[]) =>
-    special ? special(remote, ...(args as never[])) : ask(sessionOf(remote), remote, name, args);
-  if (kind === 'live') return { get: fromThis((remote) => remote.part(name)) };
-  if (kind === 'value') return { get: fromThis((remote) => call(remote, [])) };
-  return { value: fromThis(call) };
+    special ? special(remote, ...(args as never[])) : post(sessionOf(remote), remote, name, args);
+  if (kind === 'live') return { get: asMethod((remote) => remote.part(name)) };
+  if (kind === 'value') return { get: asMethod((remote) => call(remote, [])) };
+  return { value: asMethod(call) };
 }
 
 /** Turns a function of the proxy into a method or getter. */
-function fromThis<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remote, ...args: unknown[]) => T {
+function asMethod<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remote, ...args: unknown[]) => T {
   return function (this: Remote, ...args) {
     return work(this, args);
   };
@@ -303,16 +304,16 @@ function define(target: object, name: string, what: PropertyDescriptor): void {
 }
 
 /** Suppresses the unhandled rejection: the failure is reported by every use of the object. */
-function silently({ place, made }: ReturnType<typeof make>): Place {
-  made.catch(() => undefined);
-  return place;
+function ignoreRejection({ state, created }: ReturnType<typeof make>): RemoteState {
+  created.catch(() => undefined);
+  return state;
 }
 
-function creator(made: Class, name: ClassName): (...args: unknown[]) => Promise<Remote> {
+function creator(proxy: Class, name: ClassName): (...args: unknown[]) => Promise<Remote> {
   return async (...args) => {
-    const asked = make(name, args);
-    const object = new made(asked.place);
-    await asked.made;
+    const request = make(name, args);
+    const object = new proxy(request.state);
+    await request.created;
     return object;
   };
 }
@@ -326,6 +327,6 @@ export const remoteClasses = classes as unknown as { readonly [N in ClassName]: 
 
 /** Returns the proxy of a free function of the library. */
 export function remoteFunction<N extends FunctionName>(name: N): RemoteFunction<N> {
-  const call = async (...args: unknown[]) => ask(currentSession(), undefined, name, args);
+  const call = async (...args: unknown[]) => post(currentSession(), undefined, name, args);
   return call as unknown as RemoteFunction<N>;
 }

@@ -11,23 +11,23 @@ export interface NodeWorker {
   unref(): void;
 }
 
-interface Waiting {
+interface PendingRequest {
   resolve: (value: unknown) => void;
   reject: (error: unknown) => void;
   onReport: ((report: Report) => void) | undefined;
   /** The object of the call, kept from garbage collection until the answer arrives. */
-  asked: unknown;
+  target: unknown;
 }
 
 /** Options of a request: buffers to transfer, the object of the call, and the listener of reports. */
-interface Extra {
+interface RequestOptions {
   transfer?: ArrayBuffer[];
-  asked?: unknown;
+  target?: unknown;
   onReport?: ((report: Report) => void) | undefined;
 }
 
 /** A pending answer and the id of its request. */
-interface Asked {
+interface PendingAnswer {
   id: number;
   answer: Promise<unknown>;
 }
@@ -35,7 +35,7 @@ interface Asked {
 /** Sends requests to a worker and settles the promise of each with its answer. */
 export class Session {
   readonly #worker: Worker | NodeWorker;
-  readonly #waiting = new Map<number, Waiting>();
+  readonly #pending = new Map<number, PendingRequest>();
   #last = 0;
   #started = false;
   #end: Error | undefined;
@@ -44,7 +44,7 @@ export class Session {
     this.#worker = worker;
     listen(
       worker,
-      (reply) => this.#hear(reply),
+      (reply) => this.#receive(reply),
       (what) => this.end(this.#started ? new VesicleCrash(`The worker ended: ${what}`) : notStarted(what)),
     );
   }
@@ -55,17 +55,17 @@ export class Session {
   }
 
   /** Returns a new id, for an object or a request. */
-  number(): number {
+  nextId(): number {
     this.#last += 1;
     return this.#last;
   }
 
   /** Posts a task. Throws synchronously if it cannot be posted. */
-  ask(task: Task, { transfer = [], asked, onReport }: Extra = {}): Asked {
+  post(task: Task, { transfer = [], target, onReport }: RequestOptions = {}): PendingAnswer {
     if (this.#end) throw this.#end;
-    const id = this.number();
+    const id = this.nextId();
     this.#send({ ...task, id }, transfer);
-    const answer = new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject, onReport, asked }));
+    const answer = new Promise((resolve, reject) => this.#pending.set(id, { resolve, reject, onReport, target }));
     // Keeps Node running as long as requests are pending, and no longer.
     if ('ref' in this.#worker) this.#worker.ref();
     return { id, answer };
@@ -86,8 +86,8 @@ export class Session {
     if (this.#end) return;
     this.#end = reason;
     this.#worker.terminate();
-    for (const { reject } of this.#waiting.values()) reject(reason);
-    this.#waiting.clear();
+    for (const { reject } of this.#pending.values()) reject(reason);
+    this.#pending.clear();
   }
 
   #send(request: Request, transfer: ArrayBuffer[]): void {
@@ -95,21 +95,21 @@ export class Session {
       this.#worker.postMessage(request, transfer);
     } catch (error) {
       const what = (error as Error).message;
-      throw new VesicleError('invalid-argument', `an argument cannot be handed over to the worker: ${what}`);
+      throw new VesicleError('invalid-argument', `an argument cannot be sent to the worker: ${what}`);
     }
   }
 
-  #hear(reply: Reply): void {
+  #receive(reply: Reply): void {
     this.#started = true;
-    const waiting = this.#waiting.get(reply.id);
-    if (!waiting || this.#end) return;
-    if (reply.type === 'report') waiting.onReport?.(reply.report);
-    else this.#settle(reply, waiting);
+    const request = this.#pending.get(reply.id);
+    if (!request || this.#end) return;
+    if (reply.type === 'report') request.onReport?.(reply.report);
+    else this.#settle(reply, request);
   }
 
-  #settle(reply: Exclude<Reply, { type: 'report' }>, { resolve, reject }: Waiting): void {
-    this.#waiting.delete(reply.id);
-    if ('unref' in this.#worker && this.#waiting.size === 0) this.#worker.unref();
+  #settle(reply: Exclude<Reply, { type: 'report' }>, { resolve, reject }: PendingRequest): void {
+    this.#pending.delete(reply.id);
+    if ('unref' in this.#worker && this.#pending.size === 0) this.#worker.unref();
     if (reply.type === 'value') {
       resolve(reply.value);
       return;
@@ -124,23 +124,23 @@ const notStarted = (what: string) => new Error(`init: the worker could not be st
 
 function errorOf(failure: Failure): Error {
   if (failure.kind === 'other') return Object.assign(failure.error, { name: failure.name });
-  if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was called off');
+  if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was aborted');
   if (failure.kind === 'error') return new VesicleError(failure.code, failure.message);
   const crash = new VesicleCrash('', { cause: failure.cause });
   crash.message = failure.message;
   return crash;
 }
 
-function listen(worker: Worker | NodeWorker, hear: (reply: Reply) => void, fail: (what: string) => void): void {
-  const garbled = () => fail('a message from it could not be read');
+function listen(worker: Worker | NodeWorker, receive: (reply: Reply) => void, fail: (what: string) => void): void {
+  const garbled = () => fail('a message could not be deserialised');
   if ('on' in worker) {
-    worker.on('message', (reply) => hear(reply as Reply));
+    worker.on('message', (reply) => receive(reply as Reply));
     worker.on('error', (error) => fail(error instanceof Error ? error.message : String(error)));
-    worker.on('exit', (code) => fail(`it left with code ${code}`));
+    worker.on('exit', (code) => fail(`exited with code ${code}`));
     worker.on('messageerror', garbled);
     return;
   }
-  worker.addEventListener('message', ({ data }) => hear(data));
+  worker.addEventListener('message', ({ data }) => receive(data));
   worker.addEventListener('error', (event) => {
     // All pending requests reject with it; the console need not report it.
     event.preventDefault();

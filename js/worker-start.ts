@@ -1,5 +1,5 @@
 // Starts and terminates the worker, for any origin of page and package.
-import { knownOnly } from './check.js';
+import { checkProperties } from './check.js';
 import { VesicleError } from './error.js';
 import type { InitInput } from './runtime.js';
 import type { Task } from './worker-protocol.js';
@@ -20,7 +20,7 @@ export interface WorkerInit {
 let session: Session | undefined;
 let starting: Promise<void> | undefined;
 // Number of starts, to recognise one that was cancelled meanwhile.
-let turn = 0;
+let startCount = 0;
 
 /**
  * Starts the worker and loads the module in it; required before anything else. Idempotent: later calls return the same
@@ -34,7 +34,7 @@ export function init(given: WorkerInit = {}): Promise<void> {
     session = undefined;
     starting = undefined;
   }
-  starting ??= begin(given);
+  starting ??= startOnce(given);
   return starting;
 }
 
@@ -43,7 +43,7 @@ export function init(given: WorkerInit = {}): Promise<void> {
  * `VesicleError` `aborted`. {@link init} starts a new worker.
  */
 export function terminate(): void {
-  turn += 1;
+  startCount += 1;
   starting = undefined;
   session?.end(terminated());
 }
@@ -56,28 +56,28 @@ export function currentSession(): Session {
 
 const terminated = () => new VesicleError('aborted', 'the worker was terminated; call init() to start another');
 
-async function begin(given: WorkerInit): Promise<void> {
-  turn += 1;
-  const mine = turn;
+async function startOnce(given: WorkerInit): Promise<void> {
+  startCount += 1;
+  const own = startCount;
   try {
-    await start(given, mine);
+    await start(given, own);
   } catch (error) {
-    if (mine === turn) giveUp(error);
+    if (own === startCount) resetAfterFailure(error);
     throw error;
   }
 }
 
-async function start(given: WorkerInit, mine: number): Promise<void> {
-  const { module_or_path, worker } = knownOnly('options', given, ['module_or_path', 'worker']);
+async function start(given: WorkerInit, own: number): Promise<void> {
+  const { module_or_path, worker } = checkProperties('options', given, ['module_or_path', 'worker']);
   const module = await sendable(await module_or_path);
-  const made = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
-  if (mine === turn) session = made;
-  else made.end(terminated());
-  await made.ask({ type: 'init', module }).answer;
+  const started = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
+  if (own === startCount) session = started;
+  else started.end(terminated());
+  await started.post({ type: 'init', module }).answer;
 }
 
 /** Ends the session after a failed start; a later call of `init` tries again. */
-function giveUp(error: unknown): void {
+function resetAfterFailure(error: unknown): void {
   starting = undefined;
   session?.end(error instanceof Error ? error : new Error(String(error)));
   session = undefined;

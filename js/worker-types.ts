@@ -25,7 +25,7 @@ export type FunctionName = Exclude<
 >;
 
 /** Any object of the library, as it exists in the worker. */
-export type Own = Library[ClassName]['prototype'];
+export type LibraryObject = Library[ClassName]['prototype'];
 
 /** A `Volume` of the library, in the worker. */
 export interface Volume extends Remote<vesicle.Volume> {}
@@ -53,29 +53,29 @@ interface Remotes {
 
 type NameOf<T> = { [N in ClassName]: T extends Library[N]['prototype'] ? N : never }[ClassName];
 
-type Whole = ArrayBufferView | AbortSignal | Callable;
+type Opaque = ArrayBufferView | AbortSignal | Callable;
 
-type Swapped<T> = T extends Own
+type SwapRemotes<T> = T extends LibraryObject
   ? Remotes[NameOf<T>]
-  : T extends Whole
+  : T extends Opaque
     ? T
     : T extends object
-      ? { [K in keyof T]: Swapped<T[K]> }
+      ? { [K in keyof T]: SwapRemotes<T[K]> }
       : T;
 
 /** A type with remote objects in place of the library's. A type that contains none of them keeps its name. */
-export type There<T> = [T, Swapped<T>] extends [Swapped<T>, T] ? T : Swapped<T>;
+export type WithRemotes<T> = [T, SwapRemotes<T>] extends [SwapRemotes<T>, T] ? T : SwapRemotes<T>;
 
-type Arguments<A extends unknown[]> = { [K in keyof A]: There<A[K]> };
+type Arguments<A extends unknown[]> = { [K in keyof A]: WithRemotes<A[K]> };
 
 // Method types are compared bivariantly, so that each remote model is a Stepper, as in the library.
 type Method<A extends unknown[], R> = { method(...args: A): R }['method'];
 
-type Member<T> = [T] extends [Own]
-  ? There<T>
+type Member<T> = [T] extends [LibraryObject]
+  ? WithRemotes<T>
   : [T] extends [(...args: infer A) => infer R]
-    ? Method<Arguments<A>, Promise<There<Awaited<R>>>>
-    : Promise<There<T>>;
+    ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
+    : Promise<WithRemotes<T>>;
 
 /**
  * Proxy of an object in the worker: methods and properties return promises; live meshes are available synchronously.
@@ -97,20 +97,20 @@ export type RemoteFunction<N extends FunctionName> = Member<Library[N]>;
 /** Proxy of a class whose objects live in the worker. */
 export type RemoteClass<N extends ClassName> = {
   readonly [K in keyof Library[N] as Exclude<K, 'prototype'>]: Member<Library[N][K]>;
-} & Maker<Library[N]>;
+} & Constructor<Library[N]>;
 
-type Maker<C> = C extends new (
+type Constructor<C> = C extends new (
   ...args: infer A
 ) => infer I
   ? {
       /** Returns an object at once; if its creation fails, every promise of the object rejects. */
-      new (...args: Arguments<A>): There<I>;
+      new (...args: Arguments<A>): WithRemotes<I>;
       /** Resolves with an object once it is created; rejects if the creation fails. */
-      create(...args: Arguments<A>): Promise<There<I>>;
+      create(...args: Arguments<A>): Promise<WithRemotes<I>>;
     }
   : // For classes without a public constructor; only for `instanceof`.
     C extends { prototype: infer I }
     ? abstract new (
         ...args: never
-      ) => There<I>
+      ) => WithRemotes<I>
     : never;

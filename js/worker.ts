@@ -95,13 +95,13 @@ export { init as default, terminate, type WorkerInit } from './worker-start.js';
 export type { Remote, Stepper } from './worker-types.js';
 
 /** Constructor options of a {@link DeformableModel} in the worker, as in `vesicle`. */
-export type DeformableOptions = there.There<vesicle.DeformableOptions>;
+export type DeformableOptions = there.WithRemotes<vesicle.DeformableOptions>;
 /** The initial surface of a {@link DeformableModel} in the worker, as in `vesicle`. */
-export type DeformableStart = there.There<vesicle.DeformableStart>;
+export type DeformableStart = there.WithRemotes<vesicle.DeformableStart>;
 /** Constructor options of a {@link MultiresolutionModel} in the worker, as in `vesicle`. */
-export type MultiresOptions = there.There<vesicle.MultiresOptions>;
+export type MultiresOptions = there.WithRemotes<vesicle.MultiresOptions>;
 /** Constructor options of a {@link SurfaceTracker} in the worker, as in `vesicle`. */
-export type TrackingOptions = there.There<vesicle.TrackingOptions>;
+export type TrackingOptions = there.WithRemotes<vesicle.TrackingOptions>;
 
 export type Volume = there.Volume;
 export type Mesh = there.Mesh;

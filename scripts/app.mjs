@@ -2,7 +2,7 @@
 import { writeNotices } from './licences.mjs';
 import { at, must, say, tool } from './shell.mjs';
 
-/** The app and its documentation as static files, ready for any server. */
+/** Builds the app and its documentation into `dist/` as static files for any server. */
 export async function buildApp() {
   const started = performance.now();
   await must(tool('vite'), ['build', '--logLevel', 'warn', '--config', at('www/vite.config.ts')]);

@@ -1,4 +1,4 @@
-// What the programs in examples/ measure natively, in the form of the benches in Node and Chromium.
+// Runs the benchmark programs in examples/ and returns their figures in the form of the benches in Node and Chromium.
 import { mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -7,7 +7,7 @@ import { must } from './shell.mjs';
 const example = (name, files = [], env = {}) =>
   must('cargo', ['run', '--quiet', '--locked', '--release', '--example', name, '--', ...files], { env });
 
-/** A folder for files in passing, gone after `work`. */
+/** Calls `work` with the path of a temporary folder, removes the folder afterwards, and returns the result. */
 export async function inFolder(work) {
   const folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   try {
@@ -17,12 +17,12 @@ export async function inFolder(work) {
   }
 }
 
-/** Steps of the deformable model: its program prints the rows as JSON. */
+/** Returns the native timings of steps of the deformable model, which the example prints as JSON. */
 export async function stepsNatively() {
   return { host: 'native', rows: JSON.parse(await example('step_figures')) };
 }
 
-/** Remeshing of the same meshes as in bench/remesh.mjs. */
+/** Returns the native timings of remeshing, of the same meshes as in bench/remesh.mjs. */
 export async function remeshNatively() {
   const { meshes } = await import('../bench/remesh.mjs');
   const printed = await inFolder(async (folder) => {
@@ -32,13 +32,13 @@ export async function remeshNatively() {
       await writeFile(files.at(-1), mesh.toBytes('ply'));
       mesh.free();
     }
-    // Of these files alone, without the shapes that the program brings along.
+    // Only these files, without the example's built-in shapes.
     return example('remesh_figures', files, { ONLY: '.ply' });
   });
   return { host: 'native', rows: readTable(printed).map(remeshRow) };
 }
 
-/** Rows of a printed table, by the words of its first line. */
+/** Parses a printed table into row objects whose keys are the words of its first line. */
 function readTable(printed) {
   const [head, ...lines] = printed.trim().split('\n');
   const names = head.trim().split(/\s+/);

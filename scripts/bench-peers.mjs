@@ -1,20 +1,23 @@
-// Other people's software on the data of our own bench, in the same run: bench/peers.py times it where it is there. What can be
-// compared and what cannot is said at its head. VESICLE_PYTHON names another Python than python3.
+// Compares other software with this library on the benches' data, in the same run. bench/peers.py times the packages
+// that are installed; its docstring says how far figures can be compared. VESICLE_PYTHON names a Python other than
+// python3.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus, loadavg } from 'node:os';
 import { join } from 'node:path';
 import { inFolder, remeshNatively } from './bench-native.mjs';
 import { at, run } from './shell.mjs';
 
-/** For what takes a moment only: so many times as many runs, on both sides. */
+/** Factor on the number of runs of short tasks, for both sides. */
 const CHEAP = 10;
 
 export const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
 
-/** What the machine was busy with before anything was measured here. */
+/** Load average of the machine before the benches start. */
 const [load] = loadavg();
 
-/** Rows of ours and theirs for each task and package, or why there is nothing of theirs. */
+/**
+ * Returns a row for each task and package, with the figures of both sides or the reason why the package was skipped.
+ */
 export async function comparePeers(scan, repeats) {
   const all = tasks(await measureOurs(scan, repeats));
   return inFolder(async (folder) => {
@@ -41,7 +44,7 @@ const PER_TRIANGLE = {
 
 const remeshTask = (name, factor) => `remesh ${name} ${factor}`;
 
-/** What is compared, with whom, and what ours came to. */
+/** Returns the tasks: their names, the packages to compare with, and this library's results. */
 function tasks({ head: { cubes, model }, points: { few, many }, remesh }) {
   const host = `Node ${process.versions.node}`;
   const solve = ({ solve, residual }) => ({ milliseconds: solve, residual });
@@ -65,7 +68,7 @@ function tasks({ head: { cubes, model }, points: { few, many }, remesh }) {
   return [...inNode.map((task) => ({ host, ...PER_RUN, ...task })), ...natively];
 }
 
-/** Writes what the others are to work on; gives the file that says so. */
+/** Writes the input files of the other packages and returns the path of the job file that lists them. */
 async function writeJob(folder, scan, repeats) {
   const { ISO } = await import('../bench/head.mjs');
   const { FEW, MANY } = await import('../bench/points.mjs');
@@ -103,13 +106,13 @@ async function writeMeshes(folder) {
   return written;
 }
 
-/** Lines of three numbers each. */
+/** Formats an array as lines of three numbers each, after the prefix `first`. */
 function lines(array, first = '') {
   const line = (_, k) => `${first}${array[3 * k]} ${array[3 * k + 1]} ${array[3 * k + 2]}`;
   return Array.from({ length: array.length / 3 }, line);
 }
 
-/** The one format that both remeshers read: text. */
+/** Returns a mesh as OFF text, the one format that both remeshers read. */
 function offOf({ positions, indices }) {
   const counts = `${positions.length / 3} ${indices.length / 3} 0`;
   return `${['OFF', counts, ...lines(positions), ...lines(indices, '3 ')].join('\n')}\n`;
@@ -121,7 +124,10 @@ async function measureTheirs(job) {
   return { results: JSON.parse(output.trim().split('\n').at(-1)) };
 }
 
-/** One row. What a package says without naming a task goes for all of them that it has not done. */
+/**
+ * Returns the row of a task and a package. A result without a task explains all tasks of its package that have no
+ * result.
+ */
 async function compare({ task, name, unit, figure, host, ours }, wanted, { results = [], absent }) {
   const from = results.filter(({ package: name }) => name === wanted);
   const found = from.find((one) => one.task === task) ?? from.find((one) => !one.task);
@@ -136,7 +142,9 @@ const COUNTED = ['vertices', 'triangles', 'iterations', 'converged', 'volume', '
 
 const counts = (of) => Object.fromEntries(COUNTED.filter((name) => name in of).map((name) => [name, of[name]]));
 
-/** The smallest angle and the crossings of a mesh of theirs, measured as ours are. */
+/**
+ * Returns the smallest angle and the number of self-intersections of another package's mesh, measured by this library.
+ */
 async function looked(files) {
   if (!files) return {};
   const { Mesh } = await import('../pkg/index.js');
@@ -152,10 +160,10 @@ async function looked(files) {
   }
 }
 
-/** What was read, from its own beginning. */
+/** Copies the bytes of a Node buffer, which may be part of a larger one, into an `ArrayBuffer` of their own. */
 const bufferOf = ({ buffer, byteOffset, byteLength }) => buffer.slice(byteOffset, byteOffset + byteLength);
 
-/** A line for each row, under a heading for each task. */
+/** Returns the printed lines: one for each row, with a heading for each task. */
 export function peerRows({ rows, bestOf }) {
   const lines = [['', '', `best of ${bestOf}; the ratio is ours to theirs`]];
   let task;
@@ -180,7 +188,7 @@ function peerLine(row) {
   return [`  ${row.package} ${short(version)}`, shown(row, theirs), `${ratio.toPrecision(2).padEnd(6)}  ${remark}`];
 }
 
-/** Without a word for the day it was packed on. */
+/** Removes the post-release number from a version. */
 const short = (version) => version.replace(/\.post\d+$/, '');
 
 function shown({ unit }, { figure }) {

@@ -1,6 +1,6 @@
-// Times points to a surface, remeshing, sculpting, tracking, single steps and heads, in Node, in Chromium and, where a
-// program for it is there, natively, the app in Chromium, and other people's software at the same; prints tables and writes
-// bench.json. `npm run bench -- points` does one of them, and writes nothing; so does `hosts`, which is done when asked for.
+// Runs the benches of all methods in Node and Chromium and, for those that have a native program, natively; measures
+// the app in Chromium; and compares with other software. Prints tables and writes bench.json. `npm run bench -- points`
+// runs a single bench and writes nothing; `hosts` runs only when it is named.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { buildApp } from './app.mjs';
@@ -16,7 +16,7 @@ const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
 const BUST = 'www/public/data/nefertiti.ply';
 const REPEATS = 3;
 
-/** What can be measured, and how each is printed. Each has a module of its own, with nothing in its memory yet. */
+/** The benches and how their results are printed. Each imports its own module, with an empty wasm memory. */
 const BENCHES = {
   points: {
     inNode: async () => (await import('../bench/points.mjs')).measure(REPEATS),
@@ -51,7 +51,7 @@ const BENCHES = {
     rows: headRows,
   },
   page: {
-    // The whole app, in a browser only.
+    // Measures the whole app, in a browser only.
     alone: async () => {
       await buildApp();
       return (await import('../bench/page.mjs')).measure(at('dist'), REPEATS);
@@ -59,7 +59,7 @@ const BENCHES = {
     rows: pageRows,
   },
   hosts: {
-    // For docs/hosts.md, and not in the report.
+    // For docs/hosts.md; not part of the report.
     apart: true,
     alone: async () => {
       await buildApp();
@@ -165,7 +165,7 @@ function trackRows({ host, dims, frames, cubes, run, ratio, trueEjection, bytes 
   ];
 }
 
-/** Sizes against the smallest, and, natively measured before, one processor against the other. */
+/** Returns rows for mesh sizes, relative to the smallest one and, if given, to the native timings. */
 function stepRows({ host, rows }, native) {
   const row = ({ vertices, step, topology }, k) => {
     const remarks = [`${(step / rows[0].step).toFixed(2)} of the smallest`, `topology ${topology.toFixed(1)} ms`];
@@ -175,7 +175,7 @@ function stepRows({ host, rows }, native) {
   return [[host, '', 'all vertices moving, the best of 6 to 36 steps'], ...rows.map(row)];
 }
 
-/** What a run does to the main thread; the view's frames; what is kept and how it came there. */
+/** Returns rows for start-up, long tasks of the main thread, frame rates, memory and transferred bytes. */
 function pageRows({ host, viewport, cold, warm, runs, motion, memory }) {
   const megabytes = (bytes) => `${((bytes ?? 0) / 1e6).toFixed(1)} MB`;
   const milliseconds = (took) => `${took.toFixed(0)} ms`;

@@ -1,10 +1,10 @@
-// Makes one file of the package out of several.
+// Bundles several modules of the package into one file.
 import { copyFile } from 'node:fs/promises';
 import { at } from './shell.mjs';
 
-/** Bundles `entry` into `pkg/<name>.js`, with plugins of its own. */
+/** Bundles `entry` into `pkg/<name>.js`, with additional plugins. */
 export async function bundle(name, entry, plugins, minify) {
-  // Fetched by set-up, which comes first: on a fresh machine there is no Vite when this file is read.
+  // Imported here because set-up installs it: on a fresh machine there is no Vite when this file is read.
   const { build } = await import('vite');
   const outDir = at('target', name);
   await build({

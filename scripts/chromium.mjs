@@ -3,11 +3,11 @@ import { chromium } from 'playwright-core';
 import { findChromium } from './setup.mjs';
 
 const ARGUMENTS = [
-  // WebGL2 in software, and no calls home.
+  // WebGL2 rendered in software, and no background requests.
   ...['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking'],
 ];
 
-/** A browser; the caller closes it. Throws where there is none. */
+/** Launches a browser, which the caller closes. Throws if none is installed. */
 export async function launchChromium() {
   const executablePath = findChromium();
   if (!executablePath) throw new Error('no Chromium or Chrome was found: install one, or set CHROMIUM_PATH');

@@ -1,9 +1,10 @@
-// Makes `<vesicle-lab>`: its code with three.js in one file, and its types; the library is the one beside it.
+// Builds `<vesicle-lab>`: one file with its code and three.js, and its types. It imports the library from the same
+// folder.
 import { bundle } from './bundle.mjs';
 import { noteBundled } from './licences.mjs';
 import { at, must, tool } from './shell.mjs';
 
-/** What the element shares with the package stays where it is. */
+/** Files that the element shares with the package are not bundled. */
 const shared = {
   name: 'shared',
   enforce: 'pre',

@@ -1,15 +1,15 @@
-// Fuzzes the core: `npm run fuzz -- [seconds per target] [target…]`, 60 seconds and all targets without. What they find
-// is in fuzz/artifacts, what they learned in fuzz/corpus; neither belongs into the repository.
+// Fuzzes the core: `npm run fuzz -- [seconds per target] [target…]`, by default all targets for 60 seconds each.
+// Failing inputs go to fuzz/artifacts, new corpus inputs to fuzz/corpus; neither belongs into the repository.
 import { existsSync } from 'node:fs';
 import { mkdir, readdir, readFile } from 'node:fs/promises';
 import { at, must, run, say, script } from './shell.mjs';
 
 const NIGHTLY = '+nightly';
 const SECONDS = 60;
-/** Longer inputs are slower and find no more. */
+/** Longest input in bytes. Longer inputs are slower and find no more. */
 const LONGEST = 4096;
 
-// The core has no unsafe code of its own for a sanitizer to look into; memory is counted by the targets.
+// The core has no unsafe code of its own that a sanitizer could check; the targets count memory themselves.
 const BUILD = ['--sanitizer', 'none', '--codegen-units', '16'];
 
 async function checkTools() {
@@ -26,7 +26,7 @@ async function allTargets() {
   return [...manifest.matchAll(/^\[\[bin\]\]\nname = "(\w+)"/gm)].map(([, name]) => name);
 }
 
-/** Seconds and targets from the command line. */
+/** Parses seconds and targets from the command line. */
 async function asked(words) {
   const all = await allTargets();
   const seconds = /^\d+$/.test(words[0] ?? '') ? Number(words.shift()) : SECONDS;
@@ -37,7 +37,7 @@ async function asked(words) {
 
 const number = (output, pattern) => Number(output.match(pattern)?.[1] ?? 0);
 
-/** What libFuzzer printed, as figures. */
+/** Extracts figures from libFuzzer's output. */
 export function figures(output) {
   const covered = [...output.matchAll(/cov: (\d+)/g)].map(([, count]) => Number(count));
   const seeds = number(output, /INITED cov: (\d+)/);
@@ -70,7 +70,7 @@ async function fuzz(target, seconds) {
   return row;
 }
 
-/** The lines that say what happened. */
+/** Returns the lines of the output that describe the failure. */
 const told = (output) =>
   output
     .split('\n')

@@ -1,5 +1,5 @@
-// What of other people's is in the app and in the package, and under which licence. Fails where one is not permissive, and
-// writes the notices that go with both.
+// Lists the third-party crates and packages in the app and in the package, with their licences. Fails if one is not
+// permissive, and writes the notices that are shipped with both.
 import { mkdir, readdir, readFile, writeFile } from 'node:fs/promises';
 import { basename, dirname, join } from 'node:path';
 import { at, must, run, say, script, startedAs } from './shell.mjs';
@@ -7,12 +7,12 @@ import { at, must, run, say, script, startedAs } from './shell.mjs';
 const WASM = ['--locked', '--filter-platform', 'wasm32-unknown-unknown'];
 const LISTS = 'target/licences';
 
-/** Folder of the npm package that a bundled file is of; undefined for our own. */
+/** Returns the folder of the npm package that contains a bundled file; undefined for the project's own files. */
 const packageOf = (file) => file.match(/^(.*[\\/]node_modules[\\/](?:@[^\\/]+[\\/])?[^\\/]+)[\\/]/)?.[1];
 
 /**
- * Plugins for Vite that write down which packages came into a bundle called `name`: one for the page, and one for each of its
- * workers, which are bundles of their own. `besides` are packages whose files are laid beside it.
+ * Returns Vite plugins that record the packages in a bundle called `name`: one for the page, and one for its workers,
+ * which are bundles of their own. `besides` are packages whose files are copied next to it.
  */
 export function noteBundled(name, besides = []) {
   const folders = new Set(besides.map((one) => at('node_modules', one)));
@@ -39,7 +39,7 @@ async function bundled(name) {
   return JSON.parse(folders);
 }
 
-/** The npm packages in some bundles. */
+/** Returns the npm packages in the given bundles. */
 export async function packagesIn(...bundles) {
   const folders = new Set((await Promise.all(bundles.map(bundled))).flat());
   return Promise.all([...folders].map(packageAt));
@@ -50,7 +50,7 @@ async function packageAt(folder) {
   return { name, version, licence: license, home: homepage, texts: await textsIn(folder, license) };
 }
 
-/** The crates that are compiled into the module: without macros, which are gone by then. */
+/** Returns the crates that are compiled into the module; procedural macros are not in it. */
 export async function crates() {
   const tree = ['tree', '--locked', '--package', 'vesicle', '--edges', 'normal,no-proc-macro'];
   const shown = ['--target', 'wasm32-unknown-unknown', '--prefix', 'none', '--format', '{p}'];
@@ -61,12 +61,12 @@ export async function crates() {
 }
 
 async function crateOf({ name, version, license, repository, manifest_path }) {
-  // As old crates have it.
+  // Old crates separate alternatives by a slash.
   const licence = license?.replaceAll('/', ' OR ');
   return { name, version, licence, home: repository, texts: await textsIn(dirname(manifest_path), licence) };
 }
 
-/** What a command prints, without what it says besides. */
+/** Returns the output of a command without status messages. */
 async function output(command, args) {
   const printed = await must(command, [...args, '--quiet']);
   return printed.slice(printed.search(/^[{\w]/m));
@@ -74,7 +74,7 @@ async function output(command, args) {
 
 const IS_LICENCE = /^(licen[cs]e|copying|copyright|unlicense|notice)([-._].*)?$/i;
 
-/** The texts of licences in a folder: where one may choose MIT, that one and notices; else all. */
+/** Returns the licence texts in a folder: if MIT may be chosen, only that one and notices; otherwise all. */
 async function textsIn(folder, licence = '') {
   const files = (await readdir(folder)).filter((file) => IS_LICENCE.test(file) && !/\.(html|js|json)$/.test(file));
   const choice = /\bMIT\b/.test(licence) && !/\bAND\b/.test(licence);
@@ -85,20 +85,20 @@ async function textsIn(folder, licence = '') {
 
 const textOf = async (file) => (await readFile(file, 'utf8')).replaceAll('\r\n', '\n').trim();
 
-/** A licence that stands at the end of what is to be read first. */
+/** Returns the licence at the end of a README, if there is one. */
 async function inReadme(folder) {
   const text = await textOf(join(folder, 'README.md')).catch(() => '');
   const [found] = text.match(/^#*\s*licen[cs]e\b[\s\S]*\bcopyright\b[\s\S]*/im) ?? [];
   return found ? [found] : [];
 }
 
-/** The licences that are permissive: the same for crates and for packages. */
+/** Returns the permissive licences, for crates and packages alike. */
 export async function allowed() {
   const [, list = ''] = (await readFile(at('deny.toml'), 'utf8')).match(/^allow = \[([^\]]*)\]/m) ?? [];
   return [...list.matchAll(/"([^"]+)"/g)].map(([, licence]) => licence);
 }
 
-/** Throws where something may not be used under one of the permissive licences. */
+/** Throws if a part cannot be used under one of the permissive licences. */
 export async function refuseOthers(parts) {
   const { default: satisfies } = await import('spdx-satisfies');
   const list = await allowed();
@@ -124,7 +124,7 @@ const title = ({ name, version, licence, home }) => `${name} ${version} (${licen
 
 const MISSING = 'These come without the text of their licence; https://spdx.org/licenses has it.';
 
-/** One text for all who have the same; of another version where one comes without it. */
+/** Formats the notices. Parts with the same text share it; a part without a text takes that of another version. */
 function notices(parts) {
   const groups = new Map();
   for (const part of parts.toSorted(byName)) {
@@ -136,7 +136,7 @@ function notices(parts) {
   return [...groups].map(([text, titles]) => `${rule}\n${titles.join('\n')}\n\n${text}\n`).join('\n');
 }
 
-/** Writes the notices of what is in some bundles, and in the module, to a file. */
+/** Writes the notices of the given bundles and of the module to a file. */
 export async function writeNotices(file, ...bundles) {
   const parts = [...(await crates()), ...(await packagesIn(...bundles))];
   await refuseOthers(parts);
@@ -144,7 +144,7 @@ export async function writeNotices(file, ...bundles) {
   return parts;
 }
 
-/** Everything that is compiled or tested with, too, where cargo-deny is there to look. */
+/** Checks everything that is used to compile and test as well, if cargo-deny is installed. */
 async function askCargoDeny() {
   const { code } = await run('cargo', ['deny', '--version'], { echo: false });
   if (code !== 0) return say('cargo deny', 'not asked: `cargo install cargo-deny --locked` brings it');

@@ -1,10 +1,10 @@
-// Makes the bust of the Sculpt lab in www/public/data, and its base: node scripts/make_bust.mjs <nefertiti-lowres.obj>
-// Both without normals, which are computed again where they are read. Needs pkg/.
+// Makes the bust of the Sculpt lab and its base in www/public/data: node scripts/make_bust.mjs <nefertiti-lowres.obj>
+// Both are written without normals, which readers compute again. Needs pkg/.
 import { readFile, writeFile } from 'node:fs/promises';
 import init, { Mesh, MultiresolutionModel } from '../pkg/index.js';
 import { at, say, script } from './shell.mjs';
 
-/** Crown, head, neck and chest, as in www/src/sculpt/examples. */
+/** Ellipsoids of crown, head, neck and chest, as in www/src/sculpt/examples. */
 const ELLIPSOIDS = [
   {
     center: [0, 125, 0],
@@ -30,7 +30,7 @@ function upright(center, [a, b, c]) {
   };
 }
 
-/** A mesh as binary PLY: positions and triangles, no more. */
+/** Returns a mesh as binary PLY with positions and triangles only. */
 function asPly({ positions, indices }) {
   const [vertices, faces] = [positions.length / 3, indices.length / 3];
   const head = [

@@ -4,23 +4,23 @@
     python scripts/make_demo_data.py <folder of the source volumes> www/public/data
     python scripts/make_demo_data.py --points <folder of points and photographs> www/public/data
 
-The source folder holds ct_head_visible_male/vismale_head_ct.nii.gz, ct_tooth/tooth.nhdr (with tooth.raw) and
-micro_ovule/ovule_raw.nrrd; that of the points holds points/spot_stereo_noisy.ply, points/spot_spacecarved.ply,
+The source folder contains ct_head_visible_male/vismale_head_ct.nii.gz, ct_tooth/tooth.nhdr (with tooth.raw) and
+micro_ovule/ovule_raw.nrrd; the folder of points contains points/spot_stereo_noisy.ply, points/spot_spacecarved.ply,
 points/angel_scan_points.ply and multiview/spot_rendered (cameras.json, its views and masks). www/public/data/README.md
-says where these come from.
+names the sources.
 
 visible-human-head-full.nii.gz   all voxels of the CT head; air is set to 0 where it is more than MARGIN voxels away
-                                 from anything of AIR or more, so that every surface of an intensity of AIR or more,
-                                 and the gradient beside it, is exactly that of the source
+                                 from any voxel of AIR or more, so that every iso-surface at AIR or more, and the
+                                 gradient near it, is exactly that of the source
 visible-human-head.nii.gz        the same with y and z halved: each voxel is the mean of 2 x 2, so that the grid is
                                  128 x 128 x 128 and nearly isotropic; then air is cleared as above
 tooth.nrrd                       the CT of a tooth, as one gzipped file; intensities (0 to 1300) rounded to multiples
                                  of STEP, below the scan's own noise, which halves the file
 ovule.nrrd                       plant cells under the confocal microscope, recompressed only
-spot/stereo.ply, carved.ply      points as they are
-angel.ply                        points as they are
-spot/view00.png ...              the views with their masks as alpha; what is masked out is black
-spot/cameras.json                their projections, and no more
+spot/stereo.ply, carved.ply      unchanged points
+angel.ply                        unchanged points
+spot/view00.png ...              the views with their masks as alpha; masked pixels are black
+spot/cameras.json                their projections only
 """
 
 import gzip
@@ -52,7 +52,7 @@ def write_nifti(voxels, affine, name):
     image.set_qform(affine, 1)
     image.header.set_xyzt_units("mm", "sec")
     image.header["descrip"] = b"Visible Human male, CT; NLM, public domain"
-    # A fixed time in the gzip header: the same input gives the same bytes.
+    # A fixed time in the gzip header, so that the same input gives the same bytes.
     (OUT / name).write_bytes(gzip.compress(image.to_bytes(), 9, mtime=0))
 
 

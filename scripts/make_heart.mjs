@@ -1,5 +1,5 @@
 // Makes the beating heart of the Track lab in www/public/data: node scripts/make_heart.mjs <ep_sax_cine_crop128.nii.gz>
-// Pixels binned 2 × 2, which is about what was measured: the scanner interpolated them. Needs pkg/.
+// Pixels are binned 2 × 2, which is about the measured resolution: the scanner interpolated them. Needs pkg/.
 import { readFile, writeFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
 import init, { Volume } from '../pkg/index.js';

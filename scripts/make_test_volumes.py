@@ -1,10 +1,10 @@
-"""Writes tests/data/volumes/made: one small volume in many formats, by the formats' usual Python libraries.
+"""Writes tests/data/volumes/made: one small volume in many formats, written by their usual Python libraries.
 
     pip install nibabel==5.4.2 pynrrd==1.1.3 SimpleITK==2.5.7 numpy
     python scripts/make_test_volumes.py tests/data/volumes/made
 
 Voxel (x, y, z, t) of 5 x 4 x 3 (x 2) holds unit * (x + 5y + 20z + 60t), unit 1, 100, 1e6 or 0.25 by type.
-World is a rotated frame of spacing 1.5, 2, 3 whose affine in RAS is printed at the end, as nibabel reads it back.
+The grid is rotated, with spacing 1.5, 2, 3; its affine in RAS is printed at the end, as nibabel reads it back.
 """
 
 import sys

@@ -1,16 +1,16 @@
-"""Prints how far screened Poisson surface reconstruction, given the true normals, is from shapes that are known.
+"""Prints the errors of screened Poisson surface reconstruction, given the true normals, on known shapes.
 
     pip install pymeshlab==2025.7.post1 numpy==2.4.6
     cargo test --release --test core implicit_accuracy -- --ignored
     python scripts/poisson_reference.py target/tmp/accuracy
 
-The second line writes the points, with the outward normals of the shapes where they were before noise moved them, as
-<shape>-<noise>-<seed>.xyz. tests/core/implicit_accuracy.rs has the table that comes out, and holds the implicit surface of the
-same points, without the normals, against it.
+The second command writes the points as <shape>-<noise>-<seed>.xyz, with the outward normals at their positions before noise
+was added. tests/core/implicit_accuracy.rs contains the resulting table, and compares the implicit surface of the same points,
+without the normals, with it.
 
-Each row is the mean over the seeds of the mean distance to the shape: that of the centre of each triangle, weighted by area.
-Depth is that of the octree; all else is the library's default, but for one thread, so that every run gives the same.
-Best is the depth of the least error; the parts of its surfaces and their genus in all are named for every outcome.
+Each row is the mean over the seeds of the mean distance to the shape: that of each triangle's centre, weighted by area.
+Depth is that of the octree; other settings are the library's defaults, except for one thread, so that every run gives the same.
+Best is the depth with the smallest error; components and total genus of its surfaces are listed for every outcome.
 It takes some minutes.
 """
 
@@ -25,7 +25,7 @@ import pymeshlab
 DEPTHS = [5, 6, 7, 8, 9]
 
 
-# The shapes of tests/common/points.rs: near the surface their functions are distances, but for the blend.
+# The shapes of tests/common/points.rs: signed distances near the surface, except for the blend.
 def sphere(p):
     return np.linalg.norm(p, axis=1) - 1
 

@@ -1,6 +1,7 @@
-// The deformable model at its default settings on every volume of a folder: `npm run real -- FOLDER [--levels N] [--pipeline]`; by
-// default on the example volumes. Prints a row for each volume and iso value, with --pipeline the figures of what one would use without
-// us below it. Ends with 1 if a surface intersects itself, or if recall or precision is below 99 %.
+// Runs the deformable model at its default settings on every volume of a folder: `npm run real -- FOLDER [--levels N]
+// [--pipeline]`; by default on the example volumes. Prints a row for each volume and iso value and, with --pipeline,
+// the figures of flying edges and isotropic remeshing below it. Ends with 1 if a surface intersects itself, or if
+// recall or precision is below 99 %.
 import { readdir, readFile } from 'node:fs/promises';
 import { basename, dirname, join, relative } from 'node:path';
 import { parseArgs } from 'node:util';
@@ -11,23 +12,23 @@ import { at, say, script, startedAs } from './shell.mjs';
 const VOLUMES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/;
 const BINS = 256;
 
-/** Standard deviation, in bins, by which the histogram is smoothed before valleys are looked for. */
+/** Standard deviation, in bins, of the Gaussian that smooths the histogram before valleys are searched. */
 const SMOOTHING = 4;
 
-/** Volumes with fewer voxels along an axis are no objects but test files. */
+/** Fewest voxels along an axis; smaller volumes are test files, not objects. */
 const SMALLEST = 8;
 
-/** Width of the first column. */
+/** Width of the first column, in characters. */
 const LONGEST_NAME = 54;
 
-/** Every volume of a folder, and of those in it. */
+/** Returns the paths of all volumes in a folder and its subfolders. */
 async function volumesIn(folder) {
   const entries = await readdir(folder, { recursive: true, withFileTypes: true });
   const files = entries.filter((entry) => entry.isFile() && VOLUMES.test(entry.name));
   return files.map((entry) => join(entry.parentPath, entry.name)).sort();
 }
 
-/** A header's data, where it names a file beside it. */
+/** Returns the data file that a header names, if it names one beside it. */
 async function dataBeside(path, bytes) {
   if (!/\.(nhdr|mhd)$/.test(path)) return undefined;
   const [, name] = /^(?:data ?file|ElementDataFile)\s*[:=]\s*(\S+)\s*$/im.exec(bytes.toString('latin1')) ?? [];
@@ -41,7 +42,7 @@ function smoothed(histogram) {
     let weights = 0;
     for (let d = -reach; d <= reach; d++) {
       const weight = Math.exp(-0.5 * (d / SMOOTHING) ** 2);
-      // Logarithms: background is a thousand times as frequent as what matters.
+      // Logarithms, since the background is a thousand times as frequent as the objects.
       if (bin + d >= 0 && bin + d < histogram.length) sum += weight * Math.log1p(histogram[bin + d]);
       weights += weight;
     }
@@ -49,7 +50,10 @@ function smoothed(histogram) {
   });
 }
 
-/** The deepest valleys of the histogram, at most `count`, as intensities; filled up from even shares of the range. */
+/**
+ * Returns the intensities of at most `count` deepest valleys of the histogram, filled up with fixed fractions of the
+ * range.
+ */
 export function valleys(histogram, [low, high], count) {
   const heights = smoothed(histogram);
   const found = [];
@@ -66,16 +70,20 @@ export function valleys(histogram, [low, high], count) {
   return bins.sort((a, b) => a - b).map((bin) => low + ((high - low) * (bin + 0.5)) / heights.length);
 }
 
-/** Whether the whole of the contour was found, and nothing else. */
+/** Returns whether the whole contour was found, and nothing else. */
 export const isComplete = ({ recall, precision }) => recall >= 0.99 && precision >= 0.99;
 
-/** Levels of √3 above a volume, down to four voxels along its shortest side. */
+/**
+ * Returns the largest number of √3 levels above a volume whose coarsest level has four voxels along its shortest side.
+ */
 function mostLevels(dims) {
   return Math.max(0, Math.floor(Math.log(Math.min(...dims) / 4) / Math.log(Math.sqrt(3))));
 }
 
-/** One run at the defaults, beside marching cubes of the same run. Self-intersections are those after every step together;
- *  the clock stands still while they are counted. */
+/**
+ * Runs the model once at the defaults and marching cubes for comparison. Self-intersections are summed over all steps;
+ * counting them is not timed.
+ */
 export async function measured({ DeformableModel, Mesh }, volume, iso, levels) {
   const cubes = Math.min(...[1, 2, 3].map(() => timed(() => Mesh.marchingCubes(volume, iso).free())));
   const reference = Mesh.marchingCubes(volume, iso);
@@ -138,7 +146,7 @@ const COLUMNS = [
 
 const line = (name, cells) => `${name.padEnd(LONGEST_NAME)}${cells.map((cell) => cell.padStart(11)).join('')}\n`;
 
-/** Rows for one file; what cannot be read is said in one line. */
+/** Prints and returns the rows of one file; a file that cannot be read gets one line and no rows. */
 async function report(library, path, name, { levels, pipeline }) {
   const bytes = await readFile(path);
   let volume;

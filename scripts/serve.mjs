@@ -1,4 +1,4 @@
-// A small static server for what was built: files of one folder, nothing else.
+// A small static server for the files of one folder.
 import { createReadStream } from 'node:fs';
 import { stat } from 'node:fs/promises';
 import { createServer } from 'node:http';
@@ -17,10 +17,10 @@ const TYPES = {
   '.wasm': 'application/wasm',
 };
 
-// `.gz` files are data here: without a Content-Encoding they arrive as they are stored.
+// `.gz` files are data: they are sent as stored, without a Content-Encoding.
 const typeOf = (path) => TYPES[extname(path)] ?? 'application/octet-stream';
 
-/** The file an address stands for, or undefined when there is none inside the folder. */
+/** Returns the path of the file at an address, or undefined if there is none inside the folder. */
 async function resolve(folder, address) {
   const { pathname } = new URL(address, 'http://localhost');
   const path = normalize(join(folder, decodeURIComponent(pathname)));
@@ -30,10 +30,10 @@ async function resolve(folder, address) {
   return found?.isDirectory() ? resolve(folder, `${pathname.replace(/\/$/, '')}/index.html`) : undefined;
 }
 
-// The build puts a hash of what is inside into these names: what was once fetched stays right.
+// The build puts a content hash into these names, so cached files never become outdated.
 const isHashed = (path) => /[\\/]assets[\\/][^\\/]+-[\w-]{8}\.\w+$/.test(path);
 
-/** How long a browser may keep a file, and how it asks later whether it is still the same. */
+/** Returns the headers for caching: how long a browser may keep a file, and the tag by which it revalidates it. */
 async function freshness(path) {
   const { mtimeMs, size } = await stat(path);
   const keep = isHashed(path) ? 'max-age=31536000, immutable' : 'no-cache';

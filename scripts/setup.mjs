@@ -1,4 +1,4 @@
-// Brings a fresh clone to where everything can be built and tested. Does nothing where nothing is missing.
+// Installs everything that building and testing a fresh clone needs. Does nothing if nothing is missing.
 import { existsSync, statSync } from 'node:fs';
 import { at, must, run, say, script, startedAs } from './shell.mjs';
 
@@ -29,7 +29,7 @@ async function checkRust() {
   else say('rust', output.trim().split('\n').at(-1));
 }
 
-// rust-toolchain.toml names a version; where automatic installs are off, cargo fails until it is there.
+// rust-toolchain.toml names a version; if automatic installs are off, cargo fails until it is installed.
 async function installToolchain(problem) {
   const { code, output } = await run('rustup', ['toolchain', 'install', '--no-self-update'], { echo: false });
   if (code !== 0)
@@ -37,7 +37,7 @@ async function installToolchain(problem) {
   say('rust', 'toolchain installed');
 }
 
-// Asks for the file itself: starting rustup would cost more than all the rest.
+// Checks the file itself: starting rustup would take longer than all the rest.
 async function addTarget() {
   const sysroot = (await must('rustc', ['--print', 'sysroot'])).trim();
   if (existsSync(`${sysroot}/lib/rustlib/${TARGET}/lib`)) return say('wasm target', 'present');
@@ -53,7 +53,7 @@ async function installPackages() {
   say('packages', 'installed');
 }
 
-/** Path of a Chromium or Chrome, or undefined. `CHROMIUM_PATH` wins. */
+/** Returns the path of a Chromium or Chrome, or undefined. `CHROMIUM_PATH` wins. */
 export function findChromium() {
   const named = process.env.CHROMIUM_PATH;
   return named ? named : CHROMIUMS.find((path) => existsSync(path));
@@ -74,7 +74,7 @@ async function installChromium() {
   return findChromium();
 }
 
-/** All of it, in order. Throws where something is missing that this script must not install. */
+/** Runs all parts of the set-up in order. Throws if something is missing that this script must not install. */
 export async function setup({ browser = true } = {}) {
   checkNode();
   await checkRust();

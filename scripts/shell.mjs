@@ -1,4 +1,4 @@
-// What the other scripts share: where things are, and how a command is run.
+// Helpers of the other scripts: paths, and running commands.
 import { spawn } from 'node:child_process';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -6,26 +6,29 @@ import { fileURLToPath } from 'node:url';
 /** The project's folder. */
 export const root = dirname(dirname(fileURLToPath(import.meta.url)));
 
-/** Absolute path of something in the project. */
+/** Returns the absolute path of a file or folder of the project. */
 export const at = (...parts) => join(root, ...parts);
 
-/** Path of a program that `npm ci` installed. */
+/** Returns the path of a program that `npm ci` installed. */
 export const tool = (name) => at('node_modules', '.bin', process.platform === 'win32' ? `${name}.cmd` : name);
 
-/** One line of progress. */
+/** Prints one line of progress. */
 export function say(what, detail = '') {
   process.stdout.write(`${what.padEnd(12)} ${detail}\n`);
 }
 
-/** The same environment without progress bars, and without colours where nobody sees them, plus `extra`. */
+/**
+ * Returns the current environment plus `extra`, without progress bars, and without colours if the output is no
+ * terminal.
+ */
 function environment(extra) {
   const plain = process.stdout.isTTY ? {} : { NO_COLOR: '1' };
   return { ...process.env, CARGO_TERM_PROGRESS_WHEN: 'never', ...plain, ...extra };
 }
 
 /**
- * Runs a command in the project's folder and resolves to `{ code, output }`, where output is everything it
- * printed. With `echo` it is printed as it comes.
+ * Runs a command in the project's folder and resolves to `{ code, output }`, where output is everything it printed.
+ * With `echo` the output is also printed immediately.
  */
 export function run(command, args, { env = {}, echo = true, cwd = root } = {}) {
   return new Promise((resolve) => {
@@ -60,5 +63,5 @@ export async function script(main) {
   }
 }
 
-/** True when this file was started by name and not imported. */
+/** Returns whether the file at `url` is the script that was started, and not imported. */
 export const startedAs = (url) => process.argv[1] === fileURLToPath(url);

@@ -1,11 +1,12 @@
-// What the package weighs on its way to a page: `npm run sizes` prints it and writes sizes.json, which the tests hold it to.
+// Measures the download size of the package: `npm run sizes` prints it and writes sizes.json, which the tests compare
+// with.
 import { readFile, writeFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
 import { at, say, script, startedAs } from './shell.mjs';
 
 const MODULES = ['vesicle_bg.wasm', 'vesicle_plain_bg.wasm'];
 
-/** What is bundled for a page that imports this, with all it brings; modules of wasm are fetched beside it. */
+/** Entry points, each bundled with all that it imports; wasm modules are fetched separately. */
 const ENTRIES = {
   vesicle: 'index.js',
   'vesicle/inline': 'inline.js',
@@ -22,13 +23,13 @@ async function bundled(file) {
   const { outputFiles } = await build({
     entryPoints: [at('pkg', file)],
     ...{ bundle: true, minify: true, format: 'esm', target: 'es2022', write: false, logLevel: 'error' },
-    // Met in Node alone, and fetched there alone.
+    // Imported in Node only.
     external: ['node:*'],
   });
   return outputFiles[0].contents;
 }
 
-/** Bytes of each part of the package, compressed as servers do it. */
+/** Returns the gzipped size of each part of the package in bytes. */
 export async function sizes() {
   const all = {};
   for (const name of MODULES) all[name] = gzipSync(await readFile(at('pkg', name)), { level: 9 }).length;

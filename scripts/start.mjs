@@ -1,4 +1,5 @@
-// Set-up, package, app, and a server for it. PORT says where; else 5173 or, where that is taken, any free port.
+// Sets up, builds the package and the app, and serves it on PORT; by default on 5173 or, if that is taken, any free
+// port.
 import { buildApp } from './app.mjs';
 import { build } from './build.mjs';
 import { serve } from './serve.mjs';

@@ -1,6 +1,6 @@
-// Every check there is. Goes on after a failure; the last line is the sum.
-// `npm test -- build package` runs the stages of these names only. On a terminal everything is shown as it comes;
-// elsewhere only what failed, and all of it is in `target/test-logs`.
+// Runs every check. Continues after a failure; the last line is the total.
+// `npm test -- build package` runs only the stages of these names. On a terminal all output is shown; otherwise only
+// failures, with all output in `target/test-logs`.
 import { existsSync } from 'node:fs';
 import { mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { buildApp } from './app.mjs';
@@ -14,19 +14,19 @@ const DENY = ['--', '-D', 'warnings'];
 
 const echo = Boolean(process.stdout.isTTY);
 
-/** A command that passes or fails as a whole. */
+/** Returns a stage that runs a command, which passes or fails as a whole. */
 const check = (command, args, options) => async () => {
   const { code, output } = await run(command, args, { echo, ...options });
   return code === 0 ? { passed: 1, failed: 0, output } : { passed: 0, failed: 1, output };
 };
 
-/** A function of ours that throws when it fails. */
+/** Returns a stage that calls a function, which throws if it fails. */
 const works = (work) => async () => {
   await work();
   return { passed: 1, failed: 0 };
 };
 
-/** Counts of all `test result:` lines, as cargo's harness and the wasm runner print them. */
+/** Sums the counts of all `test result:` lines, as cargo's harness and the wasm runner print them. */
 export function countCargo(output) {
   const counts = { passed: 0, failed: 0 };
   for (const [, passed, failed] of output.matchAll(/test result: .*?(\d+) passed; (\d+) failed/g)) {
@@ -61,13 +61,16 @@ const vitest = (folder) => async () => {
   return { output, ...atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests }) };
 };
 
-// A run that does not compile, or crashes, fails without saying how many tests it took with it.
+// A run that does not compile, or crashes, fails without reporting how many tests did not run.
 function atLeastOneFailed(code, { passed, failed }) {
   if (passed + failed === 0) return { passed: 0, failed: 1 };
   return { passed, failed: code === 0 ? failed : Math.max(failed, 1) };
 }
 
-/** Lanes of a group run side by side, the groups and the stages of a lane one after the other. */
+/**
+ * Stages by group and lane. The lanes of a group run in parallel; groups, and the stages of a lane, one after the
+ * other.
+ */
 const GROUPS = [
   [
     [
@@ -78,7 +81,7 @@ const GROUPS = [
         'rust docs',
         check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
       ],
-      // With what the tests measure, for the log.
+      // Shows the tests' measurements in the log.
       ['native', cargoTests('--', '--show-output')],
     ],
   ],
@@ -113,7 +116,10 @@ async function attempt([name, work]) {
   return { name, seconds, ...counts };
 }
 
-/** The part of a stage's output that says what went wrong: the lines that tell of failures with those after them, and the end. */
+/**
+ * Returns the part of a stage's output that explains the failure: lines that report failures with those after them, and
+ * the end.
+ */
 function failuresIn(output) {
   const lines = output.split('\n');
   const tells = lines.map((line) => /FAIL|panicked|^failures:|^error|✗|×/.test(line));
@@ -140,7 +146,7 @@ async function all(names) {
   checkNames(names);
   await mkdir(at(LOGS), { recursive: true });
   const ready = await attempt(['set-up', works(setup)]);
-  // Without tools and packages nothing else can tell anything.
+  // Without tools and packages no other stage can run.
   if (ready.failed) return [ready];
   const results = [ready];
   for (const lanes of GROUPS) {

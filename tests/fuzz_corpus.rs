@@ -1,6 +1,7 @@
-//! What is fuzzed (`fuzz`, docs/fuzzing.md), without a fuzzer: each target over its seeds and over thousands of changes of them.
+//! The fuzz targets (`fuzz`, docs/fuzzing.md) without a fuzzer: each runs on its seeds and on thousands of mutations of
+//! them.
 //!
-//! `cargo test --test fuzz_corpus -- --ignored` writes the seeds anew, from the files in `data` and from small scenes.
+//! `cargo test --test fuzz_corpus -- --ignored` rewrites the seeds from the files in `data` and from small scenes.
 
 #![cfg(not(target_arch = "wasm32"))]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test fails by panicking")]
@@ -24,7 +25,7 @@ fn folder(target: &str) -> PathBuf {
     fuzz_folder().join("seeds").join(target)
 }
 
-/// The seeds of a target that are kept, in the order of their names.
+/// Returns the stored seeds of a target, sorted by name.
 fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     let files = fs::read_dir(folder(target)).unwrap_or_else(|error| panic!("seeds of {target}: {error}"));
     let mut paths: Vec<PathBuf> = files.map(|file| file.unwrap().path()).collect();
@@ -32,7 +33,7 @@ fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     paths.into_iter().map(|path| (path.display().to_string(), fs::read(&path).unwrap())).collect()
 }
 
-/// Says what was run when a panic goes by.
+/// Prints the current input if a panic unwinds.
 struct Running<'a>(&'a str, &'a [u8]);
 
 impl Drop for Running<'_> {
@@ -43,7 +44,7 @@ impl Drop for Running<'_> {
     }
 }
 
-/// A few changes of the kinds that a fuzzer makes.
+/// Returns a seed with one to four random mutations of the kinds that a fuzzer makes.
 fn mutated(seeds: &[(String, Vec<u8>)], random: &mut Random) -> Vec<u8> {
     let mut data = seeds[random.below(seeds.len())].1.clone();
     for _ in 0..1 + random.below(4) {
@@ -73,14 +74,14 @@ fn replay(name: &str) {
         fuzz::run(target.name, data);
     }
     let mut random = Random(1);
-    for _ in 0..target.changes {
+    for _ in 0..target.mutations {
         let data = mutated(&seeds, &mut random);
         let _running = Running(target.name, &data);
         fuzz::run(target.name, &data);
     }
 }
 
-/// Every target as a test of its name.
+/// Generates a test for each target, with the target's name.
 macro_rules! replayed {
     ($($name:ident),+) => {
         mod nothing_panics_or_takes_too_much_memory {
@@ -120,9 +121,9 @@ replayed!(
     remeshing
 );
 
-/// Each target has a program of its own, as cargo-fuzz needs it, and a test.
+/// Each target has a binary of its own, as cargo-fuzz requires, and a test.
 #[test]
-fn every_target_has_its_program_and_test() {
+fn every_target_has_a_binary_and_a_test() {
     assert_eq!(REPLAYED, fuzz::TARGETS.each_ref().map(|target| target.name));
     let manifest = fs::read_to_string(fuzz_folder().join("Cargo.toml")).unwrap();
     assert_eq!(manifest.matches("[[bin]]").count(), fuzz::TARGETS.len());
@@ -135,7 +136,7 @@ fn every_target_has_its_program_and_test() {
 
 #[test]
 #[ignore = "writes into the repository"]
-fn seeds_are_written() {
+fn write_seeds() {
     for Target { name, .. } in &fuzz::TARGETS {
         fs::create_dir_all(folder(name)).unwrap();
         for (file, data) in fuzz_seeds::of(name) {

@@ -3,12 +3,12 @@
 use vesicle::math::DVec3;
 
 /// A source of numbers read from fuzzer input; once it is used up, from a generator seeded with it.
-pub struct Bytes<'a> {
+pub struct Choices<'a> {
     left: &'a [u8],
     state: u64,
 }
 
-impl<'a> Bytes<'a> {
+impl<'a> Choices<'a> {
     /// Creates a source that reads `data`.
     pub fn new(data: &'a [u8]) -> Self {
         let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
@@ -17,13 +17,13 @@ impl<'a> Bytes<'a> {
 
     /// Returns the next byte of the input, or of the generator once the input is used up.
     fn byte(&mut self) -> u8 {
-        let Some((&first, rest)) = self.left.split_first() else { return self.beyond() };
+        let Some((&first, rest)) = self.left.split_first() else { return self.generated_byte() };
         self.left = rest;
         first
     }
 
     /// Returns the next byte of the generator, a SplitMix64.
-    fn beyond(&mut self) -> u8 {
+    fn generated_byte(&mut self) -> u8 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -62,12 +62,12 @@ impl<'a> Bytes<'a> {
     }
 
     /// Returns a point in the cube of half edge `half` around the origin.
-    pub fn place(&mut self, half: f64) -> DVec3 {
+    pub fn point(&mut self, half: f64) -> DVec3 {
         DVec3::new(self.within(-half, half), self.within(-half, half), self.within(-half, half))
     }
 
     /// Returns a unit vector.
     pub fn direction(&mut self) -> DVec3 {
-        self.place(1.0).try_normalize().unwrap_or(DVec3::X)
+        self.point(1.0).try_normalize().unwrap_or(DVec3::X)
     }
 }

@@ -1,19 +1,21 @@
 //! Fuzz targets of single mesh edits, decimation and remeshing.
 
-use super::bytes::Bytes;
+use super::bytes::Choices;
 use super::steppers::shape;
 use vesicle::math::Vec3;
-use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_crossings, curvature, geodesic, measure};
+use vesicle::mesh::{
+    EditError, Mesh, TriangleMesh, count_self_intersections, curvature, geodesic_distances, measure,
+};
 use vesicle::remesh::{EdgeBounds, Unchecked, decimate, remesh, restructure};
 use vesicle::spatial::{cross_section, surface_distance};
 
 /// Number of vertices beyond which no more edits are made.
-const MOST: usize = 200;
+const MAX_VERTICES: usize = 200;
 
 /// Makes random edits: each is rejected and changes nothing, or succeeds and leaves a valid mesh; recorded ones may be
 /// rolled back.
 pub fn edits(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let Ok(mut mesh) = Mesh::from_triangles(&shape(bytes)) else { return };
     for _ in 0..60 {
         let before = mesh.clone();
@@ -26,14 +28,14 @@ pub fn edits(data: &[u8]) {
             mesh.commit();
         }
         assert_eq!(mesh.check(), Ok(()));
-        if mesh.vertex_count() > MOST || mesh.vertex_count() == 0 {
+        if mesh.vertex_count() > MAX_VERTICES || mesh.vertex_count() == 0 {
             return;
         }
     }
 }
 
 /// Makes one random edit.
-fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
+fn edit(mesh: &mut Mesh, bytes: &mut Choices) -> Result<(), EditError> {
     let live: Vec<_> = mesh.vertices().collect();
     let u = live[bytes.below(live.len())];
     let ring = mesh.ring(u).as_slice().to_vec();
@@ -46,7 +48,7 @@ fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
         11 => mesh.join(u, live[bytes.below(live.len())], 0.5 + 0.4 * bytes.unit() as f32).map(drop),
         12 => mesh.remove_tetrahedron(u),
         13 => {
-            mesh.set_position(u, bytes.place(2.0).as_vec3());
+            mesh.set_position(u, bytes.point(2.0).as_vec3());
             Ok(())
         }
         _ => {
@@ -59,23 +61,23 @@ fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
 
 /// Decimates, remeshes and restructures a random mesh: embedded meshes stay embedded, and measures are finite.
 pub fn remeshing(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let given = shape(bytes);
     let Ok(mut mesh) = Mesh::from_triangles(&given) else { return };
     let edge = mesh.longest_edge();
-    let (crossings, euler) = (count_crossings(&given), mesh.euler());
+    let (self_intersections, euler) = (count_self_intersections(&given), mesh.euler());
     for _ in 0..1 + bytes.below(3) {
         pass(&mut mesh, edge, bytes);
         assert_eq!(mesh.check(), Ok(()));
         assert_eq!(mesh.euler(), euler);
         let now = mesh.to_triangles();
-        assert!(crossings > 0 || count_crossings(&now) == 0, "triangles cross");
-        measured(&now);
+        assert!(self_intersections > 0 || count_self_intersections(&now) == 0, "the mesh intersects itself");
+        assert_measurable(&now);
     }
 }
 
 /// Makes one random pass over the mesh.
-fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Bytes) {
+fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Choices) {
     let min = edge * bytes.within(0.2, 1.5) as f32;
     let bounds = EdgeBounds { min, max: min * bytes.within(1.9, 5.0) as f32 };
     match bytes.below(3) {
@@ -93,11 +95,11 @@ fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Bytes) {
 
 /// Asserts that measures, curvatures, geodesic distances, cross-sections and distances of a mesh are finite and
 /// complete.
-pub fn measured(mesh: &TriangleMesh) {
+pub fn assert_measurable(mesh: &TriangleMesh) {
     let found = measure(mesh);
     assert!(found.volume.is_finite() && found.area.is_finite());
     assert_eq!(curvature(mesh).mean.len(), mesh.positions.len());
-    assert_eq!(geodesic(mesh, 0).map_or(0, |all| all.len()), mesh.positions.len());
+    assert_eq!(geodesic_distances(mesh, 0).map_or(0, |all| all.len()), mesh.positions.len());
     let at = mesh.positions[0];
     let section = cross_section(mesh, at, Vec3::new(0.6, -0.5, 0.7));
     assert!(section.iter().flatten().all(|p| p.is_finite()), "a section at {at}");

@@ -15,21 +15,21 @@ pub struct Target {
     /// Name of the target, of its program and of its folder of seeds.
     pub name: &'static str,
     /// Runs the target on an input; panics if it finds a bug.
-    pub body: fn(&[u8]),
+    pub run: fn(&[u8]),
     /// Limit of the memory in use at any time, in bytes, whatever sizes the input claims.
-    pub most_memory: usize,
+    pub memory_limit: usize,
     /// Number of mutated seeds that the ordinary test runs, which takes a second or so.
-    pub changes: usize,
+    pub mutations: usize,
 }
 
 /// Returns the target of a file reader.
-const fn reader(name: &'static str, body: fn(&[u8])) -> Target {
-    Target { name, body, most_memory: 16 << 20, changes: 20_000 }
+const fn reader(name: &'static str, run: fn(&[u8])) -> Target {
+    Target { name, run, memory_limit: 16 << 20, mutations: 20_000 }
 }
 
 /// Returns the target of a saved state or a scene, which is slower and needs more memory for solvers.
-const fn method(name: &'static str, body: fn(&[u8]), changes: usize) -> Target {
-    Target { name, body, most_memory: 256 << 20, changes }
+const fn method(name: &'static str, run: fn(&[u8]), mutations: usize) -> Target {
+    Target { name, run, memory_limit: 256 << 20, mutations }
 }
 
 /// All fuzz targets.
@@ -65,6 +65,6 @@ pub fn target(name: &str) -> &'static Target {
 /// Runs a target on an input; panics if it finds a bug or exceeds its memory limit.
 pub fn run(name: &str, data: &[u8]) {
     let target = target(name);
-    let peak = memory::peak_of(|| (target.body)(data));
-    assert!(peak <= target.most_memory, "{peak} bytes of memory for an input of {}", data.len());
+    let peak = memory::peak_of(|| (target.run)(data));
+    assert!(peak <= target.memory_limit, "{peak} bytes of memory for an input of {}", data.len());
 }

@@ -12,42 +12,42 @@ thread_local! {
     static PEAK: Cell<usize> = const { Cell::new(0) };
 }
 
-struct Meter;
+struct CountingAllocator;
 
 #[global_allocator]
-static METER: Meter = Meter;
+static METER: CountingAllocator = CountingAllocator;
 
-unsafe impl GlobalAlloc for Meter {
+unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        take(layout.size());
+        allocated(layout.size());
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        take(layout.size());
+        allocated(layout.size());
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        give_back(layout.size());
+        freed(layout.size());
         unsafe { System.dealloc(memory, layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        take(size);
-        give_back(layout.size());
+        allocated(size);
+        freed(layout.size());
         unsafe { System.realloc(memory, layout, size) }
     }
 }
 
 /// Counts bytes that this thread allocates.
-fn take(bytes: usize) {
+fn allocated(bytes: usize) {
     NOW.set(NOW.get().saturating_add(bytes));
     PEAK.set(PEAK.get().max(NOW.get()));
 }
 
 /// Counts bytes that are freed. Some may have been allocated before counting began, or by another thread.
-fn give_back(bytes: usize) {
+fn freed(bytes: usize) {
     NOW.set(NOW.get().saturating_sub(bytes));
 }
 

@@ -13,8 +13,8 @@ use vesicle::methods::tracking::SurfaceTracker;
 const HEADER: usize = 16;
 
 /// Returns a state with a valid checksum: that of `saved` up to the number that identifies the input, then `contents`.
-pub fn resealed(saved: &[u8], contents: &[u8]) -> Vec<u8> {
-    let body = [&saved[HEADER..contents_of(saved)], contents].concat();
+pub fn with_checksum(saved: &[u8], contents: &[u8]) -> Vec<u8> {
+    let body = [&saved[HEADER..contents_offset(saved)], contents].concat();
     let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
     let sum = body.iter().fold(0xcbf2_9ce4_8422_2325, mix);
     [&saved[..8], &sum.to_le_bytes(), &body].concat()
@@ -22,7 +22,7 @@ pub fn resealed(saved: &[u8], contents: &[u8]) -> Vec<u8> {
 
 /// Returns the offset of the contents, after the number that identifies the input; its last byte is the first below
 /// 128.
-pub fn contents_of(saved: &[u8]) -> usize {
+pub fn contents_offset(saved: &[u8]) -> usize {
     let number = &saved[HEADER..];
     HEADER + 1 + number.iter().position(|&byte| byte < 0x80).unwrap_or(0)
 }
@@ -49,7 +49,7 @@ macro_rules! target {
     ($name:ident, $saved:ident, $scene:ident, $meshes:expr) => {
         pub fn $name(data: &[u8]) {
             let (saved, mut model) = $scene();
-            if model.restore(&resealed(saved, data)).is_err() {
+            if model.restore(&with_checksum(saved, data)).is_err() {
                 assert_eq!(model.restore(saved), Ok(()), "a refusal changed the run");
                 assert!(model.save() == saved, "a refusal changed the run");
                 return;
@@ -68,7 +68,7 @@ macro_rules! target {
         /// Returns the contents of the unchanged state, the seed of the target.
         pub fn $saved() -> Vec<u8> {
             let (saved, _) = $scene();
-            saved[contents_of(saved)..].to_vec()
+            saved[contents_offset(saved)..].to_vec()
         }
     };
 }

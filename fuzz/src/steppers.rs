@@ -1,9 +1,9 @@
 //! Fuzz targets of the methods on small random scenes, with parameters that change during the run: valid after every
 //! step.
 
-use super::bytes::Bytes;
+use super::bytes::Choices;
 use vesicle::math::{DAffine3, DVec3, Vec3};
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
 };
@@ -21,11 +21,11 @@ use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 /// self-intersections.
 fn assert_sound(mesh: &Mesh) {
     assert_eq!(mesh.check(), Ok(()));
-    assert_eq!(count_crossings(&mesh.to_triangles()), 0, "triangles cross");
+    assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "triangles cross");
 }
 
 /// Returns a volume of blobs in noise, on a rotated grid with anisotropic voxels; some voxels may be NaN.
-fn volume(bytes: &mut Bytes, dims: [usize; 4]) -> Volume {
+fn volume(bytes: &mut Choices, dims: [usize; 4]) -> Volume {
     let [nx, ny, nz, frames] = dims;
     let blobs: Vec<[DVec3; 2]> = (0..1 + bytes.below(3))
         .map(|_| {
@@ -83,7 +83,7 @@ fn flat() -> Volume {
 
 /// Steps a deformable model with random volume, start and parameters, and checks its mesh after each step.
 pub fn deformable(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let dims = [2 + bytes.below(11), 2 + bytes.below(11), 1 + bytes.below(11), 1 + bytes.below(2)];
     let volume = volume(bytes, dims);
     let options = DeformableOptions {
@@ -101,7 +101,7 @@ pub fn deformable(data: &[u8]) {
             Err(error) => panic!("{error}"),
         }
         assert_sound(model.mesh());
-        assert_eq!(count_crossings(&model.surface()), 0, "triangles cross in world space");
+        assert_eq!(count_self_intersections(&model.surface()), 0, "triangles cross in world space");
         match bytes.below(16) {
             3 => assert_covers(&model),
             4 => _ = model.seed(),
@@ -128,13 +128,13 @@ fn restored(model: &mut DeformableModel) {
 }
 
 /// Returns a random start surface.
-fn start(bytes: &mut Bytes, volume: &Volume) -> Start {
+fn start(bytes: &mut Choices, volume: &Volume) -> Start {
     match bytes.below(9) {
         6.. => Start::Contour,
         0 => Start::Bubbles(1 + bytes.below(4) as u32),
         1 => Start::MarchingCubes(bytes.within(volume.range()[0], volume.range()[1])),
         2 => Start::Seeds {
-            points: (0..1 + bytes.below(3)).map(|_| bytes.place(12.0)).collect(),
+            points: (0..1 + bytes.below(3)).map(|_| bytes.point(12.0)).collect(),
             radius: bytes.within(0.3, 9.0),
         },
         3 => Start::Mesh(shape(bytes)),
@@ -142,11 +142,11 @@ fn start(bytes: &mut Bytes, volume: &Volume) -> Start {
     }
 }
 
-fn attractor(bytes: &mut Bytes) -> Attractor {
-    Attractor { point: bytes.place(15.0), strength: bytes.within(-2.0, 2.0), radius: bytes.within(0.1, 20.0) }
+fn attractor(bytes: &mut Choices) -> Attractor {
+    Attractor { point: bytes.point(15.0), strength: bytes.within(-2.0, 2.0), radius: bytes.within(0.1, 20.0) }
 }
 
-fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
+fn deformable_params(bytes: &mut Choices, volume: &Volume) -> DeformableParams {
     let [low, high] = volume.range();
     let mut rarely = |low: f64, high: f64| if bytes.chance(3) { bytes.within(low, high) } else { 0.0 };
     let [gradient_normal, gradient_tangent, stiffness] =
@@ -176,7 +176,7 @@ fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
 
 /// Runs an implicit surface of random points to the end, with random edits and parameters, and checks its mesh.
 pub fn implicit(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let cloud = cloud(bytes);
     let (count, size) = (cloud.points.len(), size(&cloud.points));
     let options = implicit_options(bytes, size);
@@ -208,7 +208,7 @@ fn assert_healthy(mesh: &TriangleMesh) {
 /// Changes the parameters or the points, or restores the surface from its own saved state.
 fn implicit_change(
     surface: &mut ImplicitSurface,
-    bytes: &mut Bytes,
+    bytes: &mut Choices,
     count: usize,
     size: f64,
 ) -> Result<(), MethodError> {
@@ -221,7 +221,7 @@ fn implicit_change(
             Ok(())
         }
         _ => {
-            let mut places = |most| (0..bytes.below(most)).map(|_| bytes.place(2.0).as_vec3()).collect();
+            let mut places = |most| (0..bytes.below(most)).map(|_| bytes.point(2.0).as_vec3()).collect();
             let (added, exterior) = (places(6), places(3));
             let removed = (0..bytes.below(4)).map(|_| bytes.below(count + 1) as u32).collect();
             surface.set_edits(PointEdits { added, removed, exterior })
@@ -236,15 +236,15 @@ fn size(points: &[Vec3]) -> f64 {
 
 /// Returns points on a sphere, in a plane, on a line or anywhere; some coincide, and their scale may be large, small or
 /// far from the origin.
-fn cloud(bytes: &mut Bytes) -> Cloud {
+fn cloud(bytes: &mut Choices) -> Cloud {
     let (count, kind) = (1 + bytes.below(24), bytes.below(5));
     let (scale, away) = bytes.one_of(&[(1.0, 0.0), (1.0, 0.0), (300.0, 3000.0), (1e-20, 0.0), (1e20, 0.0)]);
     let point = |_| {
         let p = match kind {
             0 | 1 => bytes.direction(),
-            2 => bytes.place(1.0),
-            3 => bytes.place(1.0) * DVec3::new(1.0, 1.0, 0.0),
-            _ => bytes.place(1.0) * DVec3::X,
+            2 => bytes.point(1.0),
+            3 => bytes.point(1.0) * DVec3::new(1.0, 1.0, 0.0),
+            _ => bytes.point(1.0) * DVec3::X,
         };
         (p * scale + away).as_vec3()
     };
@@ -255,7 +255,7 @@ fn cloud(bytes: &mut Bytes) -> Cloud {
     Cloud { points, normals, confidence, colors }
 }
 
-fn camera(bytes: &mut Bytes) -> Option<Camera> {
+fn camera(bytes: &mut Choices) -> Option<Camera> {
     let rows: [f64; 12] = std::array::from_fn(|i| {
         [100.0, 32.0, 0.0, 160.0, 0.0, 32.0, 100.0, 160.0, 0.0, 1.0, 0.0, 5.0][i] + bytes.within(-3.0, 3.0)
     });
@@ -263,9 +263,9 @@ fn camera(bytes: &mut Bytes) -> Option<Camera> {
     Camera::new(rows, 16, 16, image).ok()
 }
 
-fn implicit_options(bytes: &mut Bytes, size: f64) -> ImplicitOptions {
+fn implicit_options(bytes: &mut Choices, size: f64) -> ImplicitOptions {
     ImplicitOptions {
-        exterior: bytes.chance(4).then(|| (0..bytes.below(8)).map(|_| bytes.place(3.0).as_vec3()).collect()),
+        exterior: bytes.chance(4).then(|| (0..bytes.below(8)).map(|_| bytes.point(3.0).as_vec3()).collect()),
         cameras: (0..bytes.one_of(&[0, 0, 0, 1, 2])).filter_map(|_| camera(bytes)).collect(),
         max_points: bytes.one_of(&[20_000, 20_000, 4, 10]),
         keep_components: bytes.chance(4).then(|| 1 + bytes.below(3)),
@@ -274,7 +274,7 @@ fn implicit_options(bytes: &mut Bytes, size: f64) -> ImplicitOptions {
 }
 
 /// Returns random parameters with coarse cells, so that a run takes milliseconds.
-fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
+fn implicit_params(bytes: &mut Choices, size: f64) -> ImplicitParams {
     ImplicitParams {
         delta: bytes.one_of(&[0.1, 1.0, 5.0, 20.0, 100.0]),
         tau: bytes.one_of(&[0.001, 0.01, 0.025, 0.1, 1.0]),
@@ -294,7 +294,7 @@ fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
 
 /// Steps a multiresolution model with random meshes and ellipsoids, and checks its meshes after each step.
 pub fn multires(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let detail = bytes.chance(2).then(|| shape(bytes));
     let base = bytes.chance(6).then(|| shape(bytes));
     let ellipsoids = ellipsoids(bytes, 1.0);
@@ -320,22 +320,22 @@ pub fn multires(data: &[u8]) {
     }
 }
 
-fn ellipsoids_near(bytes: &mut Bytes) -> Vec<ControlEllipsoid> {
+fn ellipsoids_near(bytes: &mut Choices) -> Vec<ControlEllipsoid> {
     ellipsoids(bytes, 1.8)
 }
 
-fn ellipsoids(bytes: &mut Bytes, spread: f64) -> Vec<ControlEllipsoid> {
+fn ellipsoids(bytes: &mut Choices, spread: f64) -> Vec<ControlEllipsoid> {
     (0..1 + bytes.below(3)).map(|_| ellipsoid(bytes, spread)).collect()
 }
 
-fn ellipsoid(bytes: &mut Bytes, spread: f64) -> ControlEllipsoid {
+fn ellipsoid(bytes: &mut Choices, spread: f64) -> ControlEllipsoid {
     let x = bytes.direction();
     let y = bytes.direction().cross(x).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
     let axes = [x, y, x.cross(y)].map(|axis| (axis * bytes.within(0.3, 1.0)).to_array());
-    ControlEllipsoid { center: bytes.place(spread).to_array(), axes }
+    ControlEllipsoid { center: bytes.point(spread).to_array(), axes }
 }
 
-fn multires_params(bytes: &mut Bytes) -> MultiresParams {
+fn multires_params(bytes: &mut Choices) -> MultiresParams {
     let edge = bytes.within(0.35, 0.8);
     MultiresParams {
         edge_min: 0.65 * edge,
@@ -352,7 +352,7 @@ fn multires_params(bytes: &mut Bytes) -> MultiresParams {
 
 /// Runs a tracker on a random 4D volume, and checks its meshes after each step.
 pub fn tracking(data: &[u8]) {
-    let bytes = &mut Bytes::new(data);
+    let bytes = &mut Choices::new(data);
     let dims = [2 + bytes.below(7), 2 + bytes.below(7), 1 + bytes.below(5), 2 + bytes.below(2)];
     let volume = volume(bytes, dims);
     let last = volume.dims().map(|n| n - 1);
@@ -360,7 +360,7 @@ pub fn tracking(data: &[u8]) {
         let low = last.map(|n| bytes.below(n / 2 + 1));
         Bounds::Voxels([low, [0, 1, 2].map(|k| low[k] + bytes.below(last[k] - low[k] + 1))])
     });
-    let component = if bytes.chance(2) { Component::Nearest(bytes.place(12.0)) } else { Component::Largest };
+    let component = if bytes.chance(2) { Component::Nearest(bytes.point(12.0)) } else { Component::Largest };
     let start = bytes.chance(5).then(|| shape(bytes));
     let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
     let options = TrackingOptions { volume, bounds, component, start, params: tracking_params(bytes) };
@@ -372,7 +372,7 @@ pub fn tracking(data: &[u8]) {
         assert_eq!(tracker.mesh().check(), Ok(()));
         if let Some(mesh) = tracker.meshes().last() {
             let found = measure(mesh);
-            assert_eq!((found.components, count_crossings(mesh)), (parts, 0));
+            assert_eq!((found.components, count_self_intersections(mesh)), (parts, 0));
         }
         if bytes.chance(8) {
             let saved = tracker.save();
@@ -383,7 +383,7 @@ pub fn tracking(data: &[u8]) {
     panic!("no end");
 }
 
-fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
+fn tracking_params(bytes: &mut Choices) -> TrackingParams {
     let mut or_zero = |low: f64, high: f64| if bytes.chance(2) { bytes.within(low, high) } else { 0.0 };
     let [radius, time_scale] = [or_zero(1.0, 8.0), or_zero(0.1, 10.0)];
     let edge_min = bytes.within(0.2, 0.5);
@@ -403,11 +403,11 @@ fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
 
 /// Returns spheres and tori beside or inside each other; bumps may make them intersect themselves. Some are scaled to
 /// the limits of single precision.
-pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
+pub fn shape(bytes: &mut Choices) -> TriangleMesh {
     let mut whole = TriangleMesh::default();
     for _ in 0..bytes.one_of(&[1, 1, 1, 2, 3]) {
         let part = if bytes.chance(2) { ring(bytes) } else { ball(bytes) };
-        let (away, first) = (bytes.place(2.0).as_vec3(), whole.positions.len() as u32);
+        let (away, first) = (bytes.point(2.0).as_vec3(), whole.positions.len() as u32);
         whole.positions.extend(part.positions.iter().map(|p| *p + away));
         whole.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
     }
@@ -421,7 +421,7 @@ pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
 }
 
 /// Returns a sphere, which may be flattened.
-fn ball(bytes: &mut Bytes) -> TriangleMesh {
+fn ball(bytes: &mut Choices) -> TriangleMesh {
     let (radius, edge) = (bytes.within(0.4, 2.0) as f32, bytes.within(0.35, 0.9) as f32);
     let mesh = Mesh::icosphere(Vec3::ZERO, radius, edge * radius);
     let flat = Vec3::new(1.0, 1.0, bytes.one_of(&[1.0, 1.0, 0.3, 0.01]));
@@ -431,7 +431,7 @@ fn ball(bytes: &mut Bytes) -> TriangleMesh {
 }
 
 /// Returns a torus.
-fn ring(bytes: &mut Bytes) -> TriangleMesh {
+fn ring(bytes: &mut Choices) -> TriangleMesh {
     let (n, m) = (3 + bytes.below(12) as u32, 3 + bytes.below(6) as u32);
     let (wide, thin) = (bytes.within(0.8, 2.0), bytes.within(0.05, 0.7));
     let mut mesh = TriangleMesh::default();
@@ -450,7 +450,7 @@ fn ring(bytes: &mut Bytes) -> TriangleMesh {
 
 /// Returns a fixed scene of few vertices, for the targets of saved states.
 pub fn small_deformable() -> DeformableModel {
-    let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 6, 1]);
+    let volume = volume(&mut Choices::new(&[0; 24]), [6, 6, 6, 1]);
     let options = DeformableOptions { edge: Some(3.0), levels: 1, ..DeformableOptions::default() };
     DeformableModel::new(&volume, options).unwrap()
 }
@@ -473,7 +473,7 @@ pub fn small_multires() -> MultiresolutionModel {
 
 /// Returns a fixed scene of few voxels, for the targets of saved states.
 pub fn small_tracking() -> SurfaceTracker {
-    let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 4, 3]);
+    let volume = volume(&mut Choices::new(&[0; 24]), [6, 6, 4, 3]);
     let options = TrackingOptions {
         volume,
         bounds: None,

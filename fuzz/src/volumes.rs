@@ -5,7 +5,7 @@ use vesicle::math::DVec3;
 use vesicle::volume::{Enrichment, Volume, marching_cubes_world};
 
 /// Largest number of voxels for which a volume is checked in full.
-const FEW: usize = 4096;
+const FULL_CHECK_LIMIT: usize = 4096;
 
 /// Reads a whole file as a volume; the seeds are NIfTI files.
 pub fn nifti(data: &[u8]) {
@@ -82,7 +82,7 @@ fn check(volume: &Volume) {
     assert_eq!(volume.voxels().len(), nx * ny * nz * frames);
     let [low, high] = volume.range();
     assert!(low <= high && low.is_finite() && high.is_finite());
-    if volume.voxels().len() > FEW {
+    if volume.voxels().len() > FULL_CHECK_LIMIT {
         return;
     }
     for frame in [0, frames - 1] {

@@ -8,7 +8,7 @@
 import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Space, VolumeInit } from '../volume.js';
-import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from './source.js';
+import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
 
@@ -42,9 +42,9 @@ const SECONDS: Record<number, number> = { 0: 1, 8: 1, 16: 1e-3, 24: 1e-6 };
  */
 export function volumeFromNiivue(volume: NiivueVolume | undefined): VolumeInit {
   const { hdr, img } = Object(volume) as NiivueVolume;
-  if (!hdr?.affine || !img) throw invalid('volume', 'a loaded volume of NiiVue is needed, as nv.volumes[0]');
+  if (!hdr?.affine || !img) throw invalid('volume', 'must be a loaded volume of NiiVue, such as nv.volumes[0]');
   const several = SEVERAL_NUMBERS[hdr.datatypeCode];
-  if (several) throw invalid('volume', `${several}; one number a voxel is needed`);
+  if (several) throw invalid('volume', `${several}; only one number per voxel is supported`);
   const grid = voxels(
     img,
     hdr.dims.slice(1, 4).map((count) => Math.max(1, count)),
@@ -106,8 +106,8 @@ export interface NiivueSurfaceOptions {
  * ```
  */
 export class NiivueSurface {
-  readonly #reader: Reader;
-  readonly #shown: Shown;
+  readonly #reader: MeshReader;
+  readonly #adapter: MeshAdapter;
 
   /**
    * @param nv - A NiiVue attached to its canvas.
@@ -115,19 +115,19 @@ export class NiivueSurface {
    */
   constructor(nv: Niivue, options: NiivueSurfaceOptions = {}) {
     const { NVMesh, name = 'vesicle', color = [1, 0.88, 0.75, 1], space = 'RAS' } = options;
-    if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'a Niivue is needed');
-    const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View };
-    if (!gl && !view) throw invalid('nv', 'has no canvas yet: attach it first');
-    this.#reader = new Reader(space, 'RAS');
+    if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'must be a Niivue');
+    const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View10 };
+    if (!gl && !view) throw invalid('nv', 'has no canvas yet; attach one first');
+    this.#reader = new MeshReader(space, 'RAS');
     const look = { name, color };
-    if (view) this.#shown = new InNext(nv, view, look);
-    else if (NVMesh && gl) this.#shown = new InFirst(nv, gl, NVMesh, look);
+    if (view) this.#adapter = new Niivue10(nv, view, look);
+    else if (NVMesh && gl) this.#adapter = new Niivue069(nv, gl, NVMesh, look);
     else throw invalid('NVMesh', "NiiVue 0.69 needs its class: import { Niivue, NVMesh } from '@niivue/niivue'");
   }
 
   /** The mesh in NiiVue's list, `nv.meshes`; undefined before the first update. */
   get mesh(): object | undefined {
-    return this.#shown.mesh;
+    return this.#adapter.mesh;
   }
 
   /**
@@ -141,26 +141,26 @@ export class NiivueSurface {
   async update(mesh: MeshSource): Promise<boolean> {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
-    await this.#shown.show(frame);
+    await this.#adapter.show(frame);
     return true;
   }
 
   /** Removes the mesh from NiiVue. */
   async dispose(): Promise<void> {
     this.#reader.clear();
-    await this.#shown.remove();
+    await this.#adapter.remove();
   }
 }
 
-interface Look {
+interface Appearance {
   name: string;
   color: readonly [number, number, number, number];
 }
 
 /** The mesh in one of the two supported generations of NiiVue. */
-interface Shown {
+interface MeshAdapter {
   readonly mesh: object | undefined;
-  show(frame: Frame): unknown;
+  show(frame: SurfaceArrays): unknown;
   remove(): unknown;
 }
 
@@ -177,7 +177,7 @@ function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uin
 }
 
 /** The properties used of an `NVMesh` of 0.69. */
-interface FirstMesh {
+interface Mesh069 {
   pts: Float32Array;
   tris: Uint32Array;
   rgba255: Uint8Array;
@@ -194,49 +194,49 @@ interface FirstMesh {
   updateMesh(gl: WebGL2RenderingContext): void;
 }
 
-class InFirst implements Shown {
-  mesh: FirstMesh | undefined;
+class Niivue069 implements MeshAdapter {
+  mesh: Mesh069 | undefined;
   readonly #nv: Niivue;
   readonly #gl: WebGL2RenderingContext;
   readonly #NVMesh: NVMeshClass;
-  readonly #look: Look;
+  readonly #appearance: Appearance;
 
-  constructor(nv: Niivue, gl: WebGL2RenderingContext, NVMesh: NVMeshClass, look: Look) {
-    [this.#nv, this.#gl, this.#NVMesh, this.#look] = [nv, gl, NVMesh, look];
+  constructor(nv: Niivue, gl: WebGL2RenderingContext, NVMesh: NVMeshClass, appearance: Appearance) {
+    [this.#nv, this.#gl, this.#NVMesh, this.#appearance] = [nv, gl, NVMesh, appearance];
   }
 
-  show(frame: Frame): void {
+  show(frame: SurfaceArrays): void {
     // NiiVue keeps the arrays for later use, so they are copied.
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
     if (this.mesh) this.#change(this.mesh, positions, indices, frame);
     else this.#add(positions, indices, frame);
   }
 
-  #change(mesh: FirstMesh, positions: Float32Array, indices: Uint32Array, frame: Frame): void {
+  #change(mesh: Mesh069, positions: Float32Array, indices: Uint32Array, frame: SurfaceArrays): void {
     if (frame.topology) Object.assign(mesh, { tris: indices, layers: [] });
     const { min, max } = bounds(positions);
     Object.assign(mesh, { pts: positions, extentsMin: min, extentsMax: max });
     mesh.furthestVertexFromOrigin = furthest(positions);
-    if (frame.colors) mesh.rgba255 = paint(frame, this.#look.color);
+    if (frame.colors) mesh.rgba255 = paint(frame, this.#appearance.color);
     // Packing the vertex records here takes a fifth of the time of `updateMesh`, which is used if their format is
     // another one.
     if (mesh.f32PerVertex === 5 && mesh.layers.length === 0) this.#upload(mesh, frame);
     else mesh.updateMesh(this.#gl);
   }
 
-  #add(positions: Float32Array<ArrayBuffer>, indices: Uint32Array<ArrayBuffer>, frame: Frame): void {
-    const { name, color } = this.#look;
+  #add(positions: Float32Array<ArrayBuffer>, indices: Uint32Array<ArrayBuffer>, frame: SurfaceArrays): void {
+    const { name, color } = this.#appearance;
     const rgba = frame.colors ? paint(frame, color) : Uint8Array.from(color, (share) => Math.round(255 * share));
     const mesh = new this.#NVMesh(positions, indices, name, rgba, 1, true, this.#gl);
-    this.mesh = mesh as FirstMesh;
+    this.mesh = mesh as Mesh069;
     this.#nv.addMesh(mesh);
   }
 
-  #upload(mesh: FirstMesh, frame: Frame): void {
+  #upload(mesh: Mesh069, frame: SurfaceArrays): void {
     const gl = this.#gl;
     gl.bindVertexArray(mesh.vao);
     gl.bindBuffer(gl.ARRAY_BUFFER, mesh.vertexBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, records(frame, mesh.rgba255), gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, vertexRecords069(frame, mesh.rgba255), gl.DYNAMIC_DRAW);
     if (frame.topology) {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.indexBuffer);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.tris, gl.DYNAMIC_DRAW);
@@ -253,7 +253,7 @@ class InFirst implements Shown {
 }
 
 /** Packs vertex records for 0.69, 20 bytes each: position, normal in signed bytes, colour. */
-function records({ positions, normals }: Frame, rgba: Uint8Array): ArrayBuffer {
+function vertexRecords069({ positions, normals }: SurfaceArrays, rgba: Uint8Array): ArrayBuffer {
   const vertices = positions.length / 3;
   const buffer = new ArrayBuffer(20 * vertices);
   const [floats, signed, words] = [new Float32Array(buffer), new Int8Array(buffer), new Uint32Array(buffer)];
@@ -282,7 +282,7 @@ function furthest(positions: Float32Array): number {
 }
 
 /** The properties used of a mesh of 1.0. */
-interface NextMesh {
+interface Mesh10 {
   positions: Float32Array;
   indices: Uint32Array;
   colors: Uint32Array;
@@ -295,7 +295,7 @@ interface NextMesh {
 }
 
 /** WebGL buffers of a mesh in the view of 1.0. */
-interface NextBuffers {
+interface Buffers10 {
   vao: WebGLVertexArrayObject | null;
   vertexBuffer: WebGLBuffer | null;
   indexBuffer: WebGLBuffer | null;
@@ -303,24 +303,24 @@ interface NextBuffers {
 }
 
 /** The view of 1.0 with its private properties; some are missing with WebGPU. */
-interface View {
+interface View10 {
   gl?: WebGL2RenderingContext | null;
-  meshResources?: Map<object, NextBuffers>;
+  meshResources?: Map<object, Buffers10>;
   _rebuildMeshResources?: () => void;
 }
 
-class InNext implements Shown {
-  mesh: NextMesh | undefined;
+class Niivue10 implements MeshAdapter {
+  mesh: Mesh10 | undefined;
   readonly #nv: Niivue;
-  readonly #view: View;
-  readonly #look: Look;
-  #known: NextBuffers | undefined;
+  readonly #view: View10;
+  readonly #appearance: Appearance;
+  #known: Buffers10 | undefined;
 
-  constructor(nv: Niivue, view: View, look: Look) {
-    [this.#nv, this.#view, this.#look] = [nv, view, look];
+  constructor(nv: Niivue, view: View10, appearance: Appearance) {
+    [this.#nv, this.#view, this.#appearance] = [nv, view, appearance];
   }
 
-  show(frame: Frame): unknown {
+  show(frame: SurfaceArrays): unknown {
     const geometry = this.#geometry(frame);
     if (!this.mesh) {
       this.mesh = { ...this.#plain(), ...geometry, layers: [] };
@@ -342,7 +342,7 @@ class InNext implements Shown {
    * Returns NiiVue's own buffers of the mesh before the update, if their size matches the known record format; else
    * undefined.
    */
-  #buffers(mesh: NextMesh): NextBuffers | undefined {
+  #buffers(mesh: Mesh10): Buffers10 | undefined {
     const { gl, meshResources } = this.#view;
     const buffers = meshResources?.get(mesh);
     if (!gl || !buffers?.vertexBuffer) return undefined;
@@ -355,14 +355,14 @@ class InNext implements Shown {
   }
 
   #upload(
-    buffers: NextBuffers,
-    frame: Frame,
+    buffers: Buffers10,
+    frame: SurfaceArrays,
     { indices, colors }: { indices: Uint32Array; colors: Uint32Array },
   ): void {
     const gl = this.#view.gl as WebGL2RenderingContext;
     gl.bindVertexArray(buffers.vao);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertexBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, longRecords(frame, colors), gl.DYNAMIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, vertexRecords10(frame, colors), gl.DYNAMIC_DRAW);
     if (frame.topology) {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.indexBuffer);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.DYNAMIC_DRAW);
@@ -371,9 +371,9 @@ class InNext implements Shown {
     buffers.indexCount = indices.length;
   }
 
-  #geometry(frame: Frame) {
+  #geometry(frame: SurfaceArrays) {
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
-    const colors = new Uint32Array(paint(frame, this.mesh?.color ?? this.#look.color).buffer);
+    const colors = new Uint32Array(paint(frame, this.mesh?.color ?? this.#appearance.color).buffer);
     const { min, max } = bounds(positions);
     const own = frame.colors ? colors : null;
     return {
@@ -384,7 +384,7 @@ class InNext implements Shown {
 
   /** Returns the other properties of a mesh of 1.0. */
   #plain() {
-    const { name, color } = this.#look;
+    const { name, color } = this.#appearance;
     const [r, g, b, a] = color;
     return {
       ...{ kind: 'mesh', name, color: [r, g, b, a] as [number, number, number, number], opacity: 1 },
@@ -401,7 +401,7 @@ class InNext implements Shown {
 }
 
 /** Packs vertex records for 1.0, 28 bytes each: position, normal, colour. */
-function longRecords({ positions, normals }: Frame, colors: Uint32Array): ArrayBuffer {
+function vertexRecords10({ positions, normals }: SurfaceArrays, colors: Uint32Array): ArrayBuffer {
   const buffer = new ArrayBuffer(28 * colors.length);
   const [floats, words] = [new Float32Array(buffer), new Uint32Array(buffer)];
   for (let v = 0; v < colors.length; v++) {

@@ -19,14 +19,14 @@ export interface MeshSource {
 }
 
 /** A surface ready to be shown, in the host's space. The arrays are valid until the next read. */
-export interface Frame extends MeshArrays {
+export interface SurfaceArrays extends MeshArrays {
   /** Whether the connectivity has changed, or the mesh is another one. */
   topology: boolean;
 }
 
 /** Reads a mesh if it has changed since the last read, and converts it to the host's space. */
-export class Reader {
-  readonly #turned: boolean;
+export class MeshReader {
+  readonly #rotated: boolean;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
   #mesh: MeshSource | undefined;
   #topology = 0;
@@ -39,24 +39,24 @@ export class Reader {
   constructor(space: Space | undefined, host: Space | undefined) {
     const spaces = [space, host].filter((one) => one !== undefined);
     for (const one of spaces) choice('space', one, ['RAS', 'LPS']);
-    this.#turned = spaces[0] !== spaces.at(-1);
+    this.#rotated = spaces[0] !== spaces.at(-1);
   }
 
   /** Returns the surface, or undefined if it has not changed. */
-  read(mesh: MeshSource): Frame | undefined {
+  read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
     const frame = this.#take(mesh);
     [this.#mesh, this.#topology, this.#geometry] = [mesh, mesh.topologyVersion, mesh.geometryVersion];
-    if (this.#turned) for (const values of [frame.positions, frame.normals]) turn(values);
+    if (this.#rotated) for (const values of [frame.positions, frame.normals]) rotate180(values);
     return { ...frame, topology };
   }
 
   #take(mesh: MeshSource): MeshArrays {
     if (!mesh.copyTo) return copied(mesh.arrays());
     const { vertices, triangles } = mesh.copyTo(this.#arrays);
-    return cut(this.#arrays, vertices, triangles);
+    return usedPart(this.#arrays, vertices, triangles);
   }
 
   /** Forgets the mesh, so that the next read returns it in full. */
@@ -68,7 +68,7 @@ export class Reader {
 function checkSource(mesh: MeshSource): void {
   const { topologyVersion, geometryVersion, arrays } = Object(mesh) as Partial<MeshSource>;
   if (typeof arrays === 'function' && Number.isFinite(topologyVersion) && Number.isFinite(geometryVersion)) return;
-  throw invalid('mesh', 'a Mesh is needed, or an object with arrays(), topologyVersion and geometryVersion');
+  throw invalid('mesh', 'must be a Mesh, or an object with arrays(), topologyVersion and geometryVersion');
 }
 
 // Arrays owned by others must not be rotated in place.
@@ -77,7 +77,7 @@ function copied({ positions, normals, ...rest }: MeshArrays): MeshArrays {
 }
 
 /** Returns views of the used part of the arrays. */
-function cut(
+function usedPart(
   { positions, normals, indices, uvs, colors }: MeshArrays,
   vertices: number,
   triangles: number,
@@ -91,7 +91,7 @@ function cut(
   };
 }
 
-function turn(vectors: Float32Array): void {
+function rotate180(vectors: Float32Array): void {
   for (let i = 0; i < vectors.length; i += 3) {
     vectors[i] = -(vectors[i] as number);
     vectors[i + 1] = -(vectors[i + 1] as number);
@@ -124,13 +124,13 @@ const ELEMENTS = [
  */
 export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit, 'data' | 'dims'> {
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
-    throw invalid('volume', `has no voxels of a kind that is taken: ${ELEMENTS.map(({ name }) => name).join(', ')}`);
+    throw invalid('volume', `unsupported voxel type; supported: ${ELEMENTS.map(({ name }) => name).join(', ')}`);
   }
   const { length } = data as VoxelArray;
   const [x = 0, y = 0, z = 0] = sizes;
   const frames = length / (x * y * z);
   if (Number.isInteger(frames) && frames > 0) return { data: data as VoxelArray, dims: [x, y, z, frames] };
-  throw invalid('volume', `${length} numbers for ${x} x ${y} x ${z} voxels; one for each voxel and frame is needed`);
+  throw invalid('volume', `must have one number per voxel and frame, got ${length} for ${x} × ${y} × ${z} voxels`);
 }
 
 /**

@@ -8,7 +8,7 @@
 import { choice, invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Space, VolumeInit } from '../volume.js';
-import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from './source.js';
+import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
 
@@ -59,17 +59,20 @@ export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' |
 function checkVolume(volume: ThreeVolume): ThreeVolume {
   const { data, xLength, yLength, zLength, matrix } = Object(volume) as ThreeVolume;
   if (data && matrix?.elements && xLength > 0 && yLength > 0 && zLength > 0) return volume;
-  throw invalid('volume', 'a loaded volume of NRRDLoader is needed: data, xLength, yLength, zLength and matrix');
+  throw invalid('volume', 'must be a loaded volume of NRRDLoader, with data, xLength, yLength, zLength and matrix');
 }
 
 function checkHeader({ sizes = [], kinds = '', endian, encoding }: Header, data: unknown): void {
   if (sizes.length > 3 && !/(list|time)$/.test(kinds.trim())) {
-    throw invalid('volume', `${sizes.length} axes, kinds '${kinds}'; one number a voxel is needed, frames last`);
+    throw invalid(
+      'volume',
+      `${sizes.length} axes, kinds '${kinds}'; only one number per voxel is supported, with frames last`,
+    );
   }
   const bytes = (data as { BYTES_PER_ELEMENT?: number }).BYTES_PER_ELEMENT ?? 1;
   const written = /^(ascii|te?xt|hex)$/.test(encoding ?? '');
   if (endian !== 'big' || bytes === 1 || written) return;
-  throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; give the file to Volume.parse instead');
+  throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; use Volume.parse instead');
 }
 
 /** Returns the columns of the linear part of a column-major 4 x 4 or 3 x 3 matrix. */
@@ -136,7 +139,7 @@ const ATTRIBUTES = [
 ] as const;
 
 /** Capacity of buffers relative to their contents, so that they are seldom reallocated. */
-const ROOM = 1.5;
+const CAPACITY_FACTOR = 1.5;
 
 /**
  * A surface in a three.js scene that follows a mesh, through all changes of connectivity.
@@ -153,7 +156,7 @@ const ROOM = 1.5;
 export class ThreeSurface {
   readonly #three: ThreeClasses;
   readonly #object: ThreeObject;
-  readonly #reader: Reader;
+  readonly #reader: MeshReader;
   #buffers: Buffers | undefined;
 
   /**
@@ -165,12 +168,12 @@ export class ThreeSurface {
    */
   constructor(three: ThreeClasses, object: ThreeObject, options: { space?: Space; worldSpace?: Space } = {}) {
     for (const name of ['BufferGeometry', 'BufferAttribute', 'Sphere', 'Box3'] as const) {
-      if (typeof Object(three)[name] !== 'function') throw invalid('three', `has no ${name}; THREE is needed`);
+      if (typeof Object(three)[name] !== 'function') throw invalid('three', `has no ${name}; pass THREE`);
     }
-    if (!Object(object).geometry) throw invalid('object', 'an object with a geometry is needed, as a THREE.Mesh');
+    if (!Object(object).geometry) throw invalid('object', 'must be an object with a geometry, such as a THREE.Mesh');
     this.#three = three;
     this.#object = object;
-    this.#reader = new Reader(options.space, options.worldSpace);
+    this.#reader = new MeshReader(options.space, options.worldSpace);
   }
 
   /**
@@ -187,7 +190,7 @@ export class ThreeSurface {
     return true;
   }
 
-  #grow(frame: Frame): void {
+  #grow(frame: SurfaceArrays): void {
     this.#buffers?.geometry.dispose();
     this.#buffers = new Buffers(this.#three, frame);
     this.#object.geometry = this.#buffers.geometry;
@@ -217,12 +220,12 @@ class Buffers {
     for (const [name, called, size] of ATTRIBUTES) {
       const values = frame[name];
       if (!values) continue;
-      const array = new Float32Array(size * room(values.length / size));
+      const array = new Float32Array(size * capacityFor(values.length / size));
       const attribute = new BufferAttribute(array, size);
       this.geometry.setAttribute(called, attribute);
       this.#parts.set(name, { array, attribute });
     }
-    const array = new Uint32Array(3 * room(frame.indices.length / 3));
+    const array = new Uint32Array(3 * capacityFor(frame.indices.length / 3));
     const attribute = new BufferAttribute(array, 1);
     this.geometry.setIndex(attribute);
     this.#parts.set('indices', { array, attribute });
@@ -236,7 +239,7 @@ class Buffers {
     });
   }
 
-  write(frame: Frame): void {
+  write(frame: SurfaceArrays): void {
     for (const [name] of ATTRIBUTES) this.#fill(name, frame[name]);
     if (frame.topology || !this.#filled) this.#fill('indices', frame.indices);
     this.#filled = true;
@@ -259,4 +262,4 @@ class Buffers {
   }
 }
 
-const room = (count: number): number => Math.ceil(ROOM * count);
+const capacityFor = (count: number): number => Math.ceil(CAPACITY_FACTOR * count);

@@ -7,7 +7,7 @@
  */
 import { choice, invalid } from '../check.js';
 import type { Space, VolumeInit } from '../volume.js';
-import { affineOf, type Frame, type MeshSource, Reader, voxels } from './source.js';
+import { affineOf, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
 
@@ -56,12 +56,12 @@ const dot = (index: number[], columns: number[][], row: number): number =>
 
 function scalarsOf(image: VtkImage) {
   const { getIndexToWorld, getPointData } = Object(image) as Partial<VtkImage>;
-  if (!getIndexToWorld || !getPointData) throw invalid('image', 'a vtkImageData is needed');
+  if (!getIndexToWorld || !getPointData) throw invalid('image', 'must be a vtkImageData');
   const scalars = getPointData().getScalars();
-  if (!scalars) throw invalid('image', 'has no scalars; a vtkImageData with one number a voxel is needed');
+  if (!scalars) throw invalid('image', 'has no scalars; must be a vtkImageData with one number per voxel');
   const components = scalars.getNumberOfComponents();
   if (components === 1) return scalars;
-  throw invalid('image', `${components} numbers a voxel; one is needed`);
+  throw invalid('image', `${components} numbers per voxel; only one is supported`);
 }
 
 /**
@@ -73,10 +73,10 @@ function scalarsOf(image: VtkImage) {
  */
 export function volumeFromItk(image: ItkImage): VolumeInit {
   const { imageType, size, spacing, origin, direction, data } = Object(image) as ItkImage;
-  if (!imageType || !size || !direction) throw invalid('image', 'an Image of itk-wasm is needed');
+  if (!imageType || !size || !direction) throw invalid('image', 'must be an Image of itk-wasm');
   const { dimension, components, pixelType } = imageType;
-  if (dimension !== 3 && dimension !== 4) throw invalid('image', `${dimension}D; a 3D or 4D image is needed`);
-  if (components !== 1) throw invalid('image', `${components} numbers a voxel, ${pixelType}; one is needed`);
+  if (dimension !== 3 && dimension !== 4) throw invalid('image', `must be a 3D or 4D image, got ${dimension}D`);
+  if (components !== 1) throw invalid('image', `${components} numbers per voxel, ${pixelType}; only one is supported`);
   const cosine = (row: number, column: number) => Number(direction[column + row * dimension]);
   const columns = [0, 1, 2].map((column) => [0, 1, 2].map((row) => cosine(row, column) * Number(spacing[column])));
   return { ...voxels(data, Array.from(size)), affine: affineOf(columns, origin), space: 'LPS' };
@@ -116,7 +116,7 @@ export class VtkSurface<P extends VtkPolyData> {
   /** Input of a `vtkMapper`; the same object from start to end. */
   readonly polyData: P;
   readonly #normals: DataArray;
-  readonly #reader: Reader;
+  readonly #reader: MeshReader;
 
   /**
    * @param vtk - The classes of vtk.js.
@@ -128,7 +128,7 @@ export class VtkSurface<P extends VtkPolyData> {
     for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {
       if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
     }
-    this.#reader = new Reader(options.space, options.worldSpace);
+    this.#reader = new MeshReader(options.space, options.worldSpace);
     this.polyData = vtk.vtkPolyData.newInstance();
     this.#normals = vtk.vtkDataArray.newInstance({
       name: 'Normals',
@@ -163,7 +163,7 @@ export class VtkSurface<P extends VtkPolyData> {
 }
 
 /** Returns the triangles as vtk cells: each preceded by its number of corners. */
-function polygons({ indices }: Frame): Uint32Array {
+function polygons({ indices }: SurfaceArrays): Uint32Array {
   const cells = new Uint32Array((indices.length / 3) * 4);
   for (let from = 0, to = 0; from < indices.length; from += 3, to += 4) {
     cells[to] = 3;

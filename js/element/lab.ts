@@ -3,7 +3,7 @@ import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
 import init, { type Stepper, type Vec3 } from '../worker.js';
-import { fetched, json, type Made, MODELS, startNamed } from './making.js';
+import { fetched, json, MODELS, type ModelWithView, parseStart } from './models.js';
 import { STYLE } from './style.js';
 import { View } from './view.js';
 
@@ -14,8 +14,8 @@ export type LabMethod = keyof typeof MODELS;
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
 /** Approximate time for steps between two renderings, milliseconds, and the largest number of steps. */
-const SLICE = 60;
-const MOST_STEPS = 256;
+const SLICE_MS = 60;
+const MAX_STEPS = 256;
 
 const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
 
@@ -40,8 +40,8 @@ export class VesicleLab extends HTMLElement {
   #model: Stepper | undefined;
   /** Number of resets, so that results of an earlier one are discarded. */
   #opening = 0;
-  #from: Vec3 = [0, -1, 0];
-  #framed = false;
+  #viewDirection: Vec3 = [0, -1, 0];
+  #fitted = false;
 
   /** The current state. */
   get state(): LabState {
@@ -73,49 +73,49 @@ export class VesicleLab extends HTMLElement {
   async reset(): Promise<void> {
     this.#close();
     const opening = ++this.#opening;
-    this.#is('loading', 'Loading.');
+    this.#setState('loading', 'Loading.');
     try {
       const { model, from } = await this.#make();
       if (opening !== this.#opening) return void model.free();
-      [this.#model, this.#from, this.#framed] = [model, from, false];
+      [this.#model, this.#viewDirection, this.#fitted] = [model, from, false];
       this.#view?.begin();
       await this.#show();
-      this.#is('paused', 'Ready.');
+      this.#setState('paused', 'Ready.');
       if (!this.hasAttribute('paused')) await this.play();
     } catch (error) {
       if (opening === this.#opening) this.#fail(error);
     }
   }
 
-  async #make(): Promise<Made> {
+  async #make(): Promise<ModelWithView> {
     const method = (this.getAttribute('method') ?? 'deformable') as LabMethod;
     const make = MODELS[method];
     if (!Object.hasOwn(MODELS, method))
-      throw invalid('method', `'${method}'; there are ${Object.keys(MODELS).join(', ')}`);
+      throw invalid('method', `must be one of ${Object.keys(MODELS).join(', ')}, got '${method}'`);
     const src = this.getAttribute('src');
-    if (!src) throw invalid('src', 'the address of a file is needed');
-    const told = {
-      start: startNamed(this.getAttribute('start')),
+    if (!src) throw invalid('src', 'must be the address of a file');
+    const settings = {
+      start: parseStart(this.getAttribute('start')),
       levels: Number(this.getAttribute('levels') ?? 0),
       params: json<Record<string, unknown>>('params', this.getAttribute('params'), {}),
       ellipsoids: json('ellipsoids', this.getAttribute('ellipsoids'), []),
     };
     const [bytes] = await Promise.all([fetched(new URL(src, document.baseURI).href), init()]);
-    return make({ ...told, bytes });
+    return make({ ...settings, bytes });
   }
 
   /** Runs to the end, or until {@link VesicleLab.pause}. */
   async play(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'running' || this.state === 'done') return;
-    this.#is('running', 'Running.');
+    this.#setState('running', 'Running.');
     try {
       // Each slice is awaited, so that however fast the steps, the page does not fall behind.
       for (let steps = 1; this.#runs(model); ) {
         const began = performance.now();
-        await this.#go(model, steps);
+        await this.#runSteps(model, steps);
         const took = performance.now() - began;
-        steps = took < SLICE / 2 ? Math.min(2 * steps, MOST_STEPS) : took > SLICE ? Math.ceil(steps / 2) : steps;
+        steps = took < SLICE_MS / 2 ? Math.min(2 * steps, MAX_STEPS) : took > SLICE_MS ? Math.ceil(steps / 2) : steps;
       }
     } catch (error) {
       if (model === this.#model) this.#fail(error);
@@ -128,7 +128,7 @@ export class VesicleLab extends HTMLElement {
 
   /** Pauses the run after the steps in progress. */
   pause(): void {
-    if (this.state === 'running') this.#is('paused', 'Paused.');
+    if (this.state === 'running') this.#setState('paused', 'Paused.');
   }
 
   /** Runs one step of the method, and pauses. */
@@ -137,25 +137,25 @@ export class VesicleLab extends HTMLElement {
     if (!model || this.state === 'done') return;
     this.pause();
     try {
-      await this.#go(model, 1);
+      await this.#runSteps(model, 1);
     } catch (error) {
       if (model === this.#model) this.#fail(error);
     }
   }
 
   /** Runs `steps` steps and shows the result. */
-  async #go(model: Stepper, steps: number): Promise<void> {
+  async #runSteps(model: Stepper, steps: number): Promise<void> {
     const report = await model.step(steps);
     if (model !== this.#model) return;
     this.#parts.figures(report);
     this.dispatchEvent(new CustomEvent('vesicle-step', { detail: report }));
-    if (report.done) this.#ended(report);
+    if (report.done) this.#finish(report);
     await this.#show();
   }
 
-  #ended({ vertices, components }: StepReport): void {
+  #finish({ vertices, components }: StepReport): void {
     const parts = components === 1 ? 'one component' : `${components} components`;
-    this.#is('done', `Done: ${vertices.toLocaleString('en')} vertices in ${parts}.`);
+    this.#setState('done', `Done: ${vertices.toLocaleString('en')} vertices in ${parts}.`);
     this.dispatchEvent(new CustomEvent('vesicle-done'));
   }
 
@@ -165,16 +165,16 @@ export class VesicleLab extends HTMLElement {
     if (model !== this.#model || !arrays?.indices.length) return;
     this.#view?.show(arrays);
     // The final surface may be much smaller than the initial one.
-    if (!this.#framed || this.state === 'done') this.#view?.frame(this.#from);
-    this.#framed = true;
+    if (!this.#fitted || this.state === 'done') this.#view?.frame(this.#viewDirection);
+    this.#fitted = true;
   }
 
   #fail(error: unknown): void {
-    this.#is('error', error instanceof Error ? error.message : String(error));
+    this.#setState('error', error instanceof Error ? error.message : String(error));
     this.dispatchEvent(new CustomEvent('vesicle-error', { detail: error }));
   }
 
-  #is(state: LabState, words: string): void {
+  #setState(state: LabState, words: string): void {
     this.dataset.state = state;
     this.#parts.show(state, words);
   }
@@ -224,7 +224,7 @@ class Parts {
       return new View(this.#canvas);
     } catch {
       const words = document.createElement('p');
-      words.textContent = 'This browser gives no WebGL: there are numbers, but no picture.';
+      words.textContent = 'WebGL is not available; only figures are shown.';
       this.#canvas.replaceWith(words);
       return undefined;
     }
@@ -255,6 +255,6 @@ function canvas(): HTMLCanvasElement {
   made.tabIndex = 0;
   made.setAttribute('part', 'view');
   made.setAttribute('role', 'img');
-  made.setAttribute('aria-label', 'The surface. Arrow keys turn it, plus and minus zoom.');
+  made.setAttribute('aria-label', 'The surface. Arrow keys rotate it, plus and minus zoom.');
   return made;
 }

@@ -7,7 +7,7 @@ import type { Vec3 } from '../volume.js';
 
 const FIELD_OF_VIEW = 40;
 /** Upper bound of the device pixel ratio of the rendering. */
-const FINEST = 2;
+const MAX_PIXEL_RATIO = 2;
 
 /** Renders a surface with three.js whenever the surface or the camera has changed. */
 export class View {
@@ -93,7 +93,7 @@ export class View {
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, FINEST));
+    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, MAX_PIXEL_RATIO));
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
     this.#camera.updateProjectionMatrix();

@@ -13,7 +13,9 @@ use super::error::Failure;
 use super::volume::RawVolume;
 use crate::io::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic, measure, report};
+use crate::mesh::{
+    Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic_distances, measure, report,
+};
 use crate::methods::deformable::DeformableModel;
 use crate::methods::implicit::ImplicitSurface;
 use crate::remesh::{
@@ -166,7 +168,7 @@ impl RawMesh {
     pub fn arrays(&self) -> RawArrays {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
-            let uvs = mesh.uvs_of_one_side();
+            let uvs = mesh.uvs_ignoring_seams();
             Rc::make_mut(&mut mesh).uvs = uvs;
         }
         RawArrays(mesh)
@@ -265,7 +267,7 @@ impl RawMesh {
 
     /// Returns the geodesic distance of each vertex from vertex `from_vertex`.
     pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
-        Ok(to_f32(&geodesic(&self.triangles(), from_vertex).map_err(Failure::from)?))
+        Ok(to_f32(&geodesic_distances(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
 
     /// Returns the distances to another surface, per vertex and in summary, as `Mesh.distanceTo` documents them.

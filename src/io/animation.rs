@@ -3,17 +3,17 @@
 //! Meshes of different connectivity cannot be morphed into one another. Each mesh is therefore a node of its own, whose
 //! scale is 1 during its frames and 0 before and after. A viewer that plays no animations shows the first mesh.
 
-use super::glb_writer::{Parts, table};
+use super::glb_writer::{DocumentBuilder, json_array_member};
 use crate::math::Vec3;
 use crate::mesh::{MeshError, TriangleMesh};
 use std::borrow::Borrow;
 
 /// Shortest duration of an animation frame, in seconds. No screen shows shorter ones, and after hours of animation,
 /// times closer together than this are equal in single precision.
-const SHORTEST: f64 = 1e-3;
+const MIN_FRAME_SECONDS: f64 = 1e-3;
 
 /// Longest duration of an animation frame, in seconds: with longer ones a player seems to stand still.
-const LONGEST: f64 = 1e3;
+const MAX_FRAME_SECONDS: f64 = 1e3;
 
 /// Returns the bytes of an animated GLB that shows the meshes in order, `frame_seconds` (0.001 to 1000) each. Every
 /// mesh is stored as by [`write_mesh`](super::write_mesh), with its texture, normals, texture coordinates and colours.
@@ -36,7 +36,7 @@ pub fn write_animation<M: Borrow<TriangleMesh>>(
 /// [`write_animation`].
 #[derive(Default)]
 pub struct AnimationWriter {
-    parts: Parts,
+    parts: DocumentBuilder,
     /// For each mesh in the file, the index of the first frame that shows it.
     starts: Vec<usize>,
     frames: usize,
@@ -51,7 +51,7 @@ impl AnimationWriter {
     pub fn add(&mut self, mesh: &TriangleMesh) -> Result<(), MeshError> {
         mesh.validate()?;
         if mesh.triangles.is_empty() {
-            return Err(refused("frames", format!("number {} has no triangles", self.frames)));
+            return Err(invalid_argument("frames", format!("number {} has no triangles", self.frames)));
         }
         if self.last.as_ref() != Some(mesh) {
             self.parts.mesh(mesh)?;
@@ -68,11 +68,12 @@ impl AnimationWriter {
     /// As [`write_animation`].
     pub fn finish(mut self, frame_seconds: f64) -> Result<Vec<u8>, MeshError> {
         if self.frames == 0 {
-            return Err(refused("frames", "there are none; at least one is needed".into()));
+            return Err(invalid_argument("frames", "must contain at least one frame".into()));
         }
-        if !(SHORTEST..=LONGEST).contains(&frame_seconds) {
-            let problem = format!("{frame_seconds}; {SHORTEST} to {LONGEST} seconds are accepted");
-            return Err(refused("frameSeconds", problem));
+        if !(MIN_FRAME_SECONDS..=MAX_FRAME_SECONDS).contains(&frame_seconds) {
+            let problem =
+                format!("must be {MIN_FRAME_SECONDS} to {MAX_FRAME_SECONDS} seconds, got {frame_seconds}");
+            return Err(invalid_argument("frameSeconds", problem));
         }
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
         for mesh in 0..self.starts.len() {
@@ -83,9 +84,10 @@ impl AnimationWriter {
             channels.push(format!(r#"{{"sampler":{mesh},"target":{{"node":{mesh},"path":"scale"}}}}"#));
             self.parts.nodes.push(node(mesh));
         }
-        let tracks = [table("samplers", &samplers), table("channels", &channels)].concat();
+        let tracks =
+            [json_array_member("samplers", &samplers), json_array_member("channels", &channels)].concat();
         let animation = [format!("{{{}}}", tracks.trim_start_matches(','))];
-        self.parts.finish(&table("animations", &animation))
+        self.parts.finish(&json_array_member("animations", &animation))
     }
 
     /// Returns the animation track of mesh number `mesh`: the times in seconds at which its scale changes, and the
@@ -110,6 +112,6 @@ fn node(mesh: usize) -> String {
     format!(r#"{{"mesh":{mesh}{scale}}}"#)
 }
 
-fn refused(parameter: &'static str, problem: String) -> MeshError {
+fn invalid_argument(parameter: &'static str, problem: String) -> MeshError {
     MeshError::InvalidArgument { parameter, problem }
 }

@@ -29,7 +29,7 @@ pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
                 "the file unpacked",
             ));
         }
-        return Err(unknown(&start));
+        return Err(unsupported_format(&start));
     }
     if nifti::is_nifti(bytes) {
         nifti::parse(bytes, detached)
@@ -38,12 +38,12 @@ pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     } else if metaimage::is_metaimage(bytes) {
         metaimage::parse(bytes, detached)
     } else {
-        Err(unknown(bytes))
+        Err(unsupported_format(bytes))
     }
 }
 
 /// Returns the error for a file of no accepted format, which names the format if its first bytes identify it.
-fn unknown(bytes: &[u8]) -> FormatError {
+fn unsupported_format(bytes: &[u8]) -> FormatError {
     if bytes.is_empty() {
         return FormatError::truncated(ANY, "signature", 4, 0);
     }
@@ -65,7 +65,7 @@ fn signature(bytes: &[u8]) -> &'static str {
         () if at(0, b"BZh") => "bzip2",
         () if line(b"<?xml") || line(b"<VTKFile") => "XML",
         () if at(0, b"# vtk") => "VTK legacy",
-        () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "a flat picture",
-        () => "a file of no known signature",
+        () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "an image file (PNG or JPEG)",
+        () => "an unknown signature",
     }
 }

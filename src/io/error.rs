@@ -38,7 +38,7 @@ pub enum FormatError {
         found: u64,
     },
     /// The content does not fit in memory.
-    #[error("{format}: {field}: needs {needed} bytes, more than can be had")]
+    #[error("{format}: {field}: needs {needed} bytes, more than is available")]
     TooLarge {
         /// Name of the file format.
         format: &'static str,
@@ -56,7 +56,7 @@ impl FormatError {
         field: impl Into<String>,
         problem: impl Into<String>,
     ) -> Self {
-        Self::Invalid { format, field: shown(field), problem: shown(problem) }
+        Self::Invalid { format, field: clipped(field), problem: clipped(problem) }
     }
 
     /// Returns an [`Unsupported`](Self::Unsupported) error about `field`.
@@ -66,7 +66,7 @@ impl FormatError {
         found: impl Into<String>,
         accepted: &'static str,
     ) -> Self {
-        Self::Unsupported { format, field: shown(field), found: shown(found), accepted }
+        Self::Unsupported { format, field: clipped(field), found: clipped(found), accepted }
     }
 
     /// Returns a [`Truncated`](Self::Truncated) error about `field`; `needed` and `found` are in bytes.
@@ -76,23 +76,23 @@ impl FormatError {
         needed: usize,
         found: usize,
     ) -> Self {
-        Self::Truncated { format, field: shown(field), needed: needed as u64, found: found as u64 }
+        Self::Truncated { format, field: clipped(field), needed: needed as u64, found: found as u64 }
     }
 
     /// Returns a [`TooLarge`](Self::TooLarge) error about `field`, which needs `needed` bytes.
     pub(crate) fn too_large(format: &'static str, field: impl Into<String>, needed: u64) -> Self {
-        Self::TooLarge { format, field: shown(field), needed }
+        Self::TooLarge { format, field: clipped(field), needed }
     }
 }
 
 /// Maximum number of characters of a file's content that an error message quotes.
-const MOST_SHOWN: usize = 200;
+const MAX_QUOTED: usize = 200;
 
-/// Truncates text quoted in an error message to [`MOST_SHOWN`] characters: a malformed file may have a field of any
+/// Truncates text quoted in an error message to [`MAX_QUOTED`] characters: a malformed file may have a field of any
 /// length.
-fn shown(text: impl Into<String>) -> String {
+fn clipped(text: impl Into<String>) -> String {
     let mut text = text.into();
-    if let Some((end, _)) = text.char_indices().nth(MOST_SHOWN) {
+    if let Some((end, _)) = text.char_indices().nth(MAX_QUOTED) {
         text.truncate(end);
         text.push('…');
     }

@@ -16,7 +16,7 @@ const INDICES: Option<u32> = Some(34963);
 /// # Errors
 /// [`MeshError::TooLarge`] if there is not enough memory for it.
 pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
-    let mut parts = Parts::default();
+    let mut parts = DocumentBuilder::default();
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
@@ -28,7 +28,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
 
 /// A glTF document under construction: its buffer and the entries of its JSON arrays.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(super) struct DocumentBuilder {
     bytes: Vec<u8>,
     views: Vec<String>,
     accessors: Vec<String>,
@@ -38,7 +38,7 @@ pub(super) struct Parts {
     images: Vec<String>,
 }
 
-impl Parts {
+impl DocumentBuilder {
     /// Adds a mesh with its texture and returns its index in the document.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Parts {
 
     /// Adds the vertex attributes of a mesh and returns the members of the primitive's `attributes` object.
     fn attributes(&mut self, mesh: &TriangleMesh) -> String {
-        let bounds = Bounds::of(&mesh.positions);
+        let bounds = Bounds::from_points(&mesh.positions);
         let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
         let position =
             self.vectors(mesh.positions.iter().copied(), VERTICES, &format!(r#","min":{min},"max":{max}"#));
@@ -93,16 +93,16 @@ impl Parts {
         self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
     }
 
-    /// Adds an accessor of vectors and returns its index; `more` is appended to its JSON.
+    /// Adds an accessor of vectors and returns its index; `extra_json` is appended to its JSON.
     pub(super) fn vectors(
         &mut self,
         vectors: impl ExactSizeIterator<Item = Vec3>,
         target: Option<u32>,
-        more: &str,
+        extra_json: &str,
     ) -> usize {
         let (start, count) = (self.bytes.len(), vectors.len());
         vectors.for_each(|v| push_floats(&mut self.bytes, &v.to_array()));
-        self.accessor(start, target, [5126, count], "VEC3", more)
+        self.accessor(start, target, [5126, count], "VEC3", extra_json)
     }
 
     /// Adds an accessor of ascending animation times in seconds and returns its index.
@@ -122,11 +122,11 @@ impl Parts {
         target: Option<u32>,
         [component, count]: [usize; 2],
         kind: &str,
-        more: &str,
+        extra_json: &str,
     ) -> usize {
         let view = self.view(start, target);
         self.accessors.push(format!(
-            r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"{more}}}"#
+            r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"{extra_json}}}"#
         ));
         self.accessors.len() - 1
     }
@@ -156,24 +156,24 @@ impl Parts {
         Ok(self.textures.len() - 1)
     }
 
-    /// Reserves memory for `more` bytes, so that lack of memory is an error instead of a crash.
-    fn reserve(&mut self, more: usize) -> Result<(), MeshError> {
-        let bytes = self.bytes.len() as u64 + more as u64;
-        let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(more).is_ok();
+    /// Reserves memory for `additional` bytes, so that lack of memory is an error instead of a crash.
+    fn reserve(&mut self, additional: usize) -> Result<(), MeshError> {
+        let bytes = self.bytes.len() as u64 + additional as u64;
+        let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(additional).is_ok();
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// Returns the bytes of the file, with all nodes as roots of one scene; `more` is appended to the members of the
+    /// Returns the bytes of the file, with all nodes as roots of one scene; `extra_json` is appended to the members of the
     /// JSON.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
-    pub(super) fn finish(mut self, more: &str) -> Result<Vec<u8>, MeshError> {
+    pub(super) fn finish(mut self, extra_json: &str) -> Result<Vec<u8>, MeshError> {
         let mut json = String::from(r#"{"asset":{"version":"2.0","generator":"vesicle"},"scene":0"#);
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
         json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
-        json += more;
-        json += &self.looks();
+        json += extra_json;
+        json += &self.materials_json();
         let buffers = [format!(r#"{{"byteLength":{}}}"#, self.bytes.len())];
         let buffers = if self.bytes.is_empty() { &[][..] } else { &buffers };
         for (name, entries) in [
@@ -183,13 +183,13 @@ impl Parts {
             ("bufferViews", &self.views),
             ("buffers", buffers),
         ] {
-            json += &table(name, entries);
+            json += &json_array_member(name, entries);
         }
         container(json + "}", std::mem::take(&mut self.bytes))
     }
 
     /// Returns the JSON of materials, textures and images. WebP is an extension of glTF, declared as required.
-    fn looks(&self) -> String {
+    fn materials_json(&self) -> String {
         let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
         let (mut materials, mut textures) = (Vec::new(), Vec::new());
         for (number, texture) in self.textures.iter().enumerate() {
@@ -207,18 +207,18 @@ impl Parts {
         let names = [String::from(r#""EXT_texture_webp""#)];
         let extensions = if self.textures.iter().any(is_webp) { &names[..] } else { &[] };
         [
-            table("extensionsUsed", extensions),
-            table("extensionsRequired", extensions),
-            table("materials", &materials),
-            table("textures", &textures),
-            table("samplers", samplers),
-            table("images", &self.images),
+            json_array_member("extensionsUsed", extensions),
+            json_array_member("extensionsRequired", extensions),
+            json_array_member("materials", &materials),
+            json_array_member("textures", &textures),
+            json_array_member("samplers", samplers),
+            json_array_member("images", &self.images),
         ]
         .concat()
     }
 }
 
 /// Returns an array as a member of a JSON object, preceded by a comma; nothing for an empty array, which glTF forbids.
-pub(super) fn table(name: &str, entries: &[String]) -> String {
+pub(super) fn json_array_member(name: &str, entries: &[String]) -> String {
     if entries.is_empty() { String::new() } else { format!(r#","{name}":[{}]"#, entries.join(",")) }
 }

@@ -24,7 +24,7 @@ const UNCOMPRESSED: &str = "files without compression (save the mesh without it)
 const PRIMITIVE_COST: u64 = 64;
 
 /// Returns whether a file may require the extension: it does not affect positions and triangles, or is supported.
-fn is_harmless(extension: &str) -> bool {
+fn is_supported_extension(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
         || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
             .contains(&extension)
@@ -40,13 +40,12 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     for part in &parts {
         let read = part.primitive.read()?.transformed(&part.to_world);
         mesh = Some(match mesh {
-            Some(before) => joined(before, read),
+            Some(before) => merged(before, read),
             None => read,
         });
     }
-    let mut mesh = mesh.ok_or_else(|| {
-        FormatError::invalid(FORMAT, "meshes", "the scene has no triangles; at least one is needed")
-    })?;
+    let mut mesh =
+        mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
     let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
     if let Some(base_color) = base_color.filter(|_| mesh.has_uvs()) {
         mesh.texture = base_color.texture(&document)?.map(Arc::new);
@@ -55,18 +54,18 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
 }
 
 /// Returns both meshes as one, with the attributes that both have.
-fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
+fn merged(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
     let first = mesh.positions.len() as u32;
     mesh.positions.extend(part.positions);
     mesh.triangles.extend(part.triangles.into_iter().map(|t| t.map(|v| v + first)));
-    mesh.normals = both(mesh.normals, part.normals);
-    mesh.uvs = both(mesh.uvs, part.uvs);
-    mesh.colors = both(mesh.colors, part.colors);
+    mesh.normals = concatenated(mesh.normals, part.normals);
+    mesh.uvs = concatenated(mesh.uvs, part.uvs);
+    mesh.colors = concatenated(mesh.colors, part.colors);
     mesh
 }
 
 /// Concatenates two attribute arrays; `None` if either is missing.
-fn both<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
+fn concatenated<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
     let mut a = a?;
     a.extend(b?);
     Some(a)
@@ -89,7 +88,7 @@ impl<'a> Document<'a> {
     /// Returns an error if the file requires an extension that is not supported.
     fn check_extensions(&self) -> Result<(), FormatError> {
         let required = self.root["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
-        match required.iter().filter_map(Value::as_str).find(|name| !is_harmless(name)) {
+        match required.iter().filter_map(Value::as_str).find(|name| !is_supported_extension(name)) {
             None => Ok(()),
             Some(name) => Err(FormatError::unsupported(FORMAT, "extensionsRequired", name, UNCOMPRESSED)),
         }
@@ -99,7 +98,7 @@ impl<'a> Document<'a> {
     pub(super) fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
         let entries = self.root[table].as_array().map_or(&[][..], Vec::as_slice);
         let found = usize::try_from(index).ok().and_then(|i| entries.get(i));
-        let problem = || format!("number {index} is named; there are {}", entries.len());
+        let problem = || format!("index {index} is out of range; there are {} entries", entries.len());
         found.ok_or_else(|| FormatError::invalid(FORMAT, table, problem()))
     }
 
@@ -114,7 +113,7 @@ impl<'a> Document<'a> {
         while let Some((index, parent)) = stack.pop() {
             let node = self.entry("nodes", index)?;
             if std::mem::replace(&mut seen[index as usize], true) {
-                let problem = "is reached twice; a tree of nodes is accepted";
+                let problem = "is reached twice; nodes must form a tree";
                 return Err(FormatError::invalid(FORMAT, format!("nodes[{index}]"), problem));
             }
             let to_world = parent * transform(node, index)?;
@@ -195,7 +194,8 @@ impl<'a> Document<'a> {
         let field = format!("bufferViews[{index}]");
         let buffer = required(value, "buffer", &field)?;
         let outside = buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null();
-        if let Some(name) = compression(value).filter(|name| outside || self.is_stand_in(buffer, name)) {
+        if let Some(name) = compression(value).filter(|name| outside || self.is_fallback_buffer(buffer, name))
+        {
             return Err(FormatError::unsupported(FORMAT, field, name, UNCOMPRESSED));
         }
         if outside {
@@ -216,13 +216,14 @@ impl<'a> Document<'a> {
     }
 
     /// Returns whether a buffer is only a placeholder for data compressed elsewhere by `extension`.
-    fn is_stand_in(&self, buffer: u64, extension: &str) -> bool {
+    fn is_fallback_buffer(&self, buffer: u64, extension: &str) -> bool {
         let buffer = self.entry("buffers", buffer);
         buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
     }
 
-    /// Returns whether an accessor has no buffer view, because its elements are compressed elsewhere.
-    fn is_hollow(&self, accessor: u64) -> bool {
+    /// Returns whether an accessor has no buffer view; in a compressed primitive, the data of the extension then hold its
+    /// elements.
+    fn lacks_buffer_view(&self, accessor: u64) -> bool {
         self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
     }
 }
@@ -303,7 +304,7 @@ impl<'a> Primitive<'a> {
         let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
         let uvs = (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32));
         Ok(Some(match &self.base_color {
-            Some(base) => uvs.map(|uv| base.place(uv)).collect(),
+            Some(base) => uvs.map(|uv| base.transform_uv(uv)).collect(),
             None => uvs.collect(),
         }))
     }
@@ -327,7 +328,7 @@ impl<'a> Primitive<'a> {
             None => (0..vertices as u32).collect(),
         };
         if let Some(bad) = order.iter().find(|&&v| v as usize >= vertices) {
-            let problem = format!("vertex {bad} is named; {vertices} are there");
+            let problem = format!("vertex index {bad} is out of range; there are {vertices} vertices");
             return Err(FormatError::invalid(FORMAT, "indices", problem));
         }
         Ok(match self.mode {
@@ -345,7 +346,7 @@ fn check_compression(document: &Document, primitive: &Value) -> Result<(), Forma
     let Some(name) = compression(primitive) else { return Ok(()) };
     let attributes = &primitive["attributes"];
     let used = [unsigned(attributes, "POSITION")?, unsigned(primitive, "indices")?];
-    if used[0].is_none() || used.into_iter().flatten().any(|accessor| document.is_hollow(accessor)) {
+    if used[0].is_none() || used.into_iter().flatten().any(|accessor| document.lacks_buffer_view(accessor)) {
         return Err(FormatError::unsupported(FORMAT, "primitives", name, UNCOMPRESSED));
     }
     Ok(())
@@ -392,7 +393,7 @@ impl Component {
     }
 
     /// Returns the value that represents 1 in normalised data.
-    fn full(self) -> f64 {
+    fn normalization_scale(self) -> f64 {
         match self {
             Self::I8 => 127.0,
             Self::U8 => 255.0,
@@ -428,7 +429,7 @@ impl Accessor<'_> {
             Component::U32 => f64::from(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
             Component::F32 => f64::from(f32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
         };
-        if self.normalized { (value / self.component.full()).max(-1.0) } else { value }
+        if self.normalized { (value / self.component.normalization_scale()).max(-1.0) } else { value }
     }
 
     fn vector(&self, i: usize) -> Vec3 {
@@ -450,7 +451,7 @@ fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usiz
         return Ok(width);
     }
     let found: String = name.chars().take(20).collect();
-    let problem = format!("is {found}; elements of {widths:?} components are accepted");
+    let problem = format!("must have elements of {widths:?} components, got {found}");
     Err(FormatError::invalid(FORMAT, format!("{field}.type"), problem))
 }
 
@@ -466,11 +467,7 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     let translation = numbers(&node["translation"], || field("translation"))?.unwrap_or([0.0; 3]);
     let rotation = DQuat::from_array(rotation);
     if rotation.length_squared() <= 0.0 {
-        return Err(FormatError::invalid(
-            FORMAT,
-            field("rotation"),
-            "is zero; a unit quaternion is accepted",
-        ));
+        return Err(FormatError::invalid(FORMAT, field("rotation"), "must be a unit quaternion, got 0"));
     }
     Ok(DAffine3::from_scale_rotation_translation(
         DVec3::from_array(scale),
@@ -489,7 +486,9 @@ pub(super) fn numbers<const N: usize>(
     }
     let list = value.as_array().map(|all| all.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
     let found = list.and_then(|all| <[f64; N]>::try_from(all).ok());
-    found.map(Some).ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("is no list of {N} numbers")))
+    found
+        .map(Some)
+        .ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("must be an array of {N} numbers")))
 }
 
 /// Reads a member that is a non-negative integer; `None` if it is missing.
@@ -498,7 +497,10 @@ pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatE
     if value.is_null() {
         return Ok(None);
     }
-    value.as_u64().map(Some).ok_or_else(|| FormatError::invalid(FORMAT, key, "is no whole number from 0"))
+    value
+        .as_u64()
+        .map(Some)
+        .ok_or_else(|| FormatError::invalid(FORMAT, key, "must be a non-negative integer"))
 }
 
 /// Reads a member that is a non-negative integer; an error if it is missing.
@@ -509,5 +511,5 @@ pub(super) fn required(object: &Value, key: &str, field: &str) -> Result<u64, Fo
 fn unsigned_list(value: &Value, field: &str) -> Result<Vec<u64>, FormatError> {
     let Some(list) = value.as_array() else { return Ok(Vec::new()) };
     let found: Option<Vec<u64>> = list.iter().map(Value::as_u64).collect();
-    found.ok_or_else(|| FormatError::invalid(FORMAT, field, "is no list of whole numbers"))
+    found.ok_or_else(|| FormatError::invalid(FORMAT, field, "must be an array of non-negative integers"))
 }

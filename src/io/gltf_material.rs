@@ -12,14 +12,14 @@ pub(super) struct BaseColor<'a> {
     texture: &'a Value,
     /// Index of the set of texture coordinates that it uses.
     pub(super) set: u64,
-    placing: Option<Placing>,
+    transform: Option<TextureTransform>,
 }
 
 /// Transform of texture coordinates by `KHR_texture_transform`: scale, then rotation, then offset.
-struct Placing {
+struct TextureTransform {
     scale: [f64; 2],
     /// Cosine and sine of the rotation angle, counter-clockwise in the image.
-    turn: [f64; 2],
+    rotation: [f64; 2],
     offset: [f64; 2],
 }
 
@@ -38,13 +38,13 @@ impl<'a> BaseColor<'a> {
         let transform = &info["extensions"]["KHR_texture_transform"];
         let own_set = unsigned(transform, "texCoord")?;
         let set = own_set.or(unsigned(info, "texCoord")?).unwrap_or(0);
-        let placing = (!transform.is_null()).then(|| Placing::parse(transform)).transpose()?;
-        Ok(Some(Self { texture, set, placing }))
+        let transform = (!transform.is_null()).then(|| TextureTransform::parse(transform)).transpose()?;
+        Ok(Some(Self { texture, set, transform }))
     }
 
     /// Returns the texture coordinates of a vertex in the image, with the texture transform applied.
-    pub(super) fn place(&self, uv: Vec2) -> Vec2 {
-        self.placing.as_ref().map_or(uv, |placing| placing.of(uv))
+    pub(super) fn transform_uv(&self, uv: Vec2) -> Vec2 {
+        self.transform.as_ref().map_or(uv, |transform| transform.of(uv))
     }
 
     /// Returns the image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
@@ -59,21 +59,21 @@ impl<'a> BaseColor<'a> {
         let image = document.entry("images", source)?;
         let bytes = match (unsigned(image, "bufferView")?, image["uri"].as_str()) {
             (Some(view), _) => document.view(view)?.bytes.to_vec(),
-            (None, Some(address)) if address.starts_with("data:") => inline(address, source)?,
+            (None, Some(address)) if address.starts_with("data:") => decode_data_uri(address, source)?,
             _ => return Ok(None),
         };
         Ok(Texture::new(bytes).ok())
     }
 }
 
-impl Placing {
+impl TextureTransform {
     fn parse(transform: &Value) -> Result<Self, FormatError> {
         let field = |name: &str| format!("KHR_texture_transform.{name}");
         let pair = |name: &str| numbers::<2>(&transform[name], || field(name));
         let angle = transform["rotation"].as_f64().unwrap_or(0.0);
         Ok(Self {
             scale: pair("scale")?.unwrap_or([1.0; 2]),
-            turn: [libm::cos(angle), libm::sin(angle)],
+            rotation: [libm::cos(angle), libm::sin(angle)],
             offset: pair("offset")?.unwrap_or([0.0; 2]),
         })
     }
@@ -82,20 +82,16 @@ impl Placing {
     /// draft of the extension rotates in the opposite direction.
     fn of(&self, uv: Vec2) -> Vec2 {
         let [u, v] = [f64::from(uv.x) * self.scale[0], f64::from(uv.y) * self.scale[1]];
-        let [cosine, sine] = self.turn;
+        let [cosine, sine] = self.rotation;
         let turned = [cosine * u + sine * v, cosine * v - sine * u];
         Vec2::new((turned[0] + self.offset[0]) as f32, (turned[1] + self.offset[1]) as f32)
     }
 }
 
 /// Returns the bytes of a base64 data URI.
-fn inline(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
+fn decode_data_uri(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
     let coded = address.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
     coded.and_then(|(_, text)| base64::decode(text)).ok_or_else(|| {
-        FormatError::invalid(
-            FORMAT,
-            format!("images[{image}].uri"),
-            "is no base64; data of that kind is accepted",
-        )
+        FormatError::invalid(FORMAT, format!("images[{image}].uri"), "must be a base64 data URI")
     })
 }

@@ -68,7 +68,7 @@ pub(super) fn unzlib(format: &'static str, bytes: &[u8], limit: usize) -> Result
 }
 
 /// Result of inflating one deflate stream.
-struct Step {
+struct Inflated {
     consumed: usize,
     /// Whether the content exceeds the limit.
     full: bool,
@@ -76,7 +76,7 @@ struct Step {
 
 /// Initial size of the output buffer, in bytes. It is doubled as needed, so that a small file costs little whatever
 /// size its header claims.
-const FIRST_ROOM: usize = 1 << 16;
+const INITIAL_CAPACITY: usize = 1 << 16;
 
 /// Appends the content of one deflate stream to `out`, which never grows beyond `limit` + 1 bytes.
 fn inflate(
@@ -85,7 +85,7 @@ fn inflate(
     out: &mut Vec<u8>,
     limit: usize,
     zlib: bool,
-) -> Result<Step, FormatError> {
+) -> Result<Inflated, FormatError> {
     let name = if zlib { "zlib" } else { "gzip" };
     let flags = TINFL_FLAG_USING_NON_WRAPPING_OUTPUT_BUF
         | if zlib {
@@ -97,16 +97,16 @@ fn inflate(
     let start = out.len();
     let (mut consumed, mut written) = (0, 0);
     let most = limit.saturating_add(1);
-    let mut room = FIRST_ROOM;
+    let mut capacity = INITIAL_CAPACITY;
     loop {
-        grow(format, out, room.saturating_add(start).min(most))?;
+        grow(format, out, capacity.saturating_add(start).min(most))?;
         let (status, read, wrote) =
             decompress(&mut state, &input[consumed..], &mut out[start..], written, flags);
         consumed += read;
         written += wrote;
         match status {
             TINFLStatus::Done => break,
-            TINFLStatus::HasMoreOutput if out.len() < most => room = room.saturating_mul(2),
+            TINFLStatus::HasMoreOutput if out.len() < most => capacity = capacity.saturating_mul(2),
             TINFLStatus::HasMoreOutput => break,
             TINFLStatus::FailedCannotMakeProgress | TINFLStatus::NeedsMoreInput => {
                 return Err(FormatError::invalid(
@@ -128,7 +128,7 @@ fn inflate(
         }
     }
     out.truncate(start + written);
-    Ok(Step { consumed, full: out.len() > limit })
+    Ok(Inflated { consumed, full: out.len() > limit })
 }
 
 fn grow(format: &'static str, out: &mut Vec<u8>, len: usize) -> Result<(), FormatError> {

@@ -44,7 +44,7 @@ impl MeshFormat {
 
     /// Returns whether texture coordinate v is measured from the lower edge of the image, not from the upper one as in
     /// glTF.
-    fn counts_v_from_below(self) -> bool {
+    fn has_v_upwards(self) -> bool {
         matches!(self, Self::Ply | Self::Obj | Self::Vtp)
     }
 }
@@ -71,11 +71,11 @@ pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
 pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<TriangleMesh, FormatError> {
     let (format, mut mesh) = parse_welded(bytes)?;
     if !mesh.has_uvs() {
-        let problem = "there are none for every triangle; a texture needs them";
+        let problem = "missing; a texture needs them for every triangle";
         return Err(FormatError::invalid(format, "texture coordinates", problem));
     }
     if format != glb::FORMAT {
-        mesh.turn_v_over();
+        mesh.flip_v();
     }
     mesh.texture = Some(texture);
     Ok(mesh)
@@ -93,7 +93,7 @@ fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatErro
         return Err(FormatError::invalid(
             format,
             "faces",
-            "there are none that span a triangle; at least one is needed",
+            "the file has no triangles with three distinct corners",
         ));
     }
     Ok((format, welded))
@@ -116,7 +116,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     if obj::is_obj(bytes) {
         return Ok(("OBJ", obj::parse(bytes)?));
     }
-    Err(unknown(bytes))
+    Err(unsupported_format(bytes))
 }
 
 /// Returns whether the first bytes contain no control characters other than those of text.
@@ -125,7 +125,7 @@ pub(super) fn is_text(bytes: &[u8]) -> bool {
 }
 
 /// Returns the error for bytes in no accepted format, which names the format if it is recognised.
-fn unknown(bytes: &[u8]) -> FormatError {
+fn unsupported_format(bytes: &[u8]) -> FormatError {
     const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
     let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);
     let text = is_text(bytes);
@@ -138,7 +138,7 @@ fn unknown(bytes: &[u8]) -> FormatError {
         // STL has no signature: other bytes long enough for its header can only be a broken STL.
         _ if !text && bytes.len() >= stl::HEADER => stl::wrong_length(bytes),
         _ if text => unsupported("text without vertices or facets"),
-        _ => unsupported("bytes without a known mark"),
+        _ => unsupported("an unknown binary format"),
     }
 }
 
@@ -154,9 +154,9 @@ fn unknown(bytes: &[u8]) -> FormatError {
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
-    let turned = (mesh.texture.is_some() && format.counts_v_from_below()).then(|| {
+    let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
         let mut mesh = mesh.clone();
-        mesh.turn_v_over();
+        mesh.flip_v();
         mesh
     });
     let mesh = turned.as_ref().unwrap_or(mesh);

@@ -7,13 +7,13 @@
 
 use super::FormatError;
 use super::gzip::{gunzip, is_gzip, unzlib};
-use super::raw::{Place, SLACK, Scalar, decode, decode_text, exact, payload_size, refused};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
 use super::text::{Field, Lines};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "MetaImage";
-const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 
 /// Returns whether the bytes start like a MetaImage header: with a `key = value` line of one of its usual first keys.
 pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
@@ -36,7 +36,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
         (true, _) => lines.rest(),
         (false, Some(payload)) => payload,
         (false, None) => {
-            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
         }
     };
     header.volume(source)
@@ -60,7 +60,7 @@ impl Fields {
                 return Err(FormatError::invalid(
                     FORMAT,
                     "header",
-                    format!("'{shown}' is no 'key = value' line"),
+                    format!("'{shown}' is not a 'key = value' line"),
                 ));
             };
             pairs.push((key.trim().to_owned(), value.trim().to_owned()));
@@ -93,7 +93,7 @@ impl Fields {
         match field.text.to_ascii_lowercase().as_str() {
             "true" | "1" => Ok(true),
             "false" | "0" => Ok(false),
-            _ => Err(field.invalid("True or False is needed")),
+            _ => Err(field.invalid("must be True or False")),
         }
     }
 
@@ -151,25 +151,25 @@ impl Header {
             frame_seconds: 0.0,
             space: Space::Lps,
         });
-        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
     /// Returns the voxels in `source`, inflated if compressed.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         if self.compressed {
-            let limit = size.saturating_add(SLACK);
+            let limit = size.saturating_add(MAX_PADDING);
             let source = self.after_skip(source, source.len())?;
             // The format says zlib; some writers put a gzip stream there.
             let inflate = if is_gzip(source) { gunzip } else { unzlib };
             let bytes = inflate(FORMAT, source, limit)?;
-            return decode(DATA, exact(DATA, &bytes, size)?, self.scalar, self.big);
+            return decode(DATA, payload(DATA, &bytes, size)?, self.scalar, self.big);
         }
         let source = self.after_skip(source, size)?;
         if self.text {
             return decode_text(DATA, source, self.scalar, size / self.scalar.size());
         }
-        decode(DATA, exact(DATA, source, size)?, self.scalar, self.big)
+        decode(DATA, payload(DATA, source, size)?, self.scalar, self.big)
     }
 
     /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
@@ -214,7 +214,7 @@ fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
         "MET_DOUBLE" => Scalar::F64,
         other => {
             let accepted =
-                "MET_CHAR, SHORT, INT, LONG, LONG_LONG and their unsigned kin, MET_FLOAT, MET_DOUBLE";
+                "MET_CHAR, SHORT, INT, LONG, LONG_LONG and their unsigned variants, MET_FLOAT, MET_DOUBLE";
             return Err(FormatError::unsupported(FORMAT, "ElementType", format!("'{other}'"), accepted));
         }
     })

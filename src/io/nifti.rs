@@ -8,12 +8,12 @@
 
 use super::FormatError;
 use super::gzip::{gunzip, gunzip_start, is_gzip};
-use super::raw::{Place, SLACK, Scalar, decode, exact, payload_size, refused};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_error};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "NIfTI";
-const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 /// Header sizes of the two versions in bytes, which are also the first number in the file.
 const SIZE_1: usize = 348;
 const SIZE_2: usize = 540;
@@ -55,7 +55,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
             return Err(FormatError::invalid(
                 FORMAT,
                 "magic",
-                "the header of a pair; give its .img as the detached payload",
+                "this is the header of a pair; pass the bytes of its .img as `data`",
             ));
         }
     };
@@ -63,7 +63,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     let end =
         offset.checked_add(size).ok_or_else(|| FormatError::too_large(FORMAT, "vox_offset", u64::MAX))?;
     if is_gzip(source) {
-        let whole = gunzip(FORMAT, source, end.saturating_add(SLACK))?;
+        let whole = gunzip(FORMAT, source, end.saturating_add(MAX_PADDING))?;
         return header.volume(&whole, offset, size);
     }
     header.volume(source, offset, size)
@@ -203,7 +203,7 @@ impl Fields {
                 Err(FormatError::invalid(
                     FORMAT,
                     "magic",
-                    format!("'{shown}' is none of 'n+1', 'ni1', 'n+2', 'ni2'"),
+                    format!("must be one of 'n+1', 'ni1', 'n+2', 'ni2', got '{shown}'"),
                 ))
             }
         }
@@ -213,11 +213,7 @@ impl Fields {
     fn dims(&self) -> Result<[usize; 4], FormatError> {
         let rank = self.dim[0];
         if !(1..=7).contains(&rank) {
-            return Err(FormatError::invalid(
-                FORMAT,
-                "dim[0]",
-                format!("{rank} dimensions; 1 to 7 are accepted"),
-            ));
+            return Err(FormatError::invalid(FORMAT, "dim[0]", format!("must be 1 to 7, got {rank}")));
         }
         let mut dims = [1; 4];
         for axis in 1..=rank as usize {
@@ -230,7 +226,7 @@ impl Fields {
                     return Err(FormatError::unsupported(FORMAT, field, n.to_string(), "1 (no vector data)"));
                 }
                 Err(_) if n > 0 => return Err(FormatError::too_large(FORMAT, field, n as u64)),
-                _ => return Err(FormatError::invalid(FORMAT, field, format!("{n}; at least 1 is needed"))),
+                _ => return Err(FormatError::invalid(FORMAT, field, format!("must be at least 1, got {n}"))),
             }
         }
         Ok(dims)
@@ -268,7 +264,7 @@ impl Fields {
             (true, false) if stated == 0.0 => Ok(least),
             (true, false) if stated >= least as f64 => Ok(stated as usize),
             _ => {
-                let problem = format!("{stated}; a whole number from {least} to {MAX_OFFSET} is accepted");
+                let problem = format!("must be an integer from {least} to {MAX_OFFSET}, got {stated}");
                 Err(FormatError::invalid(FORMAT, "vox_offset", problem))
             }
         }
@@ -284,7 +280,7 @@ impl Fields {
         }
         let (field, value) =
             if self.slope.is_finite() { ("scl_inter", self.intercept) } else { ("scl_slope", self.slope) };
-        Err(FormatError::invalid(FORMAT, field, format!("{value}; a finite number is needed")))
+        Err(FormatError::invalid(FORMAT, field, format!("must be finite, got {value}")))
     }
 
     /// Returns the transform from voxel indices to world space.
@@ -302,11 +298,7 @@ impl Fields {
     fn sform(&self) -> Result<DAffine3, FormatError> {
         for (row, name) in self.srow.iter().zip(["srow_x", "srow_y", "srow_z"]) {
             if row.iter().any(|v| !v.is_finite()) {
-                return Err(FormatError::invalid(
-                    FORMAT,
-                    name,
-                    format!("{row:?}; finite numbers are needed"),
-                ));
+                return Err(FormatError::invalid(FORMAT, name, format!("must be finite, got {row:?}")));
             }
         }
         let column = |i: usize| DVec3::new(self.srow[0][i], self.srow[1][i], self.srow[2][i]);
@@ -321,7 +313,7 @@ impl Fields {
             if values.iter().all(|v| v.is_finite()) {
                 return Ok(values);
             }
-            Err(FormatError::invalid(FORMAT, field, format!("{values:?}; finite numbers are needed")))
+            Err(FormatError::invalid(FORMAT, field, format!("must be finite, got {values:?}")))
         };
         let [b, c, d] = finite("quatern_b, c, d", self.quaternion)?;
         let origin = finite("qoffset_x, y, z", self.qoffset)?;
@@ -345,7 +337,7 @@ impl Fields {
         for (axis, size) in sizes.iter_mut().enumerate().filter(|(axis, _)| (*axis as i64) < self.dim[0]) {
             *size = self.pixdim[axis + 1].abs();
             if !(*size > 0.0 && size.is_finite()) {
-                let problem = format!("{}; a length other than 0 is needed", self.pixdim[axis + 1]);
+                let problem = format!("must be finite and not 0, got {}", self.pixdim[axis + 1]);
                 return Err(FormatError::invalid(FORMAT, format!("pixdim[{}]", axis + 1), problem));
             }
         }
@@ -359,11 +351,7 @@ impl Fields {
             return Ok(0.0);
         }
         if !step.is_finite() {
-            return Err(FormatError::invalid(
-                FORMAT,
-                "pixdim[4]",
-                format!("{step}; a finite time is needed"),
-            ));
+            return Err(FormatError::invalid(FORMAT, "pixdim[4]", format!("must be finite, got {step}")));
         }
         let second = match self.units & 0x38 {
             0 | 8 => 1.0,
@@ -456,7 +444,7 @@ impl Header {
                 source.len(),
             ));
         };
-        let payload = exact(DATA, rest, size)?;
+        let payload = payload(DATA, rest, size)?;
         let volume = Volume::new(VolumeInit {
             voxels: decode(DATA, payload, self.scalar, self.big)?,
             dims: self.dims,
@@ -466,7 +454,7 @@ impl Header {
             frame_seconds: self.frame_seconds,
             space: Space::Ras,
         });
-        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 }
 
@@ -520,8 +508,8 @@ fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
 
 /// Writes bytes at offset `at` of a header.
 fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
-    if let Some(place) = out.get_mut(at..at + N) {
-        place.copy_from_slice(&bytes);
+    if let Some(target) = out.get_mut(at..at + N) {
+        target.copy_from_slice(&bytes);
     }
 }
 

@@ -121,7 +121,7 @@ impl Reader {
         let uv = part("vt", self.uvs.len())?;
         let normal = part("vn", self.normals.len())?;
         let problem =
-            || FormatError::invalid(FORMAT, format!("line {line}"), "a corner of a face names no vertex");
+            || FormatError::invalid(FORMAT, format!("line {line}"), "a face corner has no vertex index");
         Ok(Corner { position: position.ok_or_else(problem)?, uv, normal })
     }
 
@@ -165,7 +165,7 @@ impl Reader {
 }
 
 fn face_size(line: usize, corners: usize) -> FormatError {
-    let problem = format!("a face has {corners} corners; three or more are accepted");
+    let problem = format!("a face must have at least three corners, got {corners}");
     FormatError::invalid(FORMAT, format!("line {line}"), problem)
 }
 
@@ -175,22 +175,27 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     let resolved = number.and_then(|n| if n < 0 { n.checked_add(count as i64) } else { n.checked_sub(1) });
     resolved.and_then(|i| u32::try_from(i).ok()).filter(|&i| (i as usize) < count).ok_or_else(|| {
         let found = String::from_utf8_lossy(&digits[..digits.len().min(20)]).into_owned();
-        let problem =
-            format!("a face names {table} {found}; 1 to {count} (or −1 to −{count}) are there so far");
+        let problem = format!(
+            "{table} index {found} is out of range; 1 to {count} (or −1 to −{count}) are defined so far"
+        );
         FormatError::invalid(FORMAT, format!("line {line}"), problem)
     })
 }
 
-/// Parses the numbers up to a comment; an error if there are fewer than `least`.
+/// Parses the numbers up to a comment; an error if there are fewer than `min_count`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
-    least: usize,
+    min_count: usize,
 ) -> Result<Vec<f32>, FormatError> {
     let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
     let found: Option<Vec<f32>> = words.take_while(|word| !word.starts_with(b"#")).map(number).collect();
-    found.filter(|numbers| numbers.len() >= least).ok_or_else(|| {
-        FormatError::invalid(FORMAT, format!("line {line}"), format!("{least} or more numbers are accepted"))
+    found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
+        FormatError::invalid(
+            FORMAT,
+            format!("line {line}"),
+            format!("at least {min_count} numbers are needed"),
+        )
     })
 }
 

@@ -15,7 +15,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
 
 /// Reads the vertices of a PLY file with their attributes; faces are skipped, whatever they hold.
 pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    read(bytes, |_, element, body| pass_over(element, body))
+    read(bytes, |_, element, body| skip_element(element, body))
 }
 
 /// Reads all elements of a file, with faces read by `faces`.
@@ -31,7 +31,7 @@ fn read(
         match element.name.as_str() {
             "vertex" => reader.vertices(element, &mut body)?,
             "face" => faces(&mut reader, element, &mut body)?,
-            _ => pass_over(element, &mut body)?,
+            _ => skip_element(element, &mut body)?,
         }
     }
     reader.finish()
@@ -46,7 +46,7 @@ enum Encoding {
 
 /// Number type of a property.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum NumberType {
     I8,
     U8,
     I16,
@@ -57,7 +57,7 @@ enum Kind {
     F64,
 }
 
-impl Kind {
+impl NumberType {
     fn parse(name: &str) -> Result<Self, FormatError> {
         Ok(match name {
             "char" | "int8" => Self::I8,
@@ -85,7 +85,7 @@ impl Kind {
     }
 
     /// Returns the value of a full colour channel.
-    fn full(self) -> f64 {
+    fn full_channel(self) -> f64 {
         match self {
             Self::U8 => 255.0,
             Self::U16 => 65535.0,
@@ -112,9 +112,9 @@ impl Kind {
 /// A property of an element, as declared in the header.
 struct Property {
     name: String,
-    kind: Kind,
+    kind: NumberType,
     /// Number type of the length of a list; `None` for a single value.
-    length: Option<Kind>,
+    length: Option<NumberType>,
 }
 
 /// An element, such as vertices or faces, as declared in the header.
@@ -172,7 +172,7 @@ impl Header {
                 ["element", name, count] => elements.push(parse_element(name, count)?),
                 ["property", property @ ..] => {
                     let element: Option<&mut Element> = elements.last_mut();
-                    let missing = || FormatError::invalid(FORMAT, "property", "comes before any element");
+                    let missing = || FormatError::invalid(FORMAT, "property", "must follow an element");
                     element.ok_or_else(missing)?.properties.push(parse_property(property)?);
                 }
                 [] | ["ply"] | ["comment" | "obj_info", ..] => {}
@@ -180,7 +180,7 @@ impl Header {
                     return Err(FormatError::invalid(
                         FORMAT,
                         "header",
-                        format!("\"{}\" is no line of it", clipped(line)),
+                        format!("\"{}\" is not a header line", clipped(line)),
                     ));
                 }
             }
@@ -224,7 +224,7 @@ fn parse_element(name: &str, count: &str) -> Result<Element, FormatError> {
         FormatError::invalid(
             FORMAT,
             format!("element {}", clipped(name)),
-            format!("count {}; 0 to {} are accepted", clipped(count), u32::MAX),
+            format!("count must be 0 to {}, got {}", u32::MAX, clipped(count)),
         )
     })?;
     Ok(Element { name: name.into(), count: parsed as usize, properties: Vec::new() })
@@ -233,21 +233,21 @@ fn parse_element(name: &str, count: &str) -> Result<Element, FormatError> {
 fn parse_property(words: &[&str]) -> Result<Property, FormatError> {
     match words {
         ["list", length, kind, name] => {
-            let length = Kind::parse(length)?;
-            if matches!(length, Kind::F32 | Kind::F64) {
+            let length = NumberType::parse(length)?;
+            if matches!(length, NumberType::F32 | NumberType::F64) {
                 return Err(FormatError::invalid(
                     FORMAT,
                     format!("property {}", clipped(name)),
                     "a list's length is an integer",
                 ));
             }
-            Ok(Property { name: (*name).into(), kind: Kind::parse(kind)?, length: Some(length) })
+            Ok(Property { name: (*name).into(), kind: NumberType::parse(kind)?, length: Some(length) })
         }
-        [kind, name] => Ok(Property { name: (*name).into(), kind: Kind::parse(kind)?, length: None }),
+        [kind, name] => Ok(Property { name: (*name).into(), kind: NumberType::parse(kind)?, length: None }),
         _ => Err(FormatError::invalid(
             FORMAT,
             "property",
-            format!("\"{}\" is no type and name", clipped(&words.join(" "))),
+            format!("\"{}\" must be a type and a name", clipped(&words.join(" "))),
         )),
     }
 }
@@ -265,7 +265,7 @@ struct Body<'a> {
 
 impl Body<'_> {
     /// Reads the next number.
-    fn number(&mut self, kind: Kind, field: &str) -> Result<f64, FormatError> {
+    fn number(&mut self, kind: NumberType, field: &str) -> Result<f64, FormatError> {
         if self.encoding == Encoding::Text {
             return self.text_number(field);
         }
@@ -292,7 +292,7 @@ impl Body<'_> {
         }
         std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()).ok_or_else(|| {
             let found = clipped(&String::from_utf8_lossy(word));
-            FormatError::invalid(FORMAT, field, format!("\"{found}\" is no number"))
+            FormatError::invalid(FORMAT, field, format!("\"{found}\" is not a number"))
         })
     }
 
@@ -317,7 +317,7 @@ impl Body<'_> {
 }
 
 /// Skips all values of an element.
-fn pass_over(element: &Element, body: &mut Body) -> Result<(), FormatError> {
+fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     let mut values = Vec::new();
     // An element without properties has no bytes, whatever its count.
     let count = if element.properties.is_empty() { 0 } else { element.count };
@@ -359,7 +359,7 @@ impl Reader {
                 self.mesh.uvs.get_or_insert_default().push(uv);
             }
             if let Some(at) = color {
-                let channel = |i: usize| (record[i] / element.properties[i].kind.full()) as f32;
+                let channel = |i: usize| (record[i] / element.properties[i].kind.full_channel()) as f32;
                 self.mesh.colors.get_or_insert_default().push(Vec3::from_array(at.map(channel)));
             }
         }
@@ -392,12 +392,10 @@ impl Reader {
         let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
         let limit = self.mesh.positions.len() as f64;
         if let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) {
-            return invalid(format!(
-                "names vertex {bad}; whole numbers from 0 to below {limit} are accepted"
-            ));
+            return invalid(format!("vertex index {bad} is out of range; must be an integer in 0..{limit}"));
         }
         if indices.len() < 3 {
-            return invalid(format!("has {} corners; three or more are accepted", indices.len()));
+            return invalid(format!("must have at least three corners, got {}", indices.len()));
         }
         for k in 1..indices.len() - 1 {
             self.mesh.triangles.push([0, k, k + 1].map(|i| indices[i] as u32));

@@ -9,7 +9,7 @@ use std::iter::Peekable;
 
 pub(super) const FORMAT: &str = "point text";
 /// Name of the format of the data sets of Hoppe's surface reconstruction, in error messages.
-pub(super) const KEYED: &str = "PTS";
+pub(super) const KEYWORD_FORMAT: &str = "PTS";
 
 /// Maximum number of columns; real files have some dozens. Without a limit, a file of nothing but commas would take
 /// forty times its size in memory.
@@ -33,7 +33,7 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, mark(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
+        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
     }
 
     /// Parses a cell of the line as a finite number.
@@ -41,8 +41,8 @@ impl Line<'_> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
         match cell.parse::<f32>() {
             Ok(number) if number.is_finite() => Ok(number),
-            Ok(_) => invalid("finite numbers below 3.4e38 in size are accepted"),
-            Err(_) => invalid("a number is needed, with a point before its decimals"),
+            Ok(_) => invalid("must be finite and within ±3.4e38"),
+            Err(_) => invalid("must be a number with a decimal point, not a comma"),
         }
     }
 }
@@ -61,23 +61,23 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
 
 /// Returns the text of a comment; `None` if the line is not one.
 fn comment(line: &str) -> Option<&str> {
-    ["#", "//", "%"].iter().find_map(|mark| line.strip_prefix(mark))
+    ["#", "//", "%"].iter().find_map(|separator| line.strip_prefix(separator))
 }
 
 /// Returns the separator of the line's cells; `None` for whitespace.
-fn mark(line: &str) -> Option<char> {
-    [';', ','].into_iter().find(|&mark| line.contains(mark))
+fn separator(line: &str) -> Option<char> {
+    [';', ','].into_iter().find(|&separator| line.contains(separator))
 }
 
 /// Returns the cells of a line without surrounding whitespace and quotes, at most [`MAX_COLUMNS`] + 1 of them.
-fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
+fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
     let mut quoted = false;
     let ends = |c: char| {
         quoted ^= c == '"';
-        !quoted && mark.map_or(c.is_whitespace(), |mark| c == mark)
+        !quoted && separator.map_or(c.is_whitespace(), |separator| c == separator)
     };
     // A run of whitespace is one separator.
-    let cells = line.split(ends).filter(|cell| mark.is_some() || !cell.is_empty());
+    let cells = line.split(ends).filter(|cell| separator.is_some() || !cell.is_empty());
     cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
 }
 
@@ -90,15 +90,15 @@ fn unquoted(cell: &str) -> &str {
 pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut lines = content(bytes).peekable();
     let count_line = lines.next_if(|line| announced(line).is_some());
-    let named = take_names(&mut lines, count_line.is_some())?;
+    let named = take_column_names(&mut lines, count_line.is_some())?;
     let Some(first) = lines.peek() else { return Ok(PointCloud::default()) };
-    let mark = mark(&first.text);
-    let count = cells(&first.text, mark).len();
+    let separator = separator(&first.text);
+    let count = cells(&first.text, separator).len();
     let columns = match named.or_else(|| named_in_comment(bytes, count)) {
         Some(columns) => columns,
         None => Columns::unnamed(count, first)?,
     };
-    let table = Table::read(columns, mark, lines)?;
+    let table = Table::read(columns, separator, lines)?;
     if let Some(line) = count_line {
         check_count(&line, table.rows().len())?;
     }
@@ -116,20 +116,20 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     if announced(line) == Some(rows as u64) {
         return Ok(());
     }
-    let problem = format!("points are announced, {rows} follow; the same number is accepted");
+    let problem = format!("announced number of points, but {rows} follow");
     Err(line.invalid(FORMAT, &problem))
 }
 
 /// Takes a line of column names, unless the next line consists of numbers. After an announced count, a line that names
 /// no columns is skipped.
-fn take_names<'a>(
+fn take_column_names<'a>(
     lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
     counted: bool,
 ) -> Result<Option<Columns>, FormatError> {
     let Some(line) = lines.next_if(|line| !line.is_row()) else { return Ok(None) };
     let named = Columns::named(&line.text);
     if named.is_none() && !counted {
-        let problem = "numbers in columns, or names of columns with x, y and z among them, are accepted";
+        let problem = "must be columns of numbers, or column names that include x, y and z";
         return Err(line.invalid(FORMAT, problem));
     }
     Ok(named)
@@ -161,14 +161,15 @@ struct Extras {
 impl Columns {
     /// Returns the columns that a line names; `None` if x, y and z are not all named, or there are too many columns.
     fn named(line: &str) -> Option<Self> {
-        let names: Vec<String> = cells(line, mark(line)).into_iter().map(str::to_ascii_lowercase).collect();
+        let names: Vec<String> =
+            cells(line, separator(line)).into_iter().map(str::to_ascii_lowercase).collect();
         let set = |set: [&str; 3]| -> Option<Vec<usize>> {
             set.into_iter().map(|name| names.iter().position(|found| found == name)).collect()
         };
         if names.len() > MAX_COLUMNS {
             return None;
         }
-        let points = set(["x", "y", "z"]).or_else(|| axes(&names))?;
+        let points = set(["x", "y", "z"]).or_else(|| napari_axes(&names))?;
         let normals = set(["nx", "ny", "nz"]);
         let colors = set(["red", "green", "blue"]).or_else(|| set(["r", "g", "b"]));
         let extras = Extras {
@@ -182,7 +183,7 @@ impl Columns {
     /// Returns the columns of a file that does not name them.
     fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
         if ![3, 4, 6, 7, 9].contains(&count) {
-            let accepted = "3, 4, 6, 7 or 9, or a first line that names them";
+            let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
             return Err(FormatError::unsupported(FORMAT, first.field(), columns(count), accepted));
         }
         Ok(Self { count, read: (0..count).collect(), extras: None })
@@ -190,9 +191,9 @@ impl Columns {
 }
 
 /// Returns the columns of x, y and z under the names that napari gives, whose axes are ordered from slowest to fastest.
-fn axes(names: &[String]) -> Option<Vec<usize>> {
-    let place = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
-    let all: Vec<usize> = (0..5).map_while(place).collect();
+fn napari_axes(names: &[String]) -> Option<Vec<usize>> {
+    let column_of_axis = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
+    let all: Vec<usize> = (0..5).map_while(column_of_axis).collect();
     match all.as_slice() {
         [z, y, x] | [_, z, y, x] => Some(vec![*x, *y, *z]),
         _ => None,
@@ -212,21 +213,21 @@ struct Table {
 impl Table {
     fn read<'a>(
         columns: Columns,
-        mark: Option<char>,
+        separator: Option<char>,
         mut lines: impl Iterator<Item = Line<'a>>,
     ) -> Result<Self, FormatError> {
         let mut table = Self { columns, numbers: Vec::new() };
-        lines.try_for_each(|line| table.push(&line, mark))?;
+        lines.try_for_each(|line| table.push(&line, separator))?;
         Ok(table)
     }
 
     /// Adds the numbers of a line.
-    fn push(&mut self, line: &Line, mark: Option<char>) -> Result<(), FormatError> {
-        let cells = cells(&line.text, mark);
+    fn push(&mut self, line: &Line, separator: Option<char>) -> Result<(), FormatError> {
+        let cells = cells(&line.text, separator);
         if cells.len() != self.columns.count {
             let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
             let problem =
-                format!("{found}; {accepted}, as named or in the first line of numbers, are accepted");
+                format!("must have {accepted}, as named or as in the first line of numbers, got {found}");
             return Err(line.invalid(FORMAT, &problem));
         }
         for &column in &self.columns.read {
@@ -266,8 +267,8 @@ impl Table {
         if normals.is_none_or(|at| self.are_normals(at)) && colors.is_none_or(|at| self.are_colors(at)) {
             return Ok(Extras { normals, colors });
         }
-        let problem = "in columns without names, normals (lengths within 1 % of 1) and colours (all 0 to 1, or whole \
-             numbers of 0 to 255) are accepted";
+        let problem = "without column names, these must be normals (lengths within 1 % of 1) or colours (all in 0..1, or \
+             integers in 0..255)";
         Err(FormatError::invalid(FORMAT, format!("columns 4 to {}", self.columns.count), problem))
     }
 
@@ -283,7 +284,7 @@ impl Table {
 }
 
 /// Returns whether at least one line is a point with a keyword: `p x y z`.
-pub(super) fn is_keyed(bytes: &[u8]) -> bool {
+pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
         words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f32>().is_ok())
@@ -291,18 +292,18 @@ pub(super) fn is_keyed(bytes: &[u8]) -> bool {
 }
 
 /// Reads points with a keyword (`p`). Colours (`d`, `s`) and gloss (`g`), which apply to all that follows, are ignored.
-pub(super) fn parse_keyed(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+pub(super) fn parse_keyword_lines(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut points = Vec::new();
     for line in content(bytes) {
         // One word more than a point has is enough to detect too many.
         let words: Vec<&str> = line.text.split_whitespace().take(5).collect();
         match words.as_slice() {
             ["p", x, y, z] => {
-                let number = |word| line.number(KEYED, word);
+                let number = |word| line.number(KEYWORD_FORMAT, word);
                 points.push(Vec3::new(number(x)?, number(y)?, number(z)?));
             }
             ["d" | "s" | "g", ..] => {}
-            _ => return Err(line.invalid(KEYED, "p and three numbers, or d, s or g, are accepted")),
+            _ => return Err(line.invalid(KEYWORD_FORMAT, "must be p and three numbers, or d, s or g")),
         }
     }
     Ok(PointCloud { points, ..PointCloud::default() })
@@ -418,8 +419,8 @@ mod tests {
         for (text, said) in [
             ("p 1 2 3\np 1 2\n", "PTS: line 2: 'p 1 2'"),
             ("p 1 2 3\nq 1 2 3\n", "PTS: line 2: 'q 1 2 3'"),
-            ("# a\r\np 1 2 x\r\n", "PTS: line 2: 'x': a number"),
-            ("p 1 2 inf\n", "PTS: line 1: 'inf': finite"),
+            ("# a\r\np 1 2 x\r\n", "PTS: line 2: 'x': must be a number"),
+            ("p 1 2 inf\n", "PTS: line 1: 'inf': must be finite"),
         ] {
             assert!(refusal(text).starts_with(said), "{}", refusal(text));
         }
@@ -428,34 +429,34 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_name_their_line() {
         for (text, said) in [
-            ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': 2 columns; 3 columns"),
-            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': 4 columns; 3 columns"),
-            ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': 4 columns; 3 columns"),
-            ("1 2 3\n4 five 6\n", "point text: line 2: 'five': a number"),
-            ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': a number"),
-            ("x,y,z\n1,,3\n", "point text: line 2: '': a number"),
-            ("1 2 3\n\n4 nan 6\n", "point text: line 3: 'nan': finite"),
-            ("1 2 -inf\n", "point text: line 1: '-inf': finite"),
-            ("1 2 3\n1e39 2 3\n", "point text: line 2: '1e39': finite"),
-            ("3\n1 2 3\n4 5 6\n", "point text: line 1: '3': points are announced, 2 follow"),
-            ("1\n1 2 3\n4 5 6\n", "point text: line 1: '1': points are announced, 2 follow"),
+            ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': must have 3 columns"),
+            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': must have 3 columns"),
+            ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': must have 3 columns"),
+            ("1 2 3\n4 five 6\n", "point text: line 2: 'five': must be a number"),
+            ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': must be a number"),
+            ("x,y,z\n1,,3\n", "point text: line 2: '': must be a number"),
+            ("1 2 3\n\n4 nan 6\n", "point text: line 3: 'nan': must be finite"),
+            ("1 2 -inf\n", "point text: line 1: '-inf': must be finite"),
+            ("1 2 3\n1e39 2 3\n", "point text: line 2: '1e39': must be finite"),
+            ("3\n1 2 3\n4 5 6\n", "point text: line 1: '3': announced number of points, but 2 follow"),
+            ("1\n1 2 3\n4 5 6\n", "point text: line 1: '1': announced number of points, but 2 follow"),
             ("99999999999999999999\n1 2 3\n", "point text: line 1: 1 column"),
             ("1 2\n3 4\n", "point text: line 1: 2 columns is not supported; accepted: 3, 4"),
             ("1 2 3 4 5\n", "point text: line 1: 5 columns"),
-            ("1 2 3 4 5 -6\n", "point text: columns 4 to 6: in columns without names"),
+            ("1 2 3 4 5 -6\n", "point text: columns 4 to 6: without column names"),
             ("1 2 3 0.5 0.5 200\n", "point text: columns 4 to 6"),
             ("1 2 3 9 256 0 0\n", "point text: columns 4 to 7"),
             ("1 2 3 0 0 1 -1 0 0.5\n", "point text: columns 4 to 9"),
-            ("x,y,z,r,g,b\n1,2,3,300,0,0\n", "point text: colours: some are out of range"),
-            ("a,b,c\n1,2,3\n", "point text: line 1: 'a,b,c': numbers in columns, or names"),
+            ("x,y,z,r,g,b\n1,2,3,300,0,0\n", "point text: colours: out of range"),
+            ("a,b,c\n1,2,3\n", "point text: line 1: 'a,b,c': must be columns of numbers, or column names"),
             ("axis-0,axis-1\n1,2\n", "point text: line 1: 'axis-0,axis-1'"),
             ("p 1 2 3\np 1 2 3 4 5 6\n", "PTS: line 2: 'p 1 2 3 4 5 6'"),
             ("Dear all,\n", "point text: line 1: 'Dear all,'"),
-            ("x,y,z\n", "point text: points: there are none"),
-            ("0\n", "point text: points: there are none"),
-            ("# nothing\n\n", "point text: points: there are none"),
+            ("x,y,z\n", "point text: points: the file has no points"),
+            ("0\n", "point text: points: the file has no points"),
+            ("# nothing\n\n", "point text: points: the file has no points"),
         ] {
             assert!(refusal(text).starts_with(said), "{text:?}: {}", refusal(text));
         }

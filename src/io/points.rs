@@ -51,7 +51,7 @@ pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     // Some programs start UTF-8 text with a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let (format, cloud) = parse(bytes)?;
-    checked(format, cloud)
+    validated(format, cloud)
 }
 
 /// Reads points in the format that the bytes indicate, with the name of the format.
@@ -59,7 +59,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
         return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
     }
-    if let Some(found) = foreign(bytes) {
+    if let Some(found) = unsupported_format(bytes) {
         const ACCEPTED: &str = "PLY, OBJ and text in columns (XYZ, PTS, CSV, TXT)";
         return Err(FormatError::unsupported("point file", "format", found, ACCEPTED));
     }
@@ -69,14 +69,14 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if obj::is_obj(bytes) {
         return Ok((obj::FORMAT, obj::parse_points(bytes)?));
     }
-    if point_text::is_keyed(bytes) {
-        return Ok((point_text::KEYED, point_text::parse_keyed(bytes)?));
+    if point_text::has_keywords(bytes) {
+        return Ok((point_text::KEYWORD_FORMAT, point_text::parse_keyword_lines(bytes)?));
     }
     Ok((point_text::FORMAT, point_text::parse(bytes)?))
 }
 
 /// Returns the name of an unsupported format that the first bytes indicate; `None` for text that may hold points.
-fn foreign(bytes: &[u8]) -> Option<&'static str> {
+fn unsupported_format(bytes: &[u8]) -> Option<&'static str> {
     let start = |mark: &[u8]| bytes.starts_with(mark);
     Some(match bytes {
         _ if start(b"glTF") => "GLB",
@@ -89,7 +89,7 @@ fn foreign(bytes: &[u8]) -> Option<&'static str> {
         [b'{', ..] => "JSON",
         [0x1f, 0x8b, ..] => "gzip",
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "text in UTF-16 (it must be UTF-8)",
-        _ if !is_text(bytes) => "a binary file without a known mark",
+        _ if !is_text(bytes) => "an unknown binary format",
         _ => return None,
     })
 }
@@ -99,10 +99,10 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
 }
 
 /// Returns the cloud with colours in 0..1, after checking it.
-fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
+fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
-        return Err(FormatError::invalid(format, "points", "there are none; at least one is needed"));
+        return Err(FormatError::invalid(format, "points", "the file has no points"));
     }
     check_finite(format, "points", &cloud.points)?;
     if let Some(normals) = &cloud.normals {
@@ -118,7 +118,7 @@ fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, Format
 /// Returns an error if a vector is not finite.
 fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(), FormatError> {
     let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
-    let problem = format!("that of point {i}, from 0, is {}; finite numbers are accepted", vectors[i]);
+    let problem = format!("point {i} (zero-based) has {}; numbers must be finite", vectors[i]);
     Err(FormatError::invalid(format, field, problem))
 }
 
@@ -127,14 +127,14 @@ fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) 
     if found.len() == count {
         return Ok(());
     }
-    let problem = format!("there are {} for {count} points; one each is accepted", found.len());
+    let problem = format!("there are {} for {count} points; one per point is needed", found.len());
     Err(FormatError::invalid(format, field, problem))
 }
 
 /// Returns the colours scaled to 0..1.
 fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, FormatError> {
     let full = full_channel(colors.iter().copied()).ok_or_else(|| {
-        let problem = "some are out of range; all 0 to 1, or whole numbers of 0 to 255, are accepted";
+        let problem = "out of range; all must be in 0..1, or integers in 0..255";
         FormatError::invalid(format, "colours", problem)
     })?;
     Ok(colors.into_iter().map(|color| color / full).collect())
@@ -156,7 +156,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Three points, two of them with equal positions.
-    fn made() -> PointCloud {
+    fn sample_cloud() -> PointCloud {
         let p = Vec3::new(0.1, -2.5, 1e10);
         PointCloud {
             points: vec![p, Vec3::new(4.0, 5.0, 6.0), p],
@@ -193,7 +193,7 @@ mod tests {
 
     fn ply_text(color: &str, full: f32) -> Vec<u8> {
         let header = ply_header("ascii", "float", color, ["red", "green", "blue"]);
-        format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&made(), full), "77 ", " ")).into_bytes()
+        format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&sample_cloud(), full), "77 ", " ")).into_bytes()
     }
 
     /// A binary PLY with doubles and 16-bit colours.
@@ -207,7 +207,7 @@ mod tests {
             out.extend(bytes);
         };
         [vec![2], vec![0, 7], vec![0, 8]].into_iter().for_each(&mut put);
-        for row in rows(&made(), 65535.0) {
+        for row in rows(&sample_cloud(), 65535.0) {
             put(vec![77]);
             row[..6].iter().for_each(|&x| put(f64::from(x).to_be_bytes().into()));
             row[6..].iter().for_each(|&x| put((x.round() as u16).to_be_bytes().into()));
@@ -217,7 +217,7 @@ mod tests {
     }
 
     fn obj(faces: &str) -> Vec<u8> {
-        let (mut vertices, mut normals) = (rows(&made(), 1.0), Vec::new());
+        let (mut vertices, mut normals) = (rows(&sample_cloud(), 1.0), Vec::new());
         for row in &mut vertices {
             normals.push(row.drain(3..6).collect());
         }
@@ -225,7 +225,7 @@ mod tests {
     }
 
     fn columns(head: &str, between: &str, full: f32) -> Vec<u8> {
-        format!("{head}{}", text(&rows(&made(), full), "", between)).into_bytes()
+        format!("{head}{}", text(&rows(&sample_cloud(), full), "", between)).into_bytes()
     }
 
     /// One file of each kind, all with the same points.
@@ -246,7 +246,7 @@ mod tests {
     }
 
     fn keyed() -> Vec<u8> {
-        let rows: Vec<Vec<f32>> = made().points.iter().map(|p| p.to_array().into()).collect();
+        let rows: Vec<Vec<f32>> = sample_cloud().points.iter().map(|p| p.to_array().into()).collect();
         format!("# made\nd 1 1 1\ns 1 1 1\ng 1 0 0\n{}", text(&rows, "p ", " ")).into_bytes()
     }
 
@@ -254,12 +254,16 @@ mod tests {
     fn every_format_gives_the_same_points() {
         for (name, bytes) in files() {
             let cloud = parse_points(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!((&cloud.points, &cloud.normals), (&made().points, &made().normals), "{name}");
-            for (found, expected) in cloud.colors.unwrap().iter().zip(made().colors.unwrap()) {
+            assert_eq!(
+                (&cloud.points, &cloud.normals),
+                (&sample_cloud().points, &sample_cloud().normals),
+                "{name}"
+            );
+            for (found, expected) in cloud.colors.unwrap().iter().zip(sample_cloud().colors.unwrap()) {
                 assert!((*found - expected).abs().max_element() < 1e-6, "{name}: {found} {expected}");
             }
         }
-        let expected = PointCloud { points: made().points, ..PointCloud::default() };
+        let expected = PointCloud { points: sample_cloud().points, ..PointCloud::default() };
         assert_eq!(parse_points(&keyed()).unwrap(), expected);
     }
 
@@ -281,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_name_the_format_and_field() {
         let ply = |vertices: &str, color: &str| {
             let properties = "property float x\nproperty float y\nproperty double z\n";
             let colors = ["red", "green", "blue"].map(|name| format!("property {color} {name}\n")).concat();
@@ -290,20 +294,20 @@ mod tests {
         for (bytes, said) in [
             (
                 ply("1 2 3 0 0 0\n4 nan 6 0 0 0\n", "uchar"),
-                "PLY: points: that of point 1, from 0, is [4, NaN, 6]",
+                "PLY: points: point 1 (zero-based) has [4, NaN, 6]",
             ),
             (
                 ply("1 2 3 0 0 0\n4 5 1e39 0 0 0\n", "uchar"),
-                "PLY: points: that of point 1, from 0, is [4, 5, inf]",
+                "PLY: points: point 1 (zero-based) has [4, 5, inf]",
             ),
-            (ply("1 2 3 0 0 0\n4 5 6 0 0 256\n", "uchar"), "PLY: colours: some are out of range"),
-            (ply("1 2 3 0 0 0\n4 5 6 0 0 1.5\n", "float"), "PLY: colours: some are out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 256\n", "uchar"), "PLY: colours: out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 1.5\n", "float"), "PLY: colours: out of range"),
             (ply("1 2 3 0 0 0\n4 5 6 0\n", "float"), "PLY: green: needs 1 bytes"),
-            (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is no number"),
+            (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is not a number"),
             (ply("", "float").replace("vertex 2", "vertex 4000000000"), "PLY: element vertex: needs"),
-            (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: there are none"),
-            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: that of point 0"),
-            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: 3 or more numbers"),
+            (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: the file has no points"),
+            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: point 0"),
+            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: at least 3 numbers"),
             (String::new(), "point file: content: needs 1 bytes"),
             (
                 "solid made\nendsolid\n".into(),
@@ -314,7 +318,7 @@ mod tests {
             ("# .PCD v0.7\nVERSION 0.7\n".into(), "point file: format: PCD"),
             ("OFF\n1 0 0\n1 2 3\n".into(), "point file: format: OFF"),
             ("glTF\u{2}\0\0\0".into(), "point file: format: GLB"),
-            ("1 2 3\n\0\u{1}".into(), "point file: format: a binary file"),
+            ("1 2 3\n\0\u{1}".into(), "point file: format: an unknown binary format"),
         ] {
             let error = parse_points(bytes.as_bytes()).unwrap_err().to_string();
             assert!(error.starts_with(said), "{bytes:?}: {error}");
@@ -327,15 +331,15 @@ mod tests {
     }
 
     /// Asserts the properties of every cloud that is read without an error.
-    fn assert_sound(bytes: &[u8], place: &str) {
+    fn assert_sound(bytes: &[u8], context: &str) {
         let Ok(cloud) = parse_points(bytes) else { return };
         let count = cloud.points.len();
-        assert!((1..=bytes.len()).contains(&count), "{place}");
+        assert!((1..=bytes.len()).contains(&count), "{context}");
         let normals = cloud.normals.unwrap_or(cloud.points.clone());
         let colors = cloud.colors.unwrap_or(vec![Vec3::ZERO; count]);
-        assert_eq!((normals.len(), colors.len()), (count, count), "{place}");
-        assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{place}");
-        assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{place}");
+        assert_eq!((normals.len(), colors.len()), (count, count), "{context}");
+        assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{context}");
+        assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{context}");
     }
 
     #[test]

@@ -19,14 +19,14 @@ pub(super) enum Scalar {
 }
 
 /// Number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
-pub(super) const SLACK: usize = 512;
+pub(super) const MAX_PADDING: usize = 512;
 
 /// Largest integer up to which `f64` represents every integer.
 const MAX_EXACT: u64 = 1 << 53;
 
 /// Format and field of the numbers, for error messages.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct FieldName {
     pub(super) format: &'static str,
     pub(super) field: &'static str,
 }
@@ -47,12 +47,12 @@ impl Scalar {
 ///
 /// # Errors
 /// A dimension of 0, or a size that cannot be addressed.
-pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Result<usize, FormatError> {
+pub(super) fn payload_size(name: FieldName, dims: [usize; 4], scalar: Scalar) -> Result<usize, FormatError> {
     if dims.contains(&0) {
         return Err(FormatError::invalid(
-            place.format,
-            place.field,
-            format!("{dims:?} has a 0; every size must be at least 1"),
+            name.format,
+            name.field,
+            format!("must all be at least 1, got {dims:?}"),
         ));
     }
     let bytes = dims.iter().fold(scalar.size() as u128, |product, &n| product.saturating_mul(n as u128));
@@ -60,20 +60,20 @@ pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Re
         return Ok(bytes as usize);
     }
     let needed = u64::try_from(bytes).unwrap_or(u64::MAX);
-    Err(FormatError::too_large(place.format, place.field, needed))
+    Err(FormatError::too_large(name.format, name.field, needed))
 }
 
 /// Returns the first `needed` bytes, which hold the voxels.
 ///
 /// # Errors
-/// Fewer bytes than `needed`, or more than [`SLACK`] beyond it: header and payload then do not match.
-pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
+/// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it: header and payload then do not match.
+pub(super) fn payload(name: FieldName, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
     let Some(payload) = bytes.get(..needed) else {
-        return Err(FormatError::truncated(place.format, place.field, needed, bytes.len()));
+        return Err(FormatError::truncated(name.format, name.field, needed, bytes.len()));
     };
-    if bytes.len() - needed > SLACK {
+    if bytes.len() - needed > MAX_PADDING {
         let problem = format!("{} bytes of voxels, the header accounts for {needed}", bytes.len());
-        return Err(FormatError::invalid(place.format, place.field, problem));
+        return Err(FormatError::invalid(name.format, name.field, problem));
     }
     Ok(payload)
 }
@@ -82,62 +82,67 @@ pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], 
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
-pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
+pub(super) fn decode(
+    name: FieldName,
+    bytes: &[u8],
+    scalar: Scalar,
+    big: bool,
+) -> Result<Voxels, FormatError> {
     Ok(match scalar {
-        Scalar::U8 => Voxels::U8(numbers(place, bytes, |[b]| b)?),
-        Scalar::I8 => Voxels::I8(numbers(place, bytes, i8::from_ne_bytes)?),
+        Scalar::U8 => Voxels::U8(numbers(name, bytes, |[b]| b)?),
+        Scalar::I8 => Voxels::I8(numbers(name, bytes, i8::from_ne_bytes)?),
         Scalar::U16 => {
-            Voxels::U16(numbers(place, bytes, if big { u16::from_be_bytes } else { u16::from_le_bytes })?)
+            Voxels::U16(numbers(name, bytes, if big { u16::from_be_bytes } else { u16::from_le_bytes })?)
         }
         Scalar::I16 => {
-            Voxels::I16(numbers(place, bytes, if big { i16::from_be_bytes } else { i16::from_le_bytes })?)
+            Voxels::I16(numbers(name, bytes, if big { i16::from_be_bytes } else { i16::from_le_bytes })?)
         }
         Scalar::U32 => {
-            Voxels::U32(numbers(place, bytes, if big { u32::from_be_bytes } else { u32::from_le_bytes })?)
+            Voxels::U32(numbers(name, bytes, if big { u32::from_be_bytes } else { u32::from_le_bytes })?)
         }
         Scalar::I32 => {
-            Voxels::I32(numbers(place, bytes, if big { i32::from_be_bytes } else { i32::from_le_bytes })?)
+            Voxels::I32(numbers(name, bytes, if big { i32::from_be_bytes } else { i32::from_le_bytes })?)
         }
         Scalar::F32 => {
-            Voxels::F32(numbers(place, bytes, if big { f32::from_be_bytes } else { f32::from_le_bytes })?)
+            Voxels::F32(numbers(name, bytes, if big { f32::from_be_bytes } else { f32::from_le_bytes })?)
         }
         Scalar::F64 => {
-            Voxels::F64(numbers(place, bytes, if big { f64::from_be_bytes } else { f64::from_le_bytes })?)
+            Voxels::F64(numbers(name, bytes, if big { f64::from_be_bytes } else { f64::from_le_bytes })?)
         }
         Scalar::U64 => {
             let read = if big { u64::from_be_bytes } else { u64::from_le_bytes };
-            check_exact(place, bytes, read)?;
-            Voxels::F64(numbers(place, bytes, |b| read(b) as f64)?)
+            check_exact(name, bytes, read)?;
+            Voxels::F64(numbers(name, bytes, |b| read(b) as f64)?)
         }
         Scalar::I64 => {
             let read = if big { i64::from_be_bytes } else { i64::from_le_bytes };
-            check_exact(place, bytes, |b| read(b).unsigned_abs())?;
-            Voxels::F64(numbers(place, bytes, |b| read(b) as f64)?)
+            check_exact(name, bytes, |b| read(b).unsigned_abs())?;
+            Voxels::F64(numbers(name, bytes, |b| read(b) as f64)?)
         }
     })
 }
 
 /// Decodes all numbers with `read`.
 fn numbers<const N: usize, T>(
-    place: Place,
+    name: FieldName,
     bytes: &[u8],
     read: impl Fn([u8; N]) -> T,
 ) -> Result<Vec<T>, FormatError> {
     let (parts, _) = bytes.as_chunks::<N>();
     let mut out = Vec::new();
-    let too_large = |_| FormatError::too_large(place.format, place.field, bytes.len() as u64);
+    let too_large = |_| FormatError::too_large(name.format, name.field, bytes.len() as u64);
     out.try_reserve_exact(parts.len()).map_err(too_large)?;
     out.extend(parts.iter().map(|&part| read(part)));
     Ok(out)
 }
 
 /// Returns an error if the absolute value of an integer exceeds [`MAX_EXACT`].
-fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
+fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
     match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
         None => Ok(()),
         Some(v) => {
-            let problem = format!("a 64-bit voxel of size {v}; up to {MAX_EXACT} (2^53) is accepted");
-            Err(FormatError::invalid(place.format, place.field, problem))
+            let problem = format!("64-bit voxels must be at most {MAX_EXACT} (2^53) in size, got {v}");
+            Err(FormatError::invalid(name.format, name.field, problem))
         }
     }
 }
@@ -148,54 +153,50 @@ fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Res
 /// # Errors
 /// Too few or too many numbers, a word that is not a number, or a number out of the range of its type.
 pub(super) fn decode_text(
-    place: Place,
+    name: FieldName,
     bytes: &[u8],
     scalar: Scalar,
     count: usize,
 ) -> Result<Voxels, FormatError> {
     // A number and its separator take at least two bytes: more numbers cannot be present.
     if count > bytes.len() / 2 + 1 {
-        return Err(FormatError::truncated(place.format, place.field, count.saturating_mul(2), bytes.len()));
+        return Err(FormatError::truncated(name.format, name.field, count.saturating_mul(2), bytes.len()));
     }
     let mut out = Vec::new();
-    let too_large = |_| FormatError::too_large(place.format, place.field, count as u64 * 8);
+    let too_large = |_| FormatError::too_large(name.format, name.field, count as u64 * 8);
     out.try_reserve_exact(count).map_err(too_large)?;
     let words = bytes.split(|&b| b.is_ascii_whitespace() || b == b',').filter(|word| !word.is_empty());
     for word in words {
         if out.len() == count {
             return Err(FormatError::invalid(
-                place.format,
-                place.field,
+                name.format,
+                name.field,
                 format!("more than the {count} numbers the header accounts for"),
             ));
         }
-        out.push(text_number(place, word, scalar)?);
+        out.push(text_number(name, word, scalar)?);
     }
     if out.len() == count {
         return Ok(Voxels::F64(out));
     }
     Err(FormatError::invalid(
-        place.format,
-        place.field,
+        name.format,
+        name.field,
         format!("{} numbers, the header accounts for {count}", out.len()),
     ))
 }
 
-fn text_number(place: Place, word: &[u8], scalar: Scalar) -> Result<f64, FormatError> {
+fn text_number(name: FieldName, word: &[u8], scalar: Scalar) -> Result<f64, FormatError> {
     let text = String::from_utf8_lossy(word);
-    let value = text.parse::<f64>().ok().filter(|&v| holds(scalar, v));
+    let value = text.parse::<f64>().ok().filter(|&v| can_represent(scalar, v));
     value.ok_or_else(|| {
         let shown: String = text.chars().take(20).collect();
-        FormatError::invalid(
-            place.format,
-            place.field,
-            format!("'{shown}' is not a number of type {scalar:?}"),
-        )
+        FormatError::invalid(name.format, name.field, format!("'{shown}' is not a number of type {scalar:?}"))
     })
 }
 
 /// Returns whether a number type can represent a value.
-fn holds(scalar: Scalar, v: f64) -> bool {
+fn can_represent(scalar: Scalar, v: f64) -> bool {
     let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
     match scalar {
         Scalar::U8 => within(0.0, 255.0),
@@ -211,7 +212,7 @@ fn holds(scalar: Scalar, v: f64) -> bool {
 }
 
 /// Converts an error of [`crate::volume::Volume`] to one of the file being read.
-pub(super) fn refused(format: &'static str, error: VolumeError) -> FormatError {
+pub(super) fn volume_error(format: &'static str, error: VolumeError) -> FormatError {
     match error {
         VolumeError::InvalidArgument { parameter, problem } => {
             FormatError::invalid(format, parameter, problem)

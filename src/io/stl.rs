@@ -32,7 +32,7 @@ pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
         return FormatError::Truncated { format: FORMAT, field: "triangles".into(), needed, found };
     }
     let problem =
-        format!("stands for {needed} bytes, the file has {found} (and no other mesh format's mark)");
+        format!("implies {needed} bytes, the file has {found} (and is in no other known mesh format)");
     FormatError::invalid(FORMAT, "triangle count", problem)
 }
 
@@ -72,7 +72,7 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
         if keyword.eq_ignore_ascii_case(b"vertex") {
             corners.push(text_point(words, number)?);
         } else if keyword.eq_ignore_ascii_case(b"endloop") && corners.len() % 3 != 0 {
-            let problem = "closes a facet without three vertices; three are accepted";
+            let problem = "closes a facet that does not have three vertices";
             return Err(FormatError::invalid(FORMAT, format!("line {number}"), problem));
         }
         ended |= keyword.eq_ignore_ascii_case(b"endsolid");

@@ -73,7 +73,7 @@ impl Field<'_> {
         words
             .ok()
             .filter(|v| v.len() == count)
-            .ok_or_else(|| self.invalid(&format!("{count} numbers are needed")))
+            .ok_or_else(|| self.invalid(&format!("must be {count} numbers")))
     }
 
     /// Parses `count` finite numbers separated by whitespace.
@@ -82,11 +82,7 @@ impl Field<'_> {
     /// As [`numbers`](Self::numbers), and numbers that are not finite.
     pub(super) fn finite(&self, count: usize) -> Result<Vec<f64>, FormatError> {
         let values = self.numbers(count)?;
-        if values.iter().all(|v| v.is_finite()) {
-            Ok(values)
-        } else {
-            Err(self.invalid("finite numbers are needed"))
-        }
+        if values.iter().all(|v| v.is_finite()) { Ok(values) } else { Err(self.invalid("must be finite")) }
     }
 
     /// Parses `count` positive integers separated by whitespace.
@@ -97,8 +93,7 @@ impl Field<'_> {
         let words: Result<Vec<u64>, _> = self.text.split_whitespace().map(str::parse).collect();
         let fits = |v: &Vec<u64>| v.len() == count && !v.contains(&0);
         let sizes = words.ok().filter(fits);
-        let sizes =
-            sizes.ok_or_else(|| self.invalid(&format!("{count} whole numbers of at least 1 are needed")))?;
+        let sizes = sizes.ok_or_else(|| self.invalid(&format!("must be {count} integers of at least 1")))?;
         let needed = sizes.iter().fold(1u64, |product, &n| product.saturating_mul(n));
         let counted: Result<Vec<usize>, _> = sizes.into_iter().map(usize::try_from).collect();
         counted.map_err(|_| FormatError::too_large(self.format, self.name, needed))
@@ -110,7 +105,7 @@ impl Field<'_> {
     /// Any other text.
     pub(super) fn integer(&self, least: i64) -> Result<i64, FormatError> {
         let value = self.text.trim().parse().ok().filter(|&v| v >= least);
-        value.ok_or_else(|| self.invalid(&format!("a whole number of at least {least} is needed")))
+        value.ok_or_else(|| self.invalid(&format!("must be an integer of at least {least}")))
     }
 
     /// Parses a single non-negative integer as an offset; one that cannot be addressed becomes the largest `usize`,

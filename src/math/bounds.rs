@@ -1,6 +1,6 @@
 //! Axis-aligned bounding boxes, and a bounding volume hierarchy for overlap, nearest-box and ray queries.
 
-use super::order::{by_both, rank};
+use super::order::{combined_rank, rank_f32};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
 
@@ -19,13 +19,13 @@ impl Bounds {
 
     /// Returns the smallest box that contains the points.
     #[inline]
-    pub fn of(points: &[Vec3]) -> Self {
-        points.iter().fold(Self::EMPTY, |b, &p| b.joined(&Self { min: p, max: p }))
+    pub fn from_points(points: &[Vec3]) -> Self {
+        points.iter().fold(Self::EMPTY, |b, &p| b.union(&Self { min: p, max: p }))
     }
 
     /// Returns the smallest box that contains both boxes.
     #[inline]
-    pub fn joined(&self, other: &Self) -> Self {
+    pub fn union(&self, other: &Self) -> Self {
         let (mut min, mut max) = (self.min, self.max);
         for axis in 0..3 {
             // Comparisons, since `f32::min` of variables is a call in wasm.
@@ -42,12 +42,12 @@ impl Bounds {
     /// Returns whether `p` is inside the box or on its border; false for NaN.
     #[inline]
     pub fn contains(&self, p: Vec3) -> bool {
-        self.meets(&Self { min: p, max: p })
+        self.overlaps(&Self { min: p, max: p })
     }
 
     /// Returns whether the boxes share a point.
     #[inline]
-    pub fn meets(&self, other: &Self) -> bool {
+    pub fn overlaps(&self, other: &Self) -> bool {
         self.min.x <= other.max.x
             && other.min.x <= self.max.x
             && self.min.y <= other.max.y
@@ -67,21 +67,21 @@ impl Bounds {
     /// misses. Zero if it starts inside. Rounded so that a ray in a face of the box is a hit.
     #[inline]
     pub fn ray_entry(&self, ray: &Ray) -> Option<f64> {
-        self.span_on(ray, 0.0).map(|(enter, _)| enter)
+        self.clip_line(ray, 0.0).map(|(enter, _)| enter)
     }
 
     /// Returns the distance from the ray's origin, in lengths of its direction, at which the line through it enters the
     /// box, ahead or behind; `None` if it misses. Zero if the origin is inside. Rounded as [`Self::ray_entry`].
     #[inline]
     pub fn line_entry(&self, ray: &Ray) -> Option<f64> {
-        let (enter, leave) = self.span_on(ray, f64::NEG_INFINITY)?;
+        let (enter, leave) = self.clip_line(ray, f64::NEG_INFINITY)?;
         let near = if enter > 0.0 { enter } else { -leave };
         Some(if near > 0.0 { near } else { 0.0 })
     }
 
     /// Returns the interval of the line along the ray that is inside the box, from parameter `start` on.
     #[inline]
-    fn span_on(&self, ray: &Ray, start: f64) -> Option<(f64, f64)> {
+    fn clip_line(&self, ray: &Ray, start: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (start, f64::INFINITY);
         for axis in 0..3 {
             let low = f64::from(self.min[axis]) - ray.origin[axis];
@@ -130,13 +130,13 @@ pub struct Ray {
 impl Ray {
     /// Creates the ray from `origin` along `direction`, which may have any length but 0.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
-        let inverse = |x: f64| if x.abs() > LEAST_SLOPE { 1.0 / x } else { 0.0 };
+        let inverse = |x: f64| if x.abs() > MIN_DIRECTION_COMPONENT { 1.0 / x } else { 0.0 };
         Self { origin, inverse: DVec3::from(direction.to_array().map(inverse)) }
     }
 }
 
 /// Direction components below this are treated as 0: their reciprocal would be close to infinity.
-const LEAST_SLOPE: f64 = 1e-290;
+const MIN_DIRECTION_COMPONENT: f64 = 1e-290;
 
 /// Nodes still to visit with their distances; a tree of a million items needs no allocation.
 type Stack = SmallVec<[(f64, usize); 24]>;
@@ -182,7 +182,7 @@ impl BoxTree {
         while let Some((i, j)) = stack.pop() {
             let (a, b) = (&self.nodes[i], &self.nodes[j]);
             match (a.count > 0, b.count > 0) {
-                _ if !a.bounds.meets(&b.bounds) => {}
+                _ if !a.bounds.overlaps(&b.bounds) => {}
                 (true, _) if i == j => self.pairs_within(a, &mut visit),
                 (false, _) if i == j => {
                     let (left, right) = (i + 1, a.link as usize);
@@ -223,15 +223,15 @@ impl BoxTree {
         self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `most` as initial
-    /// bound.
-    pub fn along_line(&self, ray: &Ray, most: f64, visit: impl FnMut(u32) -> f64) {
-        self.descend(most, |bounds| bounds.line_entry(ray), visit);
+    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `max_distance` as
+    /// initial bound.
+    pub fn along_line(&self, ray: &Ray, max_distance: f64, visit: impl FnMut(u32) -> f64) {
+        self.descend(max_distance, |bounds| bounds.line_entry(ray), visit);
     }
 
     /// Visits items whose boxes overlap `bounds`.
-    pub fn meeting(&self, bounds: &Bounds, mut visit: impl FnMut(u32)) {
-        let entry = |other: &Bounds| other.meets(bounds).then_some(0.0);
+    pub fn for_each_overlapping(&self, bounds: &Bounds, mut visit: impl FnMut(u32)) {
+        let entry = |other: &Bounds| other.overlaps(bounds).then_some(0.0);
         self.descend(0.0, entry, |item| {
             visit(item);
             0.0
@@ -290,7 +290,7 @@ impl BoxTree {
         let items = self.items_of(leaf);
         for (k, (bounds, item)) in items.iter().enumerate() {
             for (other_bounds, other) in &items[k + 1..] {
-                if bounds.meets(other_bounds) {
+                if bounds.overlaps(other_bounds) {
                     visit(*item.min(other), *item.max(other));
                 }
             }
@@ -300,11 +300,11 @@ impl BoxTree {
     /// Visits the overlapping pairs of two leaves.
     fn pairs_between(&self, a: &Node, b: &Node, visit: &mut impl FnMut(u32, u32)) {
         for (bounds, item) in self.items_of(a) {
-            if !bounds.meets(&b.bounds) {
+            if !bounds.overlaps(&b.bounds) {
                 continue;
             }
             for (other_bounds, other) in self.items_of(b) {
-                if bounds.meets(other_bounds) {
+                if bounds.overlaps(other_bounds) {
                     visit(*item.min(other), *item.max(other));
                 }
             }
@@ -314,7 +314,7 @@ impl BoxTree {
 
 /// Builds the subtree of `items`, split at the median along the widest axis; `first` is the index of the first of them.
 fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
-    let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.joined(item));
+    let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.union(item));
     let at = nodes.len();
     if items.len() <= LEAF {
         nodes.push(Node { bounds, link: first as u32, count: items.len() as u32 });
@@ -323,7 +323,7 @@ fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     nodes.push(Node { bounds, link: 0, count: 0 });
     let (axis, middle) = (bounds.widest_axis(), items.len() / 2);
     let mut ranked: Vec<(u64, u32)> =
-        items.iter().map(|(b, i)| by_both(rank(b.min[axis] + b.max[axis]), *i)).zip(0..).collect();
+        items.iter().map(|(b, i)| combined_rank(rank_f32(b.min[axis] + b.max[axis]), *i)).zip(0..).collect();
     ranked.select_nth_unstable(middle);
     let before = items.to_vec();
     items.iter_mut().zip(ranked).for_each(|(item, (_, i))| *item = before[i as usize]);
@@ -364,7 +364,7 @@ mod tests {
             found.sort_unstable();
             let all = (0..count).flat_map(|j| (0..j).map(move |i| (i, j)));
             let mut expected: Vec<_> =
-                all.filter(|&(i, j)| boxes[i as usize].meets(&boxes[j as usize])).collect();
+                all.filter(|&(i, j)| boxes[i as usize].overlaps(&boxes[j as usize])).collect();
             expected.sort_unstable();
             assert_eq!(found, expected, "{count} boxes");
         }

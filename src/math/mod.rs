@@ -2,7 +2,7 @@
 //! errors.
 
 mod bounds;
-mod extremes;
+mod min_max;
 pub mod order;
 pub mod predicates;
 mod quadric;
@@ -11,7 +11,7 @@ pub mod symmetric;
 pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree, Ray};
-pub use extremes::{higher, lower};
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
+pub use min_max::{higher, lower};
 pub use quadric::Quadric;
 pub use random::Random;

@@ -4,7 +4,7 @@
 //! of all types are therefore sorted as pairs of an integer rank and an index, by a single instance of the sort.
 
 /// Returns the rank of a number: an integer key in the order of `f32::total_cmp`.
-pub fn rank(x: f32) -> u32 {
+pub fn rank_f32(x: f32) -> u32 {
     let bits = x.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
@@ -16,7 +16,7 @@ pub fn rank_f64(x: f64) -> u64 {
 }
 
 /// Combines two ranks into one: ordered by the first, and by the second if those are equal.
-pub fn by_both(first: u32, second: u32) -> u64 {
+pub fn combined_rank(first: u32, second: u32) -> u64 {
     u64::from(first) << 32 | u64::from(second)
 }
 
@@ -44,9 +44,15 @@ mod tests {
         let all = [&NUMBERS[..], &[f64::NAN, -f64::NAN]].concat();
         for (&a, &b) in all.iter().flat_map(|a| all.iter().map(move |b| (a, b))) {
             assert_eq!(rank_f64(a).cmp(&rank_f64(b)), a.total_cmp(&b), "{a} {b}");
-            assert_eq!(rank(a as f32).cmp(&rank(b as f32)), (a as f32).total_cmp(&(b as f32)), "{a} {b}");
+            assert_eq!(
+                rank_f32(a as f32).cmp(&rank_f32(b as f32)),
+                (a as f32).total_cmp(&(b as f32)),
+                "{a} {b}"
+            );
         }
-        assert!(by_both(1, u32::MAX) < by_both(2, 0) && by_both(2, 0) < by_both(2, 1));
+        assert!(
+            combined_rank(1, u32::MAX) < combined_rank(2, 0) && combined_rank(2, 0) < combined_rank(2, 1)
+        );
     }
 
     #[test]

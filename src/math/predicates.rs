@@ -38,8 +38,8 @@ pub fn collinear([a, b, c]: [Vec3; 3]) -> bool {
 
 /// Returns whether two triangles share at least one point. Meant for triangles without a common corner: with one, the
 /// result is `true`.
-pub fn triangles_cross(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
-    if !Bounds::of(&a).meets(&Bounds::of(&b)) {
+pub fn triangles_intersect(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
+    if !Bounds::from_points(&a).overlaps(&Bounds::from_points(&b)) {
         return false;
     }
     let sides_of_b = sides(a, b);
@@ -50,11 +50,11 @@ pub fn triangles_cross(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     if one_side(&sides_of_a) {
         return false;
     }
-    any_edge_meets(a, sides_of_a, b) || any_edge_meets(b, sides_of_b, a)
+    any_edge_intersects(a, sides_of_a, b) || any_edge_intersects(b, sides_of_b, a)
 }
 
 /// Returns whether the triangles `shared a[0] a[1]` and `shared b[0] b[1]` share a point other than the common corner.
-pub fn triangles_cross_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 2]) -> bool {
+pub fn triangles_intersect_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 2]) -> bool {
     let (triangle_a, triangle_b) = ([shared, a[0], a[1]], [shared, b[0], b[1]]);
     let sides_of_b = b.map(|p| orient3d(shared, a[0], a[1], p));
     if one_side(&sides_of_b) {
@@ -65,19 +65,20 @@ pub fn triangles_cross_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 2]) 
         return false;
     }
     if sides_of_b == [0.0; 2] && collinear(triangle_a) {
-        return a.into_iter().any(|p| spoke_enters(shared, p, b));
+        return a.into_iter().any(|p| edge_at_corner_intersects(shared, p, b));
     }
     if sides_of_a == [0.0; 2] && collinear(triangle_b) {
-        return b.into_iter().any(|p| spoke_enters(shared, p, a));
+        return b.into_iter().any(|p| edge_at_corner_intersects(shared, p, a));
     }
     // Both triangles are star-shaped about the shared corner: if they share another point, the opposite edge of one
     // meets the other triangle.
-    segment_meets_triangle(a, sides_of_a, triangle_b) || segment_meets_triangle(b, sides_of_b, triangle_a)
+    segment_intersects_triangle(a, sides_of_a, triangle_b)
+        || segment_intersects_triangle(b, sides_of_b, triangle_a)
 }
 
 /// Returns whether the triangles `u v a` and `v u b` overlap beyond their common edge: they are coplanar and on the
 /// same side of it. A triangle without area is on neither side.
-pub fn triangles_fold_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
+pub fn triangles_overlap_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
     orient3d(u, v, a, b) == 0.0
         && Axis::ALL.into_iter().any(|axis| {
             let (side_a, side_b) = (axis.orient(u, v, a), axis.orient(u, v, b));
@@ -86,8 +87,8 @@ pub fn triangles_fold_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
 }
 
 /// Returns whether two segments share at least one point.
-pub fn segments_meet([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> bool {
-    if !Bounds::of(&[p, q]).meets(&Bounds::of(&[r, s])) || orient3d(p, q, r, s) != 0.0 {
+pub fn segments_intersect([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> bool {
+    if !Bounds::from_points(&[p, q]).overlaps(&Bounds::from_points(&[r, s])) || orient3d(p, q, r, s) != 0.0 {
         return false;
     }
     // Along an axis in whose projection some three of the coplanar points are not collinear, the plane is projected one
@@ -105,17 +106,17 @@ pub fn segments_meet([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> bool {
 
 /// Returns whether the segment from `shared` to `tip` shares a point with the triangle `shared b[0] b[1]` other than
 /// `shared`.
-fn spoke_enters(shared: Vec3, tip: Vec3, b: [Vec3; 2]) -> bool {
+fn edge_at_corner_intersects(shared: Vec3, tip: Vec3, b: [Vec3; 2]) -> bool {
     if tip == shared {
         return false;
     }
     let triangle = [shared, b[0], b[1]];
     if !collinear(triangle) {
-        return point_in_triangle(tip, triangle) || segments_meet([shared, tip], b);
+        return point_in_triangle(tip, triangle) || segments_intersect([shared, tip], b);
     }
     b.into_iter()
         .filter(|&q| q != shared)
-        .any(|q| segments_meet([tip, tip], [shared, q]) || segments_meet([q, q], [shared, tip]))
+        .any(|q| segments_intersect([tip, tip], [shared, q]) || segments_intersect([q, q], [shared, tip]))
 }
 
 /// Returns the side of the triangle's plane on which each of the points is, as the sign of [`orient3d`].
@@ -130,32 +131,33 @@ fn one_side(sides: &[f64]) -> bool {
 
 /// Returns whether an edge of one triangle, whose corners `edges` are on `sides` of the other's plane, meets that
 /// triangle.
-fn any_edge_meets(edges: [Vec3; 3], sides: [f64; 3], triangle: [Vec3; 3]) -> bool {
+fn any_edge_intersects(edges: [Vec3; 3], sides: [f64; 3], triangle: [Vec3; 3]) -> bool {
     [(0, 1), (1, 2), (2, 0)]
         .into_iter()
-        .any(|(i, j)| segment_meets_triangle([edges[i], edges[j]], [sides[i], sides[j]], triangle))
+        .any(|(i, j)| segment_intersects_triangle([edges[i], edges[j]], [sides[i], sides[j]], triangle))
 }
 
 /// Returns whether a segment meets a triangle; `sides` are the sides of the triangle's plane on which its ends are.
-fn segment_meets_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [Vec3; 3]) -> bool {
+fn segment_intersects_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [Vec3; 3]) -> bool {
     if one_side(&sides) {
         return false;
     }
     if sides == [0.0; 2] {
-        return coplanar_segment_meets_triangle(segment, triangle);
+        return coplanar_segment_intersects_triangle(segment, triangle);
     }
     let [p, q] = segment;
     let [a, b, c] = triangle;
-    let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
-    !(turns.iter().any(|&turn| turn > 0.0) && turns.iter().any(|&turn| turn < 0.0))
+    let orientations = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+    !(orientations.iter().any(|&orientation| orientation > 0.0)
+        && orientations.iter().any(|&orientation| orientation < 0.0))
 }
 
 /// Returns whether a segment in the triangle's plane meets the triangle. Also correct for a triangle without area,
 /// which is the union of its edges.
-fn coplanar_segment_meets_triangle(segment: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
+fn coplanar_segment_intersects_triangle(segment: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
     let [a, b, c] = triangle;
     point_in_triangle(segment[0], triangle)
-        || [[a, b], [b, c], [c, a]].into_iter().any(|edge| segments_meet(segment, edge))
+        || [[a, b], [b, c], [c, a]].into_iter().any(|edge| segments_intersect(segment, edge))
 }
 
 /// Returns whether `p` is in the triangle; `false` if it is not in its plane or the triangle has no area.
@@ -164,8 +166,9 @@ fn point_in_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
         return false;
     }
     let Some(axis) = Axis::ALL.into_iter().find(|axis| axis.orient(a, b, c) != 0.0) else { return false };
-    let turns = [axis.orient(a, b, p), axis.orient(b, c, p), axis.orient(c, a, p)];
-    !(turns.iter().any(|&turn| turn > 0.0) && turns.iter().any(|&turn| turn < 0.0))
+    let orientations = [axis.orient(a, b, p), axis.orient(b, c, p), axis.orient(c, a, p)];
+    !(orientations.iter().any(|&orientation| orientation > 0.0)
+        && orientations.iter().any(|&orientation| orientation < 0.0))
 }
 
 /// A coordinate axis along which points are projected.
@@ -250,8 +253,8 @@ mod tests {
             (just_above, false),
             (beside, false),
         ] {
-            assert_eq!(triangles_cross(A, other), expected, "{other:?}");
-            assert_eq!(triangles_cross(other, A), expected, "{other:?}");
+            assert_eq!(triangles_intersect(A, other), expected, "{other:?}");
+            assert_eq!(triangles_intersect(other, A), expected, "{other:?}");
         }
     }
 
@@ -262,29 +265,29 @@ mod tests {
         let away = [v(2.5, 2.5, 0.0), v(3.0, 1.5, 0.0), v(3.0, 3.0, 0.0)];
         let corner = [v(4.0, 0.0, 0.0), v(5.0, 0.0, 0.0), v(5.0, 1.0, 0.0)];
         for (other, expected) in [(inside, true), (star, true), (away, false), (corner, true)] {
-            assert_eq!(triangles_cross(A, other), expected, "{other:?}");
-            assert_eq!(triangles_cross(other, A), expected, "{other:?}");
+            assert_eq!(triangles_intersect(A, other), expected, "{other:?}");
+            assert_eq!(triangles_intersect(other, A), expected, "{other:?}");
         }
     }
 
     #[test]
     fn triangles_without_area_are_segments_and_points() {
         let needle = |z: f32| [v(1.0, 1.0, z), v(1.0, 1.0, 1.0), v(1.0, 1.0, 2.0)];
-        assert!(triangles_cross(A, needle(-1.0)));
-        assert!(triangles_cross(A, needle(0.0)));
-        assert!(!triangles_cross(A, needle(0.5)));
+        assert!(triangles_intersect(A, needle(-1.0)));
+        assert!(triangles_intersect(A, needle(0.0)));
+        assert!(!triangles_intersect(A, needle(0.5)));
         let skew = [v(0.0, 1.0, 1.5), v(1.0, 1.0, 1.5), v(2.0, 1.0, 1.5)];
-        assert!(triangles_cross(needle(-1.0), skew));
-        assert!(!triangles_cross(needle(-1.0), skew.map(|p| p + v(0.0, 0.25, 0.0))));
-        assert!(triangles_cross([A[0]; 3], [A[0]; 3]));
-        assert!(!triangles_cross([A[0]; 3], [A[1]; 3]));
+        assert!(triangles_intersect(needle(-1.0), skew));
+        assert!(!triangles_intersect(needle(-1.0), skew.map(|p| p + v(0.0, 0.25, 0.0))));
+        assert!(triangles_intersect([A[0]; 3], [A[0]; 3]));
+        assert!(!triangles_intersect([A[0]; 3], [A[1]; 3]));
     }
 
     #[test]
     fn sharing_a_corner() {
         let cross = |b: [Vec3; 2]| {
-            let forward = triangles_cross_sharing_vertex(A[0], [A[1], A[2]], b);
-            assert_eq!(triangles_cross_sharing_vertex(A[0], b, [A[2], A[1]]), forward, "{b:?}");
+            let forward = triangles_intersect_sharing_vertex(A[0], [A[1], A[2]], b);
+            assert_eq!(triangles_intersect_sharing_vertex(A[0], b, [A[2], A[1]]), forward, "{b:?}");
             forward
         };
         assert!(!cross([v(-1.0, 0.0, 0.0), v(0.0, -1.0, 0.0)]), "coplanar, apart");
@@ -303,7 +306,7 @@ mod tests {
 
     #[test]
     fn sharing_an_edge() {
-        let fold = |b| triangles_fold_sharing_edge(A[0], A[1], A[2], b);
+        let fold = |b| triangles_overlap_sharing_edge(A[0], A[1], A[2], b);
         assert!(fold(v(1.0, 1.0, 0.0)));
         assert!(fold(A[2]));
         assert!(!fold(v(1.0, -1.0, 0.0)));
@@ -352,17 +355,17 @@ mod tests {
     #[test]
     fn triangles_agree_with_separating_axes() {
         for range in [1, 2, 5, 100] {
-            let (mut next, mut crossing) = (integers(5, range), 0);
+            let (mut next, mut intersecting) = (integers(5, range), 0);
             for _ in 0..10_000 {
                 let [a, b] = [(); 2].map(|()| [(); 3].map(|()| [(); 3].map(|()| next())));
                 if normal(a) == [0; 3] || normal(b) == [0; 3] {
                     continue;
                 }
                 let expected = !separated(a, b);
-                assert_eq!(triangles_cross(a.map(to_vec), b.map(to_vec)), expected, "{a:?} {b:?}");
-                crossing += usize::from(expected);
+                assert_eq!(triangles_intersect(a.map(to_vec), b.map(to_vec)), expected, "{a:?} {b:?}");
+                intersecting += usize::from(expected);
             }
-            assert!(crossing > 500, "{crossing} cross");
+            assert!(intersecting > 500, "{intersecting} intersect");
         }
     }
 
@@ -371,7 +374,7 @@ mod tests {
         // With the corner cut off one triangle (a hundredth, less than the distance of the other's opposite edge) no
         // common point is left.
         const CUT: i64 = 100;
-        let (mut next, mut crossing) = (integers(6, 3), 0);
+        let (mut next, mut intersecting) = (integers(6, 3), 0);
         for _ in 0..20_000 {
             let [a0, a1, b0, b1] = [(); 4].map(|()| [(); 3].map(|()| CUT * next()));
             let (a, b) = ([[0; 3], a0, a1], [[0; 3], b0, b1]);
@@ -381,20 +384,20 @@ mod tests {
             let [c0, c1] = [a0, a1].map(|p| p.map(|x| x / CUT));
             let expected = !separated([a0, a1, c1], b) || !separated([a0, c1, c0], b);
             let found =
-                triangles_cross_sharing_vertex(Vec3::ZERO, [a0, a1].map(to_vec), [b0, b1].map(to_vec));
+                triangles_intersect_sharing_vertex(Vec3::ZERO, [a0, a1].map(to_vec), [b0, b1].map(to_vec));
             assert_eq!(found, expected, "{a:?} {b:?}");
-            crossing += usize::from(expected);
+            intersecting += usize::from(expected);
         }
-        assert!(crossing > 500, "{crossing} cross");
+        assert!(intersecting > 500, "{intersecting} intersect");
     }
 
     #[test]
     fn segments_in_space() {
         let base = [v(0.0, 0.0, 0.0), v(2.0, 2.0, 2.0)];
-        assert!(segments_meet(base, [v(0.0, 2.0, 1.0), v(2.0, 0.0, 1.0)]));
-        assert!(!segments_meet(base, [v(0.0, 2.0, 1.5), v(2.0, 0.0, 1.0)]));
-        assert!(segments_meet(base, [v(1.0, 1.0, 1.0), v(9.0, 9.0, 9.0)]));
-        assert!(!segments_meet(base, [v(3.0, 3.0, 3.0), v(9.0, 9.0, 9.0)]));
-        assert!(segments_meet(base, [base[1], v(2.0, 0.0, 2.0)]));
+        assert!(segments_intersect(base, [v(0.0, 2.0, 1.0), v(2.0, 0.0, 1.0)]));
+        assert!(!segments_intersect(base, [v(0.0, 2.0, 1.5), v(2.0, 0.0, 1.0)]));
+        assert!(segments_intersect(base, [v(1.0, 1.0, 1.0), v(9.0, 9.0, 9.0)]));
+        assert!(!segments_intersect(base, [v(3.0, 3.0, 3.0), v(9.0, 9.0, 9.0)]));
+        assert!(segments_intersect(base, [base[1], v(2.0, 0.0, 2.0)]));
     }
 }

@@ -38,17 +38,17 @@ impl Quadric {
     }
 
     /// Returns the value at `p`, which is never negative.
-    pub fn at(&self, p: DVec3) -> f64 {
+    pub fn evaluate(&self, p: DVec3) -> f64 {
         let value = (self.matrix() * p - 2.0 * self.linear).dot(p) + self.constant;
         // Rounding can make the difference negative.
         value.max(0.0)
     }
 
     /// Returns the position of the minimum; `None` if it is not a unique finite point.
-    pub fn least(&self) -> Option<DVec3> {
+    pub fn minimizer(&self) -> Option<DVec3> {
         let matrix = self.matrix();
-        let place = matrix.inverse() * self.linear;
-        (matrix.determinant() > 0.0 && place.is_finite()).then_some(place)
+        let minimum = matrix.inverse() * self.linear;
+        (matrix.determinant() > 0.0 && minimum.is_finite()).then_some(minimum)
     }
 
     /// Returns the matrix A.
@@ -90,18 +90,18 @@ mod tests {
         let normal = DVec3::new(2.0, 1.0, -2.0) / 3.0;
         let plane = Quadric::of_plane(P, normal, 3.0);
         let along = DVec3::new(1.0, 0.0, 1.0);
-        assert!((plane.at(P + 2.0 * normal + 7.0 * along) - 12.0).abs() < 1e-12);
-        assert!((Quadric::of_point(P, 0.5).at(P + along) - 1.0).abs() < 1e-15);
-        assert!(plane.least().is_none() || plane.at(plane.least().unwrap()) < 1e-12);
-        assert_eq!(Quadric::default().least(), None);
+        assert!((plane.evaluate(P + 2.0 * normal + 7.0 * along) - 12.0).abs() < 1e-12);
+        assert!((Quadric::of_point(P, 0.5).evaluate(P + along) - 1.0).abs() < 1e-15);
+        assert!(plane.minimizer().is_none() || plane.evaluate(plane.minimizer().unwrap()) < 1e-12);
+        assert_eq!(Quadric::default().minimizer(), None);
     }
 
     #[test]
-    fn least_where_three_planes_meet() {
+    fn the_minimizer_of_three_planes_is_their_intersection() {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::new(0.6, 0.0, 0.8)];
         let corner =
             Quadric::of_plane(P, x, 1.0) + Quadric::of_plane(P, y, 2.0) + Quadric::of_plane(P, z, 5.0);
-        assert!((corner.least().unwrap() - P).length() < 1e-14);
+        assert!((corner.minimizer().unwrap() - P).length() < 1e-14);
     }
 
     /// On a flat region the planes do not determine the minimum, and a small weight of the points does.
@@ -111,6 +111,6 @@ mod tests {
         for shift in [DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y] {
             flat += Quadric::of_plane(P + shift, DVec3::Z, 1.0) + Quadric::of_point(P + shift, 1e-6);
         }
-        assert!((flat.least().unwrap() - P).length() < 1e-9);
+        assert!((flat.minimizer().unwrap() - P).length() < 1e-9);
     }
 }

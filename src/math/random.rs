@@ -8,12 +8,12 @@ impl Random {
     /// Creates the generator of a seed.
     pub fn new(seed: u64) -> Self {
         let mut random = Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
-        random.bits();
+        random.next_u32();
         random
     }
 
     /// Returns 32 random bits.
-    pub fn bits(&mut self) -> u32 {
+    pub fn next_u32(&mut self) -> u32 {
         let state = self.0;
         self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let mixed = (((state >> 18) ^ state) >> 27) as u32;
@@ -22,11 +22,11 @@ impl Random {
 
     /// Returns a random integer in `0..limit`.
     pub fn below(&mut self, limit: u32) -> u32 {
-        ((u64::from(self.bits()) * u64::from(limit)) >> 32) as u32
+        ((u64::from(self.next_u32()) * u64::from(limit)) >> 32) as u32
     }
 
     /// Returns a random permutation of 0 to `count` − 1.
-    pub fn order(&mut self, count: usize) -> Vec<u32> {
+    pub fn permutation(&mut self, count: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..count as u32).collect();
         for i in (1..count).rev() {
             order.swap(i, self.below(i as u32 + 1) as usize);
@@ -39,7 +39,7 @@ impl Random {
 impl Random {
     /// Returns a random number in `0.0..1.0`.
     pub fn unit(&mut self) -> f64 {
-        f64::from(self.bits()) / 4_294_967_296.0
+        f64::from(self.next_u32()) / 4_294_967_296.0
     }
 }
 
@@ -51,9 +51,9 @@ mod tests {
 
     #[test]
     fn an_order_has_every_number_once_and_a_seed_gives_one_order() {
-        let order = Random::new(3).order(1000);
-        assert_eq!(order, Random::new(3).order(1000));
-        assert_ne!(order, Random::new(4).order(1000));
+        let order = Random::new(3).permutation(1000);
+        assert_eq!(order, Random::new(3).permutation(1000));
+        assert_ne!(order, Random::new(4).permutation(1000));
         let mut sorted = order.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, (0..1000).collect::<Vec<_>>());

@@ -17,7 +17,7 @@ pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let rotation = rotation_clearing(&a, p, q);
+            let rotation = jacobi_rotation(&a, p, q);
             a = rotation.transpose() * a * rotation;
             vectors *= rotation;
         }
@@ -26,14 +26,14 @@ pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
 }
 
 /// Returns the Jacobi rotation in the plane of axes `p` and `q` that zeroes the entry `(p, q)`.
-fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
+fn jacobi_rotation(a: &DMat3, p: usize, q: usize) -> DMat3 {
     let off = a.col(q)[p];
     let gap = a.col(q)[q] - a.col(p)[p];
     if off == 0.0 || off.abs() <= f64::EPSILON * 1e-3 * (a.col(p)[p].abs() + a.col(q)[q].abs()) && gap != 0.0
     {
         return DMat3::IDENTITY;
     }
-    let [_, cosine, sine] = clearing_angle(off, gap);
+    let [_, cosine, sine] = jacobi_angle(off, gap);
     let mut rotation = DMat3::IDENTITY;
     rotation.col_mut(p)[p] = cosine;
     rotation.col_mut(q)[q] = cosine;
@@ -44,7 +44,7 @@ fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
 
 /// Returns tangent, cosine and sine of the Jacobi rotation that zeroes the off-diagonal entry `off` of two diagonal
 /// entries that differ by `gap`.
-fn clearing_angle(off: f64, gap: f64) -> [f64; 3] {
+fn jacobi_angle(off: f64, gap: f64) -> [f64; 3] {
     let ratio = gap / (2.0 * off);
     let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
     let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
@@ -61,7 +61,7 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
 }
 
 /// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix.
-pub fn least<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
+pub fn least_eigenvector<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     let mut vectors = [[0.0; N]; N];
     (0..N).for_each(|k| vectors[k][k] = 1.0);
     for _ in 0..SWEEPS {
@@ -85,11 +85,11 @@ pub fn least<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
 fn rotate<const N: usize>(a: &mut [[f64; N]; N], vectors: &mut [[f64; N]; N], p: usize, q: usize) -> bool {
     let (off, gap) = (a[p][q], a[q][q] - a[p][p]);
     // Written so that NaN is left alone.
-    let counts = off.abs() > f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs());
-    if !counts {
+    let is_significant = off.abs() > f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs());
+    if !is_significant {
         return false;
     }
-    let [tangent, cosine, sine] = clearing_angle(off, gap);
+    let [tangent, cosine, sine] = jacobi_angle(off, gap);
     let diagonal = [a[p][p] - tangent * off, a[q][q] + tangent * off];
     for rows in [&mut *a, vectors] {
         let (before, after) = (rows[p], rows[q]);
@@ -164,7 +164,7 @@ mod tests {
                 let size = if p == q { 1.0 } else { [1.0, 1e-9, 0.0][round % 3] };
                 (a[p][q], a[q][p]) = (size * value, size * value);
             }
-            let v = least(a);
+            let v = least_eigenvector(a);
             let times = |x: &[f64; 4]| a.map(|row| (0..4).map(|k| row[k] * x[k]).sum::<f64>());
             let dot = |x: &[f64; 4], y: &[f64; 4]| (0..4).map(|k| x[k] * y[k]).sum::<f64>();
             let value = dot(&v, &times(&v));
@@ -177,8 +177,8 @@ mod tests {
                 assert!(dot(&x, &times(&x)) >= (value - 1e-12) * dot(&x, &x));
             }
         }
-        assert_eq!(least([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(least_eigenvector([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
         // With NaN in the matrix the iteration ends, here with an axis.
-        assert_eq!(least([[f64::NAN; 3]; 3]), [1.0, 0.0, 0.0]);
+        assert_eq!(least_eigenvector([[f64::NAN; 3]; 3]), [1.0, 0.0, 0.0]);
     }
 }

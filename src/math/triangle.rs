@@ -29,14 +29,14 @@ pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
 
 /// Returns the point with the given barycentric coordinates.
 #[inline]
-pub fn at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
+pub fn point_at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
     a.as_dvec3() * barycentric.x + b.as_dvec3() * barycentric.y + c.as_dvec3() * barycentric.z
 }
 
 /// Returns the barycentric coordinates (of `a`, `b`, `c`; none negative, sum 1) of the triangle's closest point to `p`.
 ///
 /// A triangle without area is treated as the segment or point that it is.
-pub fn closest([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
+pub fn closest_barycentric([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|q| q.as_dvec3() - p.as_dvec3());
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac);
@@ -78,12 +78,12 @@ fn nearest<const N: usize>(candidates: [(DVec3, f64); N]) -> DVec3 {
 /// squared distance.
 #[inline]
 fn segment(a: DVec3, b: DVec3, barycentric: impl Fn(f64) -> DVec3) -> (DVec3, f64) {
-    let s = fraction(a, b);
+    let s = closest_segment_parameter(a, b);
     (barycentric(s), (a * (1.0 - s) + b * s).length_squared())
 }
 
 /// Returns the position of the segment's closest point to the origin, as a fraction from `a` to `b` in 0..=1.
-fn fraction(a: DVec3, b: DVec3) -> f64 {
+fn closest_segment_parameter(a: DVec3, b: DVec3) -> f64 {
     let ab = b - a;
     let size = ab.length_squared();
     if size > 0.0 { (-a.dot(ab) / size).clamp(0.0, 1.0) } else { 0.0 }
@@ -106,7 +106,7 @@ pub struct Line {
     /// The two axes across, and the one along the line.
     axes: [usize; 3],
     /// Displacement of the line along the first two axes per unit along the third.
-    tilt: [f64; 2],
+    shear: [f64; 2],
     /// Lengths of the direction per unit along the third axis.
     scale: f64,
 }
@@ -117,7 +117,7 @@ impl Line {
         let along = direction.abs().max_position();
         let axes = [(along + 1) % 3, (along + 2) % 3, along];
         let scale = 1.0 / direction[along];
-        Self { origin, axes, tilt: [direction[axes[0]] * scale, direction[axes[1]] * scale], scale }
+        Self { origin, axes, shear: [direction[axes[0]] * scale, direction[axes[1]] * scale], scale }
     }
 
     /// Returns where the line meets the triangle, from either side, ahead or behind; `None` if it misses or the
@@ -127,7 +127,7 @@ impl Line {
     /// opposite signs, and zero belongs to both.
     #[inline]
     pub fn hit(&self, triangle: [Vec3; 3]) -> Option<LineHit> {
-        let [a, b, c] = triangle.map(|q| self.seen(q));
+        let [a, b, c] = triangle.map(|q| self.sheared(q));
         let across = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
         let (u, v, w) = (across(b, c), across(c, a), across(a, b));
         let sum = u + v + w;
@@ -135,16 +135,16 @@ impl Line {
             return None;
         }
         let barycentric = DVec3::new(u, v, w) / sum;
-        let way = a[2] * barycentric.x + b[2] * barycentric.y + c[2] * barycentric.z;
-        Some(LineHit { distance: way * self.scale, barycentric })
+        let along = a[2] * barycentric.x + b[2] * barycentric.y + c[2] * barycentric.z;
+        Some(LineHit { distance: along * self.scale, barycentric })
     }
 
     /// Returns the coordinates of a point across and along the line, after the shear.
     #[inline]
-    fn seen(&self, q: Vec3) -> [f64; 3] {
+    fn sheared(&self, q: Vec3) -> [f64; 3] {
         let p = (q.as_dvec3() - self.origin).to_array();
         let [i, j, along] = self.axes;
-        [p[i] - self.tilt[0] * p[along], p[j] - self.tilt[1] * p[along], p[along]]
+        [p[i] - self.shear[0] * p[along], p[j] - self.shear[1] * p[along], p[along]]
     }
 }
 
@@ -186,7 +186,7 @@ mod tests {
             (Vec3::new(-2.0, 1.0, 1.0), DVec3::new(0.0, 1.0, 0.0)),
             (Vec3::new(5.0, 5.5, 0.0), DVec3::new(2.0, 1.5, 0.0)),
         ] {
-            let found = at(T, closest(T, p));
+            let found = point_at(T, closest_barycentric(T, p));
             assert!((found - expected).length() < 1e-12, "{p}: {found}");
         }
     }
@@ -200,10 +200,10 @@ mod tests {
             let squash = [1.0, 0.1, 1e-3, 1e-6][k % 4];
             let triangle = [vector(), vector(), vector()].map(|p| p * Vec3::new(1.0, squash, squash));
             let p = vector() * Vec3::new(2.0, 2.0 * squash, 2.0);
-            let found = at(triangle, closest(triangle, p)).distance(p.as_dvec3());
+            let found = point_at(triangle, closest_barycentric(triangle, p)).distance(p.as_dvec3());
             for (i, j) in (0..=20).flat_map(|i| (0..=20 - i).map(move |j| (i, j))) {
                 let (u, v) = (f64::from(i) / 20.0, f64::from(j) / 20.0);
-                let other = at(triangle, DVec3::new(u, v, 1.0 - u - v)).distance(p.as_dvec3());
+                let other = point_at(triangle, DVec3::new(u, v, 1.0 - u - v)).distance(p.as_dvec3());
                 assert!(found <= other + 1e-9, "{triangle:?} {p}: {found} {other}");
             }
         }
@@ -212,15 +212,15 @@ mod tests {
     #[test]
     fn closest_without_area() {
         let segment = [Vec3::ZERO, Vec3::X * 2.0, Vec3::X];
-        assert_eq!(at(segment, closest(segment, Vec3::new(1.5, 1.0, 0.0))), DVec3::X * 1.5);
-        assert_eq!(at([Vec3::Y; 3], closest([Vec3::Y; 3], Vec3::ZERO)), DVec3::Y);
+        assert_eq!(point_at(segment, closest_barycentric(segment, Vec3::new(1.5, 1.0, 0.0))), DVec3::X * 1.5);
+        assert_eq!(point_at([Vec3::Y; 3], closest_barycentric([Vec3::Y; 3], Vec3::ZERO)), DVec3::Y);
     }
 
     #[test]
     fn rays() {
         let hit = ray_hit(T, DVec3::new(1.0, 1.0, 4.0), DVec3::new(0.0, 0.0, -2.0)).unwrap();
         assert_eq!(hit.distance, 2.0);
-        assert!((at(T, hit.barycentric) - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-15);
+        assert!((point_at(T, hit.barycentric) - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-15);
         assert!(ray_hit(T, DVec3::new(1.0, 1.0, -4.0), DVec3::Z).is_some(), "from behind");
         assert!(ray_hit(T, DVec3::new(1.0, 1.0, 4.0), DVec3::Z).is_none(), "away");
         assert!(ray_hit(T, DVec3::new(3.0, 3.0, 4.0), -DVec3::Z).is_none(), "beside");

@@ -16,19 +16,19 @@ impl Mesh {
     /// triangle with two equal corners, surfaces that touch at a vertex, or a vertex with more than 4096 triangles.
     pub fn from_triangles(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         check_indices(mesh)?;
-        let corners = Corners::sort(mesh);
+        let corners = Links::sort(mesh);
         let mut rings = Vec::with_capacity(mesh.positions.len());
-        let mut names = vec![VertexId(u32::MAX); mesh.positions.len()];
+        let mut new_ids = vec![VertexId(u32::MAX); mesh.positions.len()];
         let mut positions = Vec::with_capacity(mesh.positions.len());
         for (v, &position) in mesh.positions.iter().enumerate() {
             let links = corners.of(v);
             if !links.is_empty() {
-                names[v] = VertexId::from_index(rings.len());
-                rings.push(chain(v, links)?);
+                new_ids[v] = VertexId::from_index(rings.len());
+                rings.push(ring_from_links(v, links)?);
                 positions.push(position);
             }
         }
-        rings.iter_mut().for_each(|ring| ring.rename(|v| names[v.index()]));
+        rings.iter_mut().for_each(|ring| ring.renumber(|v| new_ids[v.index()]));
         Ok(Self::from_rings(rings, positions))
     }
 
@@ -62,13 +62,13 @@ impl Mesh {
         positive("radius", radius)?;
         positive("maxEdge", max_edge)?;
         if !center.is_finite() {
-            let problem = format!("({}, {}, {}) is not a finite point", center.x, center.y, center.z);
+            let problem = format!("must be finite, got ({}, {}, {})", center.x, center.y, center.z);
             return Err(MeshError::InvalidArgument { parameter: "center", problem });
         }
         let mut mesh = Self::icosahedron(Vec3::ZERO, 1.0);
         let limit = max_edge / radius;
         while mesh.longest_edge() > limit {
-            if mesh.vertex_count() > LARGEST_SPHERE / 3 {
+            if mesh.vertex_count() > MAX_SPHERE_VERTICES / 3 {
                 return Err(MeshError::TooLarge { bytes: 3 * mesh.vertex_count() as u64 * 64 });
             }
             mesh.refine()?;
@@ -86,15 +86,15 @@ impl Mesh {
 
     /// Converts the mesh to a triangle list with area-weighted unit normals, vertices in slot order.
     pub fn to_triangles(&self) -> TriangleMesh {
-        let mut names = vec![u32::MAX; self.slots()];
+        let mut new_ids = vec![u32::MAX; self.slots()];
         let mut positions = Vec::with_capacity(self.vertex_count());
         let mut normals = Vec::with_capacity(self.vertex_count());
         for v in self.vertices() {
-            names[v.index()] = positions.len() as u32;
+            new_ids[v.index()] = positions.len() as u32;
             positions.push(self.position(v));
             normals.push(self.area_normal(v).normalize_or_zero());
         }
-        let triangles = self.triangles().map(|corners| corners.map(|v| names[v.index()])).collect();
+        let triangles = self.triangles().map(|corners| corners.map(|v| new_ids[v.index()])).collect();
         TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
     }
 
@@ -104,60 +104,63 @@ impl Mesh {
     /// # Errors
     /// [`MeshError::TooLarge`] if there are not enough vertex ids left.
     pub fn append(&mut self, other: &Self) -> Result<Vec<VertexId>, MeshError> {
-        if !self.has_room_for(other.vertex_count()) {
+        if !self.has_ids_for(other.vertex_count()) {
             return Err(MeshError::TooLarge { bytes: 64 * other.vertex_count() as u64 });
         }
-        let mut names = vec![NO_NAME; other.slots()];
+        let mut new_ids = vec![NO_ID; other.slots()];
         for v in other.vertices() {
-            names[v.index()] = self.allocate(other.position(v));
-            self.rings[names[v.index()].index()] = other.ring(v).clone();
+            new_ids[v.index()] = self.allocate(other.position(v));
+            self.rings[new_ids[v.index()].index()] = other.ring(v).clone();
         }
         for v in other.vertices() {
-            self.rings[names[v.index()].index()].rename(|w| names[w.index()]);
+            self.rings[new_ids[v.index()].index()].renumber(|w| new_ids[w.index()]);
         }
         self.half_edges += other.half_edges;
         self.euler += other.euler;
         self.topology_changed();
-        names.retain(|&v| v != NO_NAME);
-        Ok(names)
+        new_ids.retain(|&v| v != NO_ID);
+        Ok(new_ids)
     }
 }
 
 /// The id of a free slot in a renumbering.
-const NO_NAME: VertexId = VertexId(u32::MAX);
+const NO_ID: VertexId = VertexId(u32::MAX);
 
 /// The largest vertex count of a sphere: as many as fit into a browser's memory with room to work.
-const LARGEST_SPHERE: usize = 16_000_000;
+const MAX_SPHERE_VERTICES: usize = 16_000_000;
 
 fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(MeshError::InvalidArgument { parameter, problem: format!("{value} is not a positive finite number") })
+    Err(MeshError::InvalidArgument {
+        parameter,
+        problem: format!("must be positive and finite, got {value}"),
+    })
 }
 
 fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
     let fail = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
     if mesh.triangles.is_empty() {
-        return fail("indices", "there is no triangle; at least four are needed to close a surface".into());
+        return fail("indices", "no triangles; a closed surface needs at least four".into());
     }
     let count = mesh.positions.len();
     if let Some(&bad) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {
-        return fail("indices", format!("index {bad} has no position; there are {count}"));
+        return fail("indices", format!("index {bad} is out of range; there are {count} positions"));
     }
     if let Some(bad) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        return fail("positions", format!("position {bad} is not finite"));
+        return fail("positions", format!("position {bad} must be finite"));
     }
     Ok(())
 }
 
 /// For every vertex, its links: the edges (a, b) opposite it in its triangles.
-struct Corners {
+struct Links {
     starts: Vec<usize>,
     links: Vec<(u32, u32)>,
 }
 
-impl Corners {
+impl Links {
     fn sort(mesh: &TriangleMesh) -> Self {
         let mut starts = vec![0; mesh.positions.len() + 1];
         for &i in mesh.triangles.iter().flatten() {
@@ -183,29 +186,29 @@ impl Corners {
 }
 
 /// Orders the links of vertex `v` into its one-ring, or reports why they are not a single cycle.
-fn chain(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
+fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
-        return fail("more triangles than can be handled meet");
+        return fail(&format!("more than {LARGEST_VALENCE} triangles meet"));
     }
     if links.iter().any(|&(a, b)| a == b || a as usize == v || b as usize == v) {
-        return fail("a triangle has the same corner twice");
+        return fail("a triangle has two equal corners");
     }
     let mut ring = Vec::with_capacity(links.len());
     let (first, mut here) = links[0];
     ring.push(VertexId(first));
     while here != first {
         if ring.contains(&VertexId(here)) {
-            return fail("an edge of more than two triangles, or triangles of opposite orientation,");
+            return fail("an edge with more than two triangles, or inconsistent orientation,");
         }
         ring.push(VertexId(here));
         match links.iter().find(|&&(a, _)| a == here) {
             Some(&(_, next)) => here = next,
-            None => return fail("a boundary, or triangles of opposite orientation,"),
+            None => return fail("a boundary, or inconsistent orientation,"),
         }
     }
     if ring.len() != links.len() {
-        return fail("two parts of the surface touch, or triangles are doubled,");
+        return fail("non-manifold vertex or duplicate triangles");
     }
     if ring.len() < 3 {
         return fail("fewer than three triangles meet");

@@ -4,7 +4,7 @@ use super::{Mesh, VertexId};
 
 /// A violated invariant of a mesh, found by [`Mesh::check`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Flaw {
+pub enum InvariantViolation {
     /// A vertex has fewer than three neighbours.
     #[error("{0:?} has fewer than three neighbours")]
     LowValence(VertexId),
@@ -12,13 +12,13 @@ pub enum Flaw {
     #[error("the edge from {0:?} to {1:?} is doubled")]
     DoubledEdge(VertexId, VertexId),
     /// A neighbour is not live, is the vertex itself, or does not have the vertex as its neighbour.
-    #[error("{0:?} names {1:?} as a neighbour, which does not name it back")]
+    #[error("{1:?} is in the ring of {0:?}, but not {0:?} in the ring of {1:?}")]
     OneSidedEdge(VertexId, VertexId),
     /// The rings of the three corners of a triangle are inconsistent: the surface is open or not oriented there.
-    #[error("the corners of ({0:?}, {1:?}, {2:?}) do not agree on this triangle")]
+    #[error("the rings of the corners of triangle ({0:?}, {1:?}, {2:?}) are inconsistent")]
     BrokenTriangle(VertexId, VertexId, VertexId),
     /// The Euler characteristic or the number of half-edges maintained by the edits differs from the counted one.
-    #[error("the edits predict χ = {predicted}, but {counted} is counted")]
+    #[error("χ = {predicted} according to the edits, but {counted} according to a count")]
     EulerMismatch {
         /// The Euler characteristic maintained by the edits.
         predicted: i64,
@@ -26,8 +26,8 @@ pub enum Flaw {
         counted: i64,
     },
     /// Per-vertex arrays, rings and the free list are inconsistent.
-    #[error("the arrays of the mesh are out of step")]
-    OutOfStep,
+    #[error("the arrays of the mesh are inconsistent")]
+    InconsistentArrays,
     /// A position or attribute of a vertex is NaN or infinite.
     #[error("{0:?} has a position or attribute that is not finite")]
     NotFinite(VertexId),
@@ -38,26 +38,26 @@ impl Mesh {
     ///
     /// # Errors
     /// The first violated invariant found.
-    pub fn check(&self) -> Result<(), Flaw> {
+    pub fn check(&self) -> Result<(), InvariantViolation> {
         self.check_arrays()?;
         for v in self.vertices() {
             self.check_valence(v)?;
             self.check_neighbours(v)?;
             self.check_triangles(v)?;
             if !self.position(v).is_finite() || !self.attributes.is_finite(v) {
-                return Err(Flaw::NotFinite(v));
+                return Err(InvariantViolation::NotFinite(v));
             }
         }
         self.check_euler()
     }
 
-    fn check_arrays(&self) -> Result<(), Flaw> {
+    fn check_arrays(&self) -> Result<(), InvariantViolation> {
         let empty = self.rings.iter().filter(|ring| ring.is_empty()).count();
         let fits = self.positions.len() == self.rings.len() && self.attributes.fits(self.rings.len());
         if fits && self.free.len() == empty && self.free_slots_are_distinct() {
             Ok(())
         } else {
-            Err(Flaw::OutOfStep)
+            Err(InvariantViolation::InconsistentArrays)
         }
     }
 
@@ -69,38 +69,38 @@ impl Mesh {
         })
     }
 
-    fn check_valence(&self, v: VertexId) -> Result<(), Flaw> {
-        if self.ring(v).valence() >= 3 { Ok(()) } else { Err(Flaw::LowValence(v)) }
+    fn check_valence(&self, v: VertexId) -> Result<(), InvariantViolation> {
+        if self.ring(v).valence() >= 3 { Ok(()) } else { Err(InvariantViolation::LowValence(v)) }
     }
 
-    fn check_neighbours(&self, v: VertexId) -> Result<(), Flaw> {
+    fn check_neighbours(&self, v: VertexId) -> Result<(), InvariantViolation> {
         let ring = self.ring(v).as_slice();
         for (k, &w) in ring.iter().enumerate() {
             if w == v || !self.is_live(w) || !self.ring(w).contains(v) {
-                return Err(Flaw::OneSidedEdge(v, w));
+                return Err(InvariantViolation::OneSidedEdge(v, w));
             }
             if ring[..k].contains(&w) {
-                return Err(Flaw::DoubledEdge(v, w));
+                return Err(InvariantViolation::DoubledEdge(v, w));
             }
         }
         Ok(())
     }
 
-    fn check_triangles(&self, v: VertexId) -> Result<(), Flaw> {
+    fn check_triangles(&self, v: VertexId) -> Result<(), InvariantViolation> {
         for (a, b) in self.ring(v).pairs() {
             if self.ring(a).after(b) != Some(v) || self.ring(b).after(v) != Some(a) {
-                return Err(Flaw::BrokenTriangle(v, a, b));
+                return Err(InvariantViolation::BrokenTriangle(v, a, b));
             }
         }
         Ok(())
     }
 
-    fn check_euler(&self) -> Result<(), Flaw> {
+    fn check_euler(&self) -> Result<(), InvariantViolation> {
         let half_edges: usize = self.rings.iter().map(|ring| ring.valence()).sum();
         let counted = self.vertex_count() as i64 - half_edges as i64 / 2 + half_edges as i64 / 3;
         if half_edges == self.half_edges && counted == self.euler {
             return Ok(());
         }
-        Err(Flaw::EulerMismatch { predicted: self.euler, counted })
+        Err(InvariantViolation::EulerMismatch { predicted: self.euler, counted })
     }
 }

@@ -4,7 +4,7 @@ use super::{Mesh, VertexId};
 
 /// The largest limit for which [`Mesh::component_of`] searches linearly instead of marking vertices in an array over
 /// the whole mesh.
-const SMALL: usize = 64;
+const LINEAR_SEARCH_LIMIT: usize = 64;
 
 impl Mesh {
     /// Returns the vertices of the connected component of `v` in breadth-first order, at most `limit` of them; none if
@@ -13,7 +13,7 @@ impl Mesh {
         if !self.is_live(v) {
             return Vec::new();
         }
-        if limit <= SMALL {
+        if limit <= LINEAR_SEARCH_LIMIT {
             return self.small_component_of(v, limit);
         }
         let mut found = self.flood(v, &mut vec![false; self.slots()]);

@@ -2,7 +2,7 @@
 //! operators for triangulated 2-manifolds*, 2003), summed in `f64` in the order of the triangles.
 
 use super::TriangleMesh;
-use super::edge_table::{by_edge, edge_uses};
+use super::edge_table::{by_edge, sorted_half_edges};
 use crate::math::DVec3;
 
 /// Mean and Gaussian curvature per vertex, and the area over which each is averaged.
@@ -30,7 +30,7 @@ pub fn curvature(mesh: &TriangleMesh) -> Curvature {
     for triangle in &mesh.triangles {
         add(&mut sums, triangle.map(|v| v as usize), triangle.map(|v| mesh.positions[v as usize].as_dvec3()));
     }
-    for edge in by_edge(&edge_uses(&mesh.triangles)).filter(|edge| edge.len() == 1) {
+    for edge in by_edge(&sorted_half_edges(&mesh.triangles)).filter(|edge| edge.len() == 1) {
         edge[0].ends().into_iter().for_each(|v| sums[v as usize].on_rim = true);
     }
     Curvature {
@@ -285,8 +285,8 @@ mod tests {
                 assert!(found.areas.iter().all(|a| a.is_finite()), "{seed}");
             }
         }
-        let speck = curvature(&shapes::cuboid(Vec3::splat(1e-30)));
-        assert!(speck.gaussian.iter().all(|&k| k == f64::from(f32::MAX)));
+        let tiny = curvature(&shapes::cuboid(Vec3::splat(1e-30)));
+        assert!(tiny.gaussian.iter().all(|&k| k == f64::from(f32::MAX)));
         let flat = curvature(&shapes::cuboid(Vec3::new(1.0, 0.0, 0.0)));
         assert!(flat.mean.iter().chain(&flat.gaussian).all(|&x| x == 0.0));
     }

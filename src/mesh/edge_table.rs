@@ -4,7 +4,7 @@ use crate::math::order::sort_by_rank;
 
 /// A half-edge: the use of an edge by a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct EdgeUse {
+pub(super) struct HalfEdge {
     /// The ends as a sort key, the lower vertex index in the high half.
     key: u64,
     /// The index of the triangle.
@@ -13,7 +13,7 @@ pub(super) struct EdgeUse {
     pub forward: bool,
 }
 
-impl EdgeUse {
+impl HalfEdge {
     /// Returns the vertex indices of the ends, the lower one first.
     pub fn ends(&self) -> [u32; 2] {
         [(self.key >> 32) as u32, self.key as u32]
@@ -21,23 +21,23 @@ impl EdgeUse {
 }
 
 /// Returns the half-edges of all triangles with three different corners, sorted by edge, then by triangle.
-pub(super) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
-    let mut uses = Vec::with_capacity(3 * triangles.len());
+pub(super) fn sorted_half_edges(triangles: &[[u32; 3]]) -> Vec<HalfEdge> {
+    let mut half_edges = Vec::with_capacity(3 * triangles.len());
     for (&[a, b, c], triangle) in triangles.iter().zip(0..) {
         if a == b || b == c || c == a {
             continue;
         }
-        uses.extend([(a, b), (b, c), (c, a)].map(|(from, to)| EdgeUse {
+        half_edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| HalfEdge {
             key: u64::from(from.min(to)) << 32 | u64::from(from.max(to)),
             triangle,
             forward: from < to,
         }));
     }
-    sort_by_rank(&mut uses, |u| u.key);
-    uses
+    sort_by_rank(&mut half_edges, |u| u.key);
+    half_edges
 }
 
 /// Iterates over the edges, each as the slice of its half-edges.
-pub(super) fn by_edge(uses: &[EdgeUse]) -> impl Iterator<Item = &[EdgeUse]> {
-    uses.chunk_by(|a, b| a.key == b.key)
+pub(super) fn by_edge(half_edges: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
+    half_edges.chunk_by(|a, b| a.key == b.key)
 }

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 
 /// The two vertices opposite an edge: the third corners of its two triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Opposite {
+pub struct OppositeVertices {
     /// The third corner of the triangle to the left of the directed edge, seen from outside.
     pub left: VertexId,
     /// The third corner of the triangle to the right of the directed edge, seen from outside.
@@ -17,10 +17,10 @@ impl Mesh {
     ///
     /// # Errors
     /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent.
-    pub fn opposite(&self, u: VertexId, v: VertexId) -> Result<Opposite, EditError> {
+    pub fn opposite_vertices(&self, u: VertexId, v: VertexId) -> Result<OppositeVertices, EditError> {
         let ring = self.rings.get(u.index()).ok_or(EditError::NotAnEdge(u, v))?;
         match (ring.after(v), ring.before(v)) {
-            (Some(left), Some(right)) => Ok(Opposite { left, right }),
+            (Some(left), Some(right)) => Ok(OppositeVertices { left, right }),
             _ => Err(EditError::NotAnEdge(u, v)),
         }
     }
@@ -38,8 +38,8 @@ impl Mesh {
     /// # Errors
     /// [`EditError::NotAnEdge`], [`EditError::Full`].
     pub fn split(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<VertexId, EditError> {
-        let Opposite { left: a, right: b } = self.opposite(u, v)?;
-        if !self.has_room_for(1) {
+        let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
+        if !self.has_ids_for(1) {
             return Err(EditError::Full);
         }
         let w = self.allocate(position);
@@ -67,7 +67,7 @@ impl Mesh {
     /// # Errors
     /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`].
     pub fn flip(&mut self, u: VertexId, v: VertexId) -> Result<(), EditError> {
-        let Opposite { left: a, right: b } = self.opposite(u, v)?;
+        let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
         if self.ring(a).contains(b) {
             return Err(EditError::Adjacent(a, b));
         }
@@ -89,11 +89,11 @@ impl Mesh {
     ///
     /// # Errors
     /// As [`Mesh::collapse`].
-    pub fn can_collapse(&self, u: VertexId, v: VertexId) -> Result<Opposite, EditError> {
-        let opposite = self.opposite(u, v)?;
+    pub fn can_collapse(&self, u: VertexId, v: VertexId) -> Result<OppositeVertices, EditError> {
+        let opposite = self.opposite_vertices(u, v)?;
         let common = self.common_neighbours(u, v);
         if let Some(&o) = common.iter().find(|&&w| w != opposite.left && w != opposite.right) {
-            return Err(EditError::NeckInTheWay(o));
+            return Err(EditError::LinkCondition(o));
         }
         for end in [opposite.left, opposite.right] {
             if self.ring(end).valence() <= 3 {
@@ -106,10 +106,10 @@ impl Mesh {
     /// Collapses the edge `uv`: deletes `v` and moves `u` to `position` (the paper's deletion).
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::NeckInTheWay`] if `u` and `v` have more than two common neighbours;
+    /// [`EditError::NotAnEdge`]; [`EditError::LinkCondition`] if `u` and `v` have more than two common neighbours;
     /// [`EditError::ValenceTooLow`] if a vertex opposite the edge has three neighbours only, as on a tetrahedron.
     pub fn collapse(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<(), EditError> {
-        let Opposite { left: a, right: b } = self.can_collapse(u, v)?;
+        let OppositeVertices { left: a, right: b } = self.can_collapse(u, v)?;
         self.touch(u);
         self.attributes.blend(u, u, v, 0.5);
         self.positions[u.index()] = position;

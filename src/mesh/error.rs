@@ -20,13 +20,13 @@ pub enum MeshError {
         problem: String,
     },
     /// The mesh intersects itself, but an embedded surface is required.
-    #[error("the mesh crosses itself: {pairs} pairs of triangles; an embedded one is needed")]
+    #[error("the mesh intersects itself ({pairs} pairs of triangles); an embedded mesh is required")]
     SelfIntersecting {
         /// The number of intersecting pairs of triangles.
         pairs: usize,
     },
     /// The mesh needs more memory than is available.
-    #[error("the mesh needs {bytes} bytes, more than there is")]
+    #[error("the mesh needs {bytes} bytes, more than is available")]
     TooLarge {
         /// The memory required, in bytes.
         bytes: u64,
@@ -37,28 +37,28 @@ pub enum MeshError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
     /// The two vertices are not adjacent.
-    #[error("{0:?} and {1:?} are not joined by an edge")]
+    #[error("{0:?} and {1:?} are not adjacent")]
     NotAnEdge(VertexId, VertexId),
     /// The two vertices are already adjacent, or are the same vertex.
-    #[error("{0:?} and {1:?} are joined already")]
+    #[error("{0:?} and {1:?} are already adjacent")]
     Adjacent(VertexId, VertexId),
     /// The edit would leave this vertex with fewer than three neighbours.
     #[error("{0:?} would be left with fewer than three neighbours")]
     ValenceTooLow(VertexId),
     /// The ends of the edge have this common neighbour besides the two opposite vertices, so that a collapse would
     /// pinch a neck (link condition).
-    #[error("{0:?} closes a ring of three edges that is no triangle")]
-    NeckInTheWay(VertexId),
+    #[error("link condition violated: {0:?} is a common neighbour but not opposite the edge")]
+    LinkCondition(VertexId),
     /// The three edges to cut bound a triangle of the surface.
-    #[error("the ring of three edges is a triangle of the surface")]
+    #[error("the three edges bound a triangle of the surface")]
     IsTriangle,
     /// This vertex is not a corner of a component of four vertices.
-    #[error("{0:?} is not a corner of a lone tetrahedron")]
+    #[error("{0:?} is not a corner of an isolated tetrahedron")]
     NotATetrahedron(VertexId),
     /// The edit would make the mesh intersect itself.
-    #[error("triangles would cross")]
-    WouldCross,
+    #[error("the edit would make the mesh intersect itself")]
+    WouldSelfIntersect,
     /// No vertex ids are left.
-    #[error("the mesh holds as many vertices as it can name")]
+    #[error("no vertex ids are left")]
     Full,
 }

@@ -17,10 +17,10 @@ use std::collections::BinaryHeap;
 /// The maximum number of times that a vertex propagates its distance. Usually it is one, and at most three on ordinary
 /// surfaces; among needle triangles, two vertices could reduce each other's distance by ever smaller amounts almost
 /// endlessly.
-const MOST_SPREADS: u8 = 30;
+const MAX_PROPAGATIONS: u8 = 30;
 
 /// The relative decrease of a distance below which it counts as rounding error and is not propagated.
-const LEAST_GAIN: f64 = 1e-12;
+const MIN_RELATIVE_DECREASE: f64 = 1e-12;
 
 /// Returns the geodesic distance from vertex `from` to every vertex, in the length unit of the mesh; infinite if they
 /// are not connected.
@@ -32,15 +32,15 @@ const LEAST_GAIN: f64 = 1e-12;
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] if there is no vertex `from`.
-pub fn geodesic(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
+pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
     let vertices = mesh.positions.len();
     if from as usize >= vertices {
-        let problem = format!("{from}; there are {vertices} vertices, from 0 on");
+        let problem = format!("must be below the number of vertices ({vertices}), got {from}");
         return Err(MeshError::InvalidArgument { parameter: "fromVertex", problem });
     }
     let mut front = Front::new(mesh, from as usize);
     while let Some(v) = front.pop() {
-        front.spread(v);
+        front.propagate(v);
     }
     Ok(front.distances)
 }
@@ -48,11 +48,11 @@ pub fn geodesic(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
 /// The state of the propagation: tentative distances, and a queue of vertices whose distance is to be propagated.
 struct Front<'a> {
     positions: &'a [Vec3],
-    fans: Fans,
+    links: Links,
     origin: DVec3,
     distances: Vec<f64>,
     /// By vertex, how often it has propagated its distance.
-    spreads: Vec<u8>,
+    propagations: Vec<u8>,
     /// Distances as bits, which are ordered like the positive numbers they represent, and vertices; ties go to the
     /// lower index.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
@@ -65,10 +65,10 @@ impl<'a> Front<'a> {
         distances[from] = 0.0;
         Self {
             positions,
-            fans: Fans::new(mesh),
+            links: Links::new(mesh),
             origin: positions[from].as_dvec3(),
             distances,
-            spreads: vec![0; positions.len()],
+            propagations: vec![0; positions.len()],
             queue: BinaryHeap::from([Reverse((0, from as u32))]),
         }
     }
@@ -78,8 +78,8 @@ impl<'a> Front<'a> {
         while let Some(Reverse((bits, v))) = self.queue.pop() {
             let v = v as usize;
             let is_current = self.distances[v].to_bits() == bits;
-            if is_current && self.spreads[v] < MOST_SPREADS {
-                self.spreads[v] += 1;
+            if is_current && self.propagations[v] < MAX_PROPAGATIONS {
+                self.propagations[v] += 1;
                 return Some(v);
             }
         }
@@ -87,17 +87,17 @@ impl<'a> Front<'a> {
     }
 
     /// Propagates the distance of `v` to the other corners of the triangles around it.
-    fn spread(&mut self, v: usize) {
-        for k in self.fans.range(v) {
-            let [a, b] = self.fans.edges[k].map(|w| w as usize);
-            self.offer(a, self.way(v, b, a));
-            self.offer(b, self.way(v, a, b));
+    fn propagate(&mut self, v: usize) {
+        for k in self.links.range(v) {
+            let [a, b] = self.links.edges[k].map(|w| w as usize);
+            self.relax(a, self.path_length(v, b, a));
+            self.relax(b, self.path_length(v, a, b));
         }
     }
 
     /// Returns the distance of `c` by paths along the edges of the triangle `a b c` or through it, from the distances
     /// of `a` and `b`.
-    fn way(&self, a: usize, b: usize, c: usize) -> f64 {
+    fn path_length(&self, a: usize, b: usize, c: usize) -> f64 {
         let [p, q, r] = [a, b, c].map(|v| self.positions[v].as_dvec3());
         let (to_a, to_b) = (self.distances[a], self.distances[b]);
         let along_edges = (to_a + p.distance(r)).min(to_b + q.distance(r));
@@ -106,9 +106,9 @@ impl<'a> Front<'a> {
         through.map_or(along_edges, |d| d.min(along_edges)).max(r.distance(self.origin))
     }
 
-    fn offer(&mut self, v: usize, distance: f64) {
+    fn relax(&mut self, v: usize, distance: f64) {
         let old = self.distances[v];
-        if distance < old && (old == f64::INFINITY || old - distance > LEAST_GAIN * old) {
+        if distance < old && (old == f64::INFINITY || old - distance > MIN_RELATIVE_DECREASE * old) {
             self.distances[v] = distance;
             self.queue.push(Reverse((distance.to_bits(), v as u32)));
         }
@@ -137,12 +137,12 @@ fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64
 }
 
 /// For each vertex, the edges opposite it in its triangles.
-struct Fans {
+struct Links {
     starts: Vec<u32>,
     edges: Vec<[u32; 2]>,
 }
 
-impl Fans {
+impl Links {
     fn new(mesh: &TriangleMesh) -> Self {
         let mut starts = vec![0; mesh.positions.len() + 1];
         for &v in mesh.triangles.as_flattened() {
@@ -184,7 +184,7 @@ mod tests {
     fn off_on_ball(mesh: &TriangleMesh, from: u32) -> [f64; 2] {
         let start = mesh.positions[from as usize].as_dvec3();
         let arc = |p: &Vec3| libm::atan2(start.cross(p.as_dvec3()).length(), start.dot(p.as_dvec3()));
-        off(&geodesic(mesh, from).unwrap(), mesh.positions.iter().map(arc))
+        off(&geodesic_distances(mesh, from).unwrap(), mesh.positions.iter().map(arc))
     }
 
     #[test]
@@ -224,7 +224,7 @@ mod tests {
     fn plate(size: Vec3, cells: u32, shake: f32) -> TriangleMesh {
         let mut soup = TriangleMesh::default();
         for [p, q, r, s] in shapes::cuboid_faces(size) {
-            let place = |i: u32, j: u32| {
+            let position = |i: u32, j: u32| {
                 let is_inner = |k: u32| k > 0 && k < cells;
                 let wobble =
                     if is_inner(i) && is_inner(j) { shift(i * 1000 + j) * shake } else { Vec3::ZERO };
@@ -232,7 +232,8 @@ mod tests {
                 p + (q - p) * x + (s - p) * y + (r - q + p - s) * (x * y)
             };
             for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
-                let corners = [place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)];
+                let corners =
+                    [position(i, j), position(i + 1, j), position(i + 1, j + 1), position(i, j + 1)];
                 let first = soup.positions.len() as u32;
                 soup.positions.extend(corners);
                 soup.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|v| v + first)));
@@ -241,15 +242,15 @@ mod tests {
         soup.welded()
     }
 
-    fn vertex_at(mesh: &TriangleMesh, place: Vec3) -> u32 {
-        mesh.positions.iter().position(|&p| p.distance(place) < 1e-5).unwrap() as u32
+    fn vertex_at(mesh: &TriangleMesh, position: Vec3) -> u32 {
+        mesh.positions.iter().position(|&p| p.distance(position) < 1e-5).unwrap() as u32
     }
 
     #[test]
     fn exact_on_the_faces_of_a_plate() {
         for shake in [0.0, 0.2, 0.35] {
             let mesh = plate(Vec3::new(4.0, 4.0, 0.5), 12, shake);
-            let found = geodesic(&mesh, vertex_at(&mesh, Vec3::ZERO)).unwrap();
+            let found = geodesic_distances(&mesh, vertex_at(&mesh, Vec3::ZERO)).unwrap();
             for (p, d) in mesh.positions.iter().zip(&found) {
                 // From a corner, shortest paths are straight on three faces; to the opposite face they cross one of two
                 // edges.
@@ -276,12 +277,12 @@ mod tests {
         let (major, minor) = (3.0, 1.0);
         let mesh = shapes::torus(major, minor, 240, 80);
         // Around the tube from the outer equator, and along the inner equator as far as it is the shortest path.
-        let found = geodesic(&mesh, 0).unwrap();
+        let found = geodesic_distances(&mesh, 0).unwrap();
         for j in 0..80_u32 {
             let expected = std::f64::consts::TAU * minor * f64::from(j.min(80 - j)) / 80.0;
             assert!((found[j as usize] - expected).abs() < 0.005, "{} for {expected}", found[j as usize]);
         }
-        let inner = geodesic(&mesh, 40).unwrap();
+        let inner = geodesic_distances(&mesh, 40).unwrap();
         for i in 0..60_u32 {
             let expected = std::f64::consts::TAU * (major - minor) * f64::from(i) / 240.0;
             let found = inner[(i * 80 + 40) as usize];
@@ -307,12 +308,12 @@ mod tests {
         for seed in 0..60 {
             let mut mesh = shapes::soup(seed, 80, 4);
             mesh.positions.iter_mut().for_each(|p| *p *= [1e-20, 1.0, 1e18][seed as usize % 3]);
-            let found = geodesic(&mesh, 3).unwrap();
+            let found = geodesic_distances(&mesh, 3).unwrap();
             assert!(found.iter().all(|d| !d.is_nan()) && found[3] == 0.0);
             assert!(is_between_bounds(&mesh, 3, &found), "{seed}");
         }
         for mesh in [shapes::torus(3.0, 1.0, 50, 20), plate(Vec3::new(5.0, 1.0, 0.01), 9, 0.35)] {
-            assert!(is_between_bounds(&mesh, 7, &geodesic(&mesh, 7).unwrap()));
+            assert!(is_between_bounds(&mesh, 7, &geodesic_distances(&mesh, 7).unwrap()));
         }
     }
 
@@ -322,14 +323,14 @@ mod tests {
         for (i, p) in mesh.positions.iter_mut().enumerate() {
             *p = Vec3::new(p.x * 1e3, p.y, p.z * 1e-2) + shift(i as u32) * 0.04;
         }
-        let found = geodesic(&mesh, 0).unwrap();
+        let found = geodesic_distances(&mesh, 0).unwrap();
         assert!(is_between_bounds(&mesh, 0, &found));
     }
 
     #[test]
     fn other_components_are_infinitely_far() {
         let mesh = shapes::joined(&[shapes::icosahedron(), shapes::cuboid(Vec3::splat(9.0))]);
-        let found = geodesic(&mesh, 13).unwrap();
+        let found = geodesic_distances(&mesh, 13).unwrap();
         assert!(found[..12].iter().all(|&d| d == f64::INFINITY));
         assert!(found[12..].iter().all(|&d| d < 30.0));
     }
@@ -337,7 +338,7 @@ mod tests {
     #[test]
     fn no_such_vertex() {
         for (mesh, from) in [(shapes::icosahedron(), 12), (TriangleMesh::default(), 0)] {
-            let refusal = geodesic(&mesh, from).unwrap_err();
+            let refusal = geodesic_distances(&mesh, from).unwrap_err();
             assert!(matches!(refusal, MeshError::InvalidArgument { parameter: "fromVertex", .. }));
         }
     }

@@ -34,7 +34,7 @@ enum SlotChange {
 }
 
 /// A list of triangles by their corners, each starting at its lowest id.
-pub type Triangles = SmallVec<[[VertexId; 3]; 16]>;
+pub type TriangleCorners = SmallVec<[[VertexId; 3]; 16]>;
 
 impl Mesh {
     /// Starts to record edits, until [`Mesh::commit`] keeps them or [`Mesh::roll_back`] undoes them.
@@ -92,15 +92,15 @@ impl Mesh {
 
     /// Iterates over the vertices touched by edits since [`Mesh::begin`]: those moved, created or deleted, and those
     /// whose one-ring changed.
-    pub fn touched(&self) -> impl Iterator<Item = VertexId> + '_ {
+    pub fn touched_vertices(&self) -> impl Iterator<Item = VertexId> + '_ {
         let made = (self.journal.slots..self.slots()).map(VertexId::from_index);
         self.journal.touched.iter().map(|was| was.vertex).chain(made)
     }
 
     /// Returns the triangles that edits since [`Mesh::begin`] created or moved, each once, for the tests of collision
     /// handling.
-    pub fn changed_triangles(&self) -> Triangles {
-        let mut found = Triangles::new();
+    pub fn changed_triangles(&self) -> TriangleCorners {
+        let mut found = TriangleCorners::new();
         for was in &self.journal.touched {
             let ring = self.ring(was.vertex);
             let all = was.ring.is_empty() || was.position != self.position(was.vertex);
@@ -154,8 +154,8 @@ impl Mesh {
     }
 
     /// Returns the triangles that have a corner in `vertices`, each once.
-    pub fn triangles_at(&self, vertices: &[VertexId]) -> Triangles {
-        let mut found: Triangles = vertices
+    pub fn triangles_at(&self, vertices: &[VertexId]) -> TriangleCorners {
+        let mut found: TriangleCorners = vertices
             .iter()
             .flat_map(|&v| self.ring(v).pairs().map(move |(a, b)| from_lowest([v, a, b])))
             .collect();

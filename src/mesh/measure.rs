@@ -1,8 +1,8 @@
 //! Geometric and topological measures of a triangle list, summed in `f64` in the order of the triangles.
 
 use super::TriangleMesh;
-use super::edge_table::{EdgeUse, by_edge, edge_uses};
-use super::groups::Groups;
+use super::disjoint_sets::DisjointSets;
+use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use crate::math::{DMat3, DVec3};
 
 /// Geometric and topological measures of a mesh, in the length unit of its positions.
@@ -49,9 +49,9 @@ pub struct Measures {
 ///
 /// All measures of a mesh without triangles are zero. Triangles with an invalid index are ignored.
 pub fn measure(mesh: &TriangleMesh) -> Measures {
-    let sound = mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
-    let triangles: Vec<[u32; 3]> = sound.copied().collect();
-    let uses = edge_uses(&triangles);
+    let valid = mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
+    let triangles: Vec<[u32; 3]> = valid.copied().collect();
+    let uses = sorted_half_edges(&triangles);
     let used = used_vertices(mesh.positions.len(), &triangles);
     let corners = || triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize].as_dvec3()));
 
@@ -91,8 +91,8 @@ fn bounds(mut points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
     points.fold([first; 2], |[low, high], p| [low.min(p), high.max(p)])
 }
 
-fn components(uses: &[EdgeUse], triangles: usize) -> usize {
-    let mut groups = Groups::new(triangles);
+fn components(uses: &[HalfEdge], triangles: usize) -> usize {
+    let mut groups = DisjointSets::new(triangles);
     groups.join_across_edges(uses);
     groups.count()
 }
@@ -143,7 +143,7 @@ struct Edges {
     max: f64,
 }
 
-fn edges(uses: &[EdgeUse], position: impl Fn(u32) -> DVec3) -> Edges {
+fn edges(uses: &[HalfEdge], position: impl Fn(u32) -> DVec3) -> Edges {
     let lengths = by_edge(uses).map(|edge| {
         let [u, v] = edge[0].ends();
         position(u).distance(position(v))
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_unused_vertices_and_nothing() {
+    fn components_unused_vertices_and_empty_mesh() {
         let two = shapes::joined(&[shapes::torus(3.0, 1.0, 12, 8), shapes::cuboid(Vec3::ONE)]);
         let m = measure(&two);
         assert_eq!((m.components, m.euler, m.genus), (2, 2, 1));

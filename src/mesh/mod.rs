@@ -13,22 +13,22 @@
 mod attributes;
 mod build;
 mod check;
-mod compact;
+mod component_volumes;
 mod components;
-mod crossing;
 mod curvature;
+mod disjoint_sets;
 mod edge_table;
 mod edits;
 mod error;
 mod geodesic;
-mod groups;
 mod ids;
 mod journal;
 mod measure;
-mod parts;
 mod refine;
+mod renumber;
 mod report;
 mod ring;
+mod self_intersections;
 #[cfg(test)]
 pub(crate) mod shapes;
 mod surgery;
@@ -38,19 +38,19 @@ mod tube;
 mod weld;
 
 pub use attributes::{ScalarKey, VectorKey};
-pub use check::Flaw;
-pub use crossing::{Facet, count_crossings, crossing_pairs, facets_cross};
+pub use check::InvariantViolation;
 pub use curvature::{Curvature, curvature};
-pub use edits::Opposite;
+pub(crate) use disjoint_sets::DisjointSets;
+pub use edits::OppositeVertices;
 pub use error::{EditError, MeshError};
-pub use geodesic::geodesic;
-pub(crate) use groups::Groups;
+pub use geodesic::geodesic_distances;
 pub use ids::VertexId;
-pub use journal::Triangles;
+pub use journal::TriangleCorners;
 pub use measure::{Measures, measure};
 pub use report::{MeshReport, report};
 pub use ring::Ring;
-pub use surgery::{Cut, Joint};
+pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};
+pub use surgery::{Cut, TubeRims};
 pub use texture::{ImageKind, Texture};
 pub use triangles::TriangleMesh;
 
@@ -122,7 +122,7 @@ impl Mesh {
 
     /// Advances both version counters beyond those of `replaced`, the mesh that this one replaces, so that caches built
     /// for the old mesh are invalidated.
-    pub fn count_on_from(&mut self, replaced: &Self) {
+    pub fn advance_versions_past(&mut self, replaced: &Self) {
         self.topology_version = replaced.topology_version.wrapping_add(1);
         self.geometry_version = replaced.geometry_version.wrapping_add(1);
     }
@@ -299,7 +299,7 @@ impl Mesh {
         VertexId::from_index(self.rings.len() - 1)
     }
 
-    fn has_room_for(&self, vertices: usize) -> bool {
+    fn has_ids_for(&self, vertices: usize) -> bool {
         self.slots().saturating_add(vertices) < u32::MAX as usize
     }
 

@@ -11,7 +11,7 @@ impl Mesh {
     /// [`MeshError::TooLarge`] if the result would have more vertices than there are ids.
     pub fn refine(&mut self) -> Result<(), MeshError> {
         let old = self.slots();
-        if !self.has_room_for(self.triangle_count()) {
+        if !self.has_ids_for(self.triangle_count()) {
             let bytes = (self.triangle_count() as u64).saturating_mul(std::mem::size_of::<Ring>() as u64);
             return Err(MeshError::TooLarge { bytes });
         }

@@ -1,10 +1,10 @@
 //! Validation of a triangle list from its arrays alone, independent of the dynamic mesh; one function per invariant.
 
-use super::crossing::count_crossings;
-use super::edge_table::{EdgeUse, by_edge, edge_uses};
-use super::groups::Groups;
+use super::disjoint_sets::DisjointSets;
+use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
+use super::self_intersections::count_self_intersections;
 use super::{MeshError, TriangleMesh};
-use crate::math::order::{by_both, sort_by_rank};
+use crate::math::order::{combined_rank, sort_by_rank};
 use crate::math::predicates::collinear;
 
 /// The result of validating a mesh; see [`Self::is_healthy`].
@@ -23,7 +23,7 @@ pub struct MeshReport {
     /// The number of triangles with two equal corners or collinear corners, tested exactly.
     pub degenerate_triangles: usize,
     /// The number of pairs of triangles that intersect beyond their common corners and edges, tested exactly; see
-    /// [`crossing_pairs`](super::crossing_pairs).
+    /// [`intersecting_pairs`](super::intersecting_pairs).
     pub self_intersections: usize,
 }
 
@@ -46,29 +46,29 @@ impl MeshReport {
 /// that is not finite.
 pub fn report(mesh: &TriangleMesh) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
-    let uses = edge_uses(&mesh.triangles);
+    let uses = sorted_half_edges(&mesh.triangles);
     Ok(MeshReport {
         closed: is_closed(&uses),
         oriented: is_oriented(&uses),
         non_manifold_edges: non_manifold_edges(&uses),
         non_manifold_vertices: non_manifold_vertices(mesh),
         degenerate_triangles: degenerate_triangles(mesh),
-        self_intersections: count_crossings(mesh),
+        self_intersections: count_self_intersections(mesh),
     })
 }
 
-fn is_closed(uses: &[EdgeUse]) -> bool {
+fn is_closed(uses: &[HalfEdge]) -> bool {
     by_edge(uses).all(|edge| edge.len() != 1)
 }
 
-fn is_oriented(uses: &[EdgeUse]) -> bool {
+fn is_oriented(uses: &[HalfEdge]) -> bool {
     by_edge(uses).all(|edge| {
         let forward = edge.iter().filter(|u| u.forward).count();
         forward.abs_diff(edge.len() - forward) <= edge.len() % 2
     })
 }
 
-fn non_manifold_edges(uses: &[EdgeUse]) -> usize {
+fn non_manifold_edges(uses: &[HalfEdge]) -> usize {
     by_edge(uses).filter(|edge| edge.len() > 2).count()
 }
 
@@ -92,13 +92,13 @@ struct LinkEdge {
 
 /// Returns the link edges of all vertices, sorted by vertex.
 fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
-    let sound = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
-    let mut links: Vec<_> = sound
+    let valid = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
+    let mut links: Vec<_> = valid
         .flat_map(|&[a, b, c]| {
             [(a, b, c), (b, c, a), (c, a, b)].map(|(vertex, from, to)| LinkEdge { vertex, from, to })
         })
         .collect();
-    sort_by_rank(&mut links, |link| by_both(link.from, link.to));
+    sort_by_rank(&mut links, |link| combined_rank(link.from, link.to));
     sort_by_rank(&mut links, |link| link.vertex.into());
     links
 }
@@ -108,18 +108,18 @@ fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
     let mut ends: Vec<(u64, u32)> =
         link.iter().zip(0..).flat_map(|(edge, i)| [(edge.from.into(), i), (edge.to.into(), i)]).collect();
     ends.sort_unstable();
-    let mut groups = Groups::new(link.len());
+    let mut groups = DisjointSets::new(link.len());
     let mut valence_ok = true;
     for at_vertex in ends.chunk_by(|a, b| a.0 == b.0) {
         valence_ok &= at_vertex.len() <= 2;
-        at_vertex.windows(2).for_each(|pair| groups.join(pair[0].1 as usize, pair[1].1 as usize));
+        at_vertex.windows(2).for_each(|pair| groups.union(pair[0].1 as usize, pair[1].1 as usize));
     }
     valence_ok && groups.count() == 1
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::crossing_pairs;
+    use super::super::intersecting_pairs;
     use super::super::shapes;
     use super::*;
     use crate::math::Vec3;
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused() {
+    fn invalid_input_is_rejected() {
         let mut mesh = corner_tetrahedron();
         mesh.triangles[2][1] = 4;
         let MeshError::InvalidArgument { parameter, problem } = report(&mesh).unwrap_err() else { panic!() };
@@ -207,11 +207,11 @@ mod tests {
         mesh.positions[3].y = f32::NAN;
         let MeshError::InvalidArgument { parameter, .. } = report(&mesh).unwrap_err() else { panic!() };
         assert_eq!(parameter, "positions");
-        assert_eq!(crossing_pairs(&mesh), [[0_u32; 2]; 0]);
+        assert_eq!(intersecting_pairs(&mesh), [[0_u32; 2]; 0]);
     }
 
     #[test]
-    fn crossing_tetrahedra_counted_by_hand() {
+    fn intersecting_tetrahedra_counted_by_hand() {
         // The tip of a thin spike is inside a large tetrahedron and passes only through its base z = 0. Three sides of
         // the spike intersect the base; nothing else is near.
         let large = tetrahedron([
@@ -227,13 +227,13 @@ mod tests {
             Vec3::new(0.0, 0.0, 1.0),
         ]);
         let mesh = shapes::joined(&[large.clone(), spike.clone()]);
-        assert_eq!(crossing_pairs(&mesh), [[0, 5], [0, 6], [0, 7]]);
+        assert_eq!(intersecting_pairs(&mesh), [[0, 5], [0, 6], [0, 7]]);
         assert_eq!(report(&mesh).unwrap(), MeshReport { self_intersections: 3, ..healthy() });
         // With the tip exactly on the base, its three sides touch the base; slightly below, nothing does.
         for (tip, pairs) in [(0.0, 3), (-1.0e-30, 0)] {
             let mut lower = spike.clone();
             lower.positions[3].z = tip;
-            assert_eq!(crossing_pairs(&shapes::joined(&[large.clone(), lower])).len(), pairs, "{tip}");
+            assert_eq!(intersecting_pairs(&shapes::joined(&[large.clone(), lower])).len(), pairs, "{tip}");
         }
     }
 
@@ -243,7 +243,7 @@ mod tests {
         let shifted = |x: f32| {
             let mut other = cube.clone();
             other.positions.iter_mut().for_each(|p| p.x += x);
-            crossing_pairs(&shapes::joined(&[cube.clone(), other])).len()
+            intersecting_pairs(&shapes::joined(&[cube.clone(), other])).len()
         };
         assert_eq!(shifted(1.0 + f32::EPSILON), 0);
         assert!(shifted(1.0) >= 4);
@@ -257,11 +257,11 @@ mod tests {
             triangles: vec![[0, 1, 2], [1, 0, 3]],
             ..Default::default()
         };
-        assert_eq!(crossing_pairs(&mesh), [[0, 1]]);
+        assert_eq!(intersecting_pairs(&mesh), [[0, 1]]);
         mesh.triangles = vec![[0, 1, 2], [2, 1, 3]];
-        assert_eq!(crossing_pairs(&mesh), [[0_u32; 2]; 0]);
+        assert_eq!(intersecting_pairs(&mesh), [[0_u32; 2]; 0]);
         mesh.triangles = vec![[0, 1, 2], [0, 2, 1]];
-        assert_eq!(crossing_pairs(&mesh), [[0, 1]]);
+        assert_eq!(intersecting_pairs(&mesh), [[0, 1]]);
     }
 
     #[test]
@@ -273,14 +273,14 @@ mod tests {
                 for s in 0..t {
                     let pair = [mesh.triangles[s as usize], mesh.triangles[t as usize]];
                     let two = TriangleMesh { triangles: pair.to_vec(), ..mesh.clone() };
-                    if !crossing_pairs(&two).is_empty() {
+                    if !intersecting_pairs(&two).is_empty() {
                         expected.push([s, t]);
                     }
                 }
             }
             expected.sort_unstable();
             assert!(!expected.is_empty());
-            assert_eq!(crossing_pairs(&mesh), expected, "seed {seed}");
+            assert_eq!(intersecting_pairs(&mesh), expected, "seed {seed}");
         }
     }
 
@@ -294,8 +294,8 @@ mod tests {
             Vec3::new(0.0, 3.0e38, 0.0),
         ]);
         mesh.triangles.push([n, n + 1, n + 2]);
-        let crossing = crossing_pairs(&mesh);
-        assert!(!crossing.is_empty() && crossing.len() < 1000, "{}", crossing.len());
-        assert!(crossing.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
+        let intersecting = intersecting_pairs(&mesh);
+        assert!(!intersecting.is_empty() && intersecting.len() < 1000, "{}", intersecting.len());
+        assert!(intersecting.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
     }
 }

@@ -108,9 +108,9 @@ impl Ring {
         }
     }
 
-    pub(super) fn rename(&mut self, name: impl Fn(VertexId) -> VertexId) {
+    pub(super) fn renumber(&mut self, new_id: impl Fn(VertexId) -> VertexId) {
         for v in &mut self.0 {
-            *v = name(*v);
+            *v = new_id(*v);
         }
     }
 }

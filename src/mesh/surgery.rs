@@ -16,7 +16,7 @@ pub struct Cut {
 
 /// The two rims that [`Mesh::join`] connected by a tube.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Joint {
+pub struct TubeRims {
     /// The vertices of the rim around the first centre, in the order of its ring.
     pub first: Vec<VertexId>,
     /// The vertices of the rim around the second centre, in the order of its ring.
@@ -34,12 +34,12 @@ impl Mesh {
     /// [`EditError::Full`].
     pub fn cut(&mut self, u: VertexId, v: VertexId, o: VertexId) -> Result<Cut, EditError> {
         for (a, b) in [(u, v), (v, o), (o, u)] {
-            let opposite = self.opposite(a, b)?;
+            let opposite = self.opposite_vertices(a, b)?;
             if [u, v, o].contains(&opposite.left) || [u, v, o].contains(&opposite.right) {
                 return Err(EditError::IsTriangle);
             }
         }
-        if !self.has_room_for(3) {
+        if !self.has_ids_for(3) {
             return Err(EditError::Full);
         }
         let kept = [u, v, o];
@@ -49,7 +49,7 @@ impl Mesh {
             copy
         });
         for k in 0..3 {
-            self.part_ring(kept, copies, k);
+            self.split_ring(kept, copies, k);
         }
         self.half_edges += 6;
         self.euler += 2;
@@ -58,7 +58,7 @@ impl Mesh {
     }
 
     /// Splits the ring of corner `k` of a cut: the original keeps the left half, the copy gets the right half.
-    fn part_ring(&mut self, kept: [VertexId; 3], copies: [VertexId; 3], k: usize) {
+    fn split_ring(&mut self, kept: [VertexId; 3], copies: [VertexId; 3], k: usize) {
         let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
         let ring = self.ring(kept[k]);
         let left = ring.between(kept[next], kept[previous]);
@@ -83,7 +83,7 @@ impl Mesh {
     /// # Errors
     /// [`EditError::Adjacent`] if `u` and `v` are adjacent or the same; [`EditError::NotAnEdge`] if either is not live;
     /// [`EditError::Full`].
-    pub fn join(&mut self, u: VertexId, v: VertexId, reach: f32) -> Result<Joint, EditError> {
+    pub fn join(&mut self, u: VertexId, v: VertexId, reach: f32) -> Result<TubeRims, EditError> {
         for w in [u, v] {
             if !self.is_live(w) {
                 return Err(EditError::NotAnEdge(u, v));
@@ -93,16 +93,16 @@ impl Mesh {
             return Err(EditError::Adjacent(u, v));
         }
         let corners = self.ring(u).valence() + self.ring(v).valence();
-        if !self.has_room_for(corners) {
+        if !self.has_ids_for(corners) {
             return Err(EditError::Full);
         }
-        let first = self.open_disc(u, reach);
-        let second = self.open_disc(v, reach);
-        self.close_tube(&first, &second);
+        let first = self.open_hole(u, reach);
+        let second = self.open_hole(v, reach);
+        self.connect_rims(&first, &second);
         self.half_edges += 6 * corners;
         self.euler -= 2;
         self.topology_changed();
-        Ok(Joint { first, second })
+        Ok(TubeRims { first, second })
     }
 
     /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim in
@@ -114,10 +114,10 @@ impl Mesh {
     ///      \  /       ->        r1---r0       rim vertex ri is joined to ni and n(i+1)
     ///     centre                  hole
     /// ```
-    fn open_disc(&mut self, centre: VertexId, reach: f32) -> Vec<VertexId> {
+    fn open_hole(&mut self, centre: VertexId, reach: f32) -> Vec<VertexId> {
         let spokes: Vec<VertexId> = self.ring(centre).as_slice().to_vec();
         let from = self.position(centre);
-        let rim: Vec<VertexId> = spokes.iter().map(|&w| self.spoke_point(centre, from, w, reach)).collect();
+        let rim: Vec<VertexId> = spokes.iter().map(|&w| self.rim_vertex(centre, from, w, reach)).collect();
         let n = rim.len();
         for i in 0..n {
             let (next, previous) = ((i + 1) % n, (i + n - 1) % n);
@@ -128,27 +128,27 @@ impl Mesh {
         rim
     }
 
-    fn spoke_point(&mut self, centre: VertexId, from: Vec3, w: VertexId, reach: f32) -> VertexId {
+    fn rim_vertex(&mut self, centre: VertexId, from: Vec3, w: VertexId, reach: f32) -> VertexId {
         let point = self.allocate(from + (self.position(w) - from) * reach);
         self.attributes.blend(point, centre, w, reach);
         point
     }
 
     /// Connects two rims by the tube of least total squared edge length.
-    fn close_tube(&mut self, first: &[VertexId], second: &[VertexId]) {
+    fn connect_rims(&mut self, first: &[VertexId], second: &[VertexId]) {
         let at = |rim: &[VertexId]| rim.iter().map(|&w| self.position(w)).collect::<Vec<_>>();
         let tube = shortest_tube(&at(first), &at(second));
         for i in 0..first.len() {
-            // met_by_first yields decreasing j; each is inserted right after `next`, which reverses them into ring
-            // order.
-            let met: Vec<VertexId> = tube.met_by_first(i).map(|j| second[j]).collect();
+            // `connected_to_first` yields decreasing j; each is inserted right after `next`, which reverses them into
+            // ring order.
+            let met: Vec<VertexId> = tube.connected_to_first(i).map(|j| second[j]).collect();
             for &s in &met {
                 let next = first[(i + 1) % first.len()];
                 self.ring_mut(first[i]).insert_after(next, s);
             }
         }
         for j in 0..second.len() {
-            let met: Vec<VertexId> = tube.met_by_second(j).map(|i| first[i]).collect();
+            let met: Vec<VertexId> = tube.connected_to_second(j).map(|i| first[i]).collect();
             for &r in met.iter().rev() {
                 let next = second[(j + 1) % second.len()];
                 self.ring_mut(second[j]).insert_after(next, r);

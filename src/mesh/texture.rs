@@ -54,7 +54,7 @@ impl Texture {
     /// [`MeshError::InvalidArgument`] if the bytes do not start like a PNG, JPEG or WebP file.
     pub fn new(bytes: Vec<u8>) -> Result<Self, MeshError> {
         let Some(kind) = ImageKind::of(&bytes) else {
-            let problem = "the bytes are of no image; PNG, JPEG and WebP are accepted".into();
+            let problem = "not a PNG, JPEG or WebP image".into();
             return Err(MeshError::InvalidArgument { parameter: "texture", problem });
         };
         Ok(Self { kind, bytes })

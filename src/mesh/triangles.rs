@@ -1,7 +1,7 @@
 //! Indexed triangle lists, as in files and GPU buffers.
 
-use super::edge_table::edge_uses;
-use super::groups::Groups;
+use super::disjoint_sets::DisjointSets;
+use super::edge_table::sorted_half_edges;
 use super::{MeshError, Texture};
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
 use std::sync::Arc;
@@ -38,17 +38,14 @@ impl TriangleMesh {
         let invalid = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
         if let Some(v) = self.positions.iter().position(|p| !p.is_finite()) {
-            return invalid(
-                "positions",
-                format!("vertex {v} is {}; finite numbers are accepted", self.positions[v]),
-            );
+            return invalid("positions", format!("vertex {v} must be finite, got {}", self.positions[v]));
         }
         let outside = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= vertices);
         if let Some(t) = self.triangles.iter().position(outside) {
             let named = self.triangles[t];
             return invalid(
                 "indices",
-                format!("triangle {t} is {named:?}; indices below {vertices} are accepted"),
+                format!("triangle {t} has an index that is not below {vertices}: {named:?}"),
             );
         }
         for (name, found, expected) in [
@@ -58,11 +55,11 @@ impl TriangleMesh {
             ("colors", self.colors.as_ref().map(Vec::len), vertices),
         ] {
             if let Some(found) = found.filter(|&found| found != expected) {
-                return invalid(name, format!("has {found} entries; {expected} are accepted"));
+                return invalid(name, format!("must have {expected} entries, got {found}"));
             }
         }
         if self.texture.is_some() && !self.has_uvs() {
-            return invalid("texture", "there are no texture coordinates; a texture needs uvs".into());
+            return invalid("texture", "a texture needs texture coordinates (uvs)".into());
         }
         Ok(())
     }
@@ -74,7 +71,7 @@ impl TriangleMesh {
 
     /// Replaces each texture coordinate v by 1 − v, rounded to single precision: converts between file formats whose
     /// images start at the lower edge and those whose images start at the upper edge.
-    pub(crate) fn turn_v_over(&mut self) {
+    pub(crate) fn flip_v(&mut self) {
         let turn = |uv: &mut Vec2| uv.y = 1.0 - uv.y;
         self.uvs.iter_mut().flatten().for_each(turn);
         self.corner_uvs.iter_mut().flatten().flatten().for_each(turn);
@@ -110,17 +107,21 @@ impl TriangleMesh {
     /// Components are connected through edges; a vertex where two of them touch is copied to both. Unused vertices are
     /// dropped.
     pub fn components(&self) -> Vec<Self> {
-        let mut groups = Groups::new(self.triangles.len());
-        groups.join_across_edges(&edge_uses(&self.triangles));
+        let mut groups = DisjointSets::new(self.triangles.len());
+        groups.join_across_edges(&sorted_half_edges(&self.triangles));
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.triangles.len()];
         (0..self.triangles.len()).for_each(|t| members[groups.find(t)].push(t));
         let mut slots = vec![u32::MAX; self.positions.len()];
-        members.iter().filter(|part| !part.is_empty()).map(|part| self.part(part, &mut slots)).collect()
+        members
+            .iter()
+            .filter(|component| !component.is_empty())
+            .map(|component| self.triangle_subset(component, &mut slots))
+            .collect()
     }
 
     /// Returns the given triangles as a mesh, its vertices numbered in order of first use. `slots` is scratch space,
     /// all `u32::MAX` before and after.
-    fn part(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
+    fn triangle_subset(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
         let mut used = Vec::new();
         let renumbered = |t: &usize| {
             self.triangles[*t].map(|v| {
@@ -134,13 +135,13 @@ impl TriangleMesh {
         };
         let renumbered = triangles.iter().map(renumbered).collect();
         used.iter().for_each(|&v| slots[v] = u32::MAX);
-        let part = self.gathered(&used);
+        let component = self.vertex_subset(&used);
         let corner_uvs = self.corner_uvs.as_ref().map(|uvs| triangles.iter().map(|&t| uvs[t]).collect());
-        Self { triangles: renumbered, corner_uvs, ..part }
+        Self { triangles: renumbered, corner_uvs, ..component }
     }
 
     /// Returns a mesh of the given vertices with their normals, texture coordinates and colours, without triangles.
-    pub(super) fn gathered(&self, vertices: &[usize]) -> Self {
+    pub(super) fn vertex_subset(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
             triangles: Vec::new(),
@@ -166,7 +167,7 @@ impl TriangleMesh {
     /// Returns texture coordinates per vertex, for formats without seams: at a seam those of one side are used, which
     /// distorts the texture on the triangles of the other sides. [`Self::split_at_seams`] avoids this with more
     /// vertices.
-    pub fn uvs_of_one_side(&self) -> Option<Vec<Vec2>> {
+    pub fn uvs_ignoring_seams(&self) -> Option<Vec<Vec2>> {
         let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
         let mut uvs = vec![Vec2::ZERO; self.positions.len()];
         for (&v, &uv) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()) {
@@ -193,7 +194,7 @@ impl TriangleMesh {
             vertices.push(v as usize);
             uvs.push(Vec2::new(f32::from_bits(x), f32::from_bits(y)));
         }
-        Self { triangles, uvs: Some(uvs), ..self.gathered(&vertices) }
+        Self { triangles, uvs: Some(uvs), ..self.vertex_subset(&vertices) }
     }
 }
 
@@ -230,10 +231,10 @@ mod tests {
         all.colors = Some(all.positions.clone());
         let found = all.components();
         assert_eq!(found.len(), 3);
-        for (part, expected) in found.iter().zip(&parts) {
-            part.validate().unwrap();
-            assert_eq!(part.colors.as_ref(), Some(&part.positions));
-            assert_eq!(measure(part), measure(expected));
+        for (component, expected) in found.iter().zip(&parts) {
+            component.validate().unwrap();
+            assert_eq!(component.colors.as_ref(), Some(&component.positions));
+            assert_eq!(measure(component), measure(expected));
         }
     }
 
@@ -251,6 +252,6 @@ mod tests {
         let MeshError::InvalidArgument { parameter, problem } = mesh.validate().unwrap_err() else {
             panic!()
         };
-        assert_eq!((parameter, problem.as_str()), ("uvs", "has 3 entries; 12 are accepted"));
+        assert_eq!((parameter, problem.as_str()), ("uvs", "must have 12 entries, got 3"));
     }
 }

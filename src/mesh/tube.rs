@@ -13,12 +13,12 @@ pub(super) struct Tube {
 
 impl Tube {
     /// Returns the corners of the second polygon connected to corner `i` of the first, in the order of the walk.
-    pub(super) fn met_by_first(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn connected_to_first(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(a, _)| a == i).map(|(_, j)| j)
     }
 
     /// Returns the corners of the first polygon connected to corner `j` of the second, in the order of the walk.
-    pub(super) fn met_by_second(&self, j: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn connected_to_second(&self, j: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(_, b)| b == j).map(|(i, _)| i)
     }
 
@@ -36,21 +36,21 @@ impl Tube {
 
 /// The minimum number of times that a walk switches between the two polygons. With fewer, a whole polygon is connected
 /// to a single corner of the other, and the first and last edge of that fan coincide.
-const TURNS: usize = 4;
+const MIN_SWITCHES: usize = 4;
 
 /// The largest coordinate for which squared distances, and sums of them, are sure to fit into `f32`. Polygons beyond it
-/// are scaled by [`SHRINK`] first.
-const FAR: f32 = (1u64 << 55) as f32;
-/// The scale of polygons beyond [`FAR`]; a power of two, so that scaling is exact.
-const SHRINK: f32 = 1.0 / (1u128 << 80) as f32;
+/// are scaled by [`OVERFLOW_SCALE`] first.
+const MAX_COORDINATE: f32 = (1u64 << 55) as f32;
+/// The scale of polygons beyond [`MAX_COORDINATE`]; a power of two, so that scaling is exact.
+const OVERFLOW_SCALE: f32 = 1.0 / (1u128 << 80) as f32;
 
 /// Returns the tube with the least sum of squared edge lengths, over all offsets between the polygons.
 ///
 /// Dynamic programming over (i, j, polygon of the last step, number of switches); each polygon has at least three
 /// corners.
 pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
-    if first.iter().chain(second).any(|p| p.abs().max_element() > FAR) {
-        let nearer = |rim: &[Vec3]| rim.iter().map(|&p| p * SHRINK).collect::<Vec<_>>();
+    if first.iter().chain(second).any(|p| p.abs().max_element() > MAX_COORDINATE) {
+        let nearer = |rim: &[Vec3]| rim.iter().map(|&p| p * OVERFLOW_SCALE).collect::<Vec<_>>();
         return shortest_tube(&nearer(first), &nearer(second));
     }
     let cost = |i: usize, j: usize| {
@@ -59,7 +59,7 @@ pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     let mut best: Option<(f32, Vec<(usize, usize)>)> = None;
     for offset in 0..second.len() {
         for step in [Step::First, Step::Second] {
-            let walk = Walks::fill(first.len(), second.len(), step, |i, j| cost(i, j + offset));
+            let walk = WalkTable::fill(first.len(), second.len(), step, |i, j| cost(i, j + offset));
             if let Some(total) = walk.best_total()
                 && best.as_ref().is_none_or(|(least, _)| total < *least)
             {
@@ -82,7 +82,7 @@ enum Step {
 }
 
 /// The table of the dynamic programming: the cheapest walk to each state, for one offset and one first step.
-struct Walks {
+struct WalkTable {
     rows: usize,
     columns: usize,
     first_step: Step,
@@ -90,29 +90,29 @@ struct Walks {
     states: Vec<(f32, u8, u8)>,
 }
 
-impl Walks {
-    fn index(&self, i: usize, j: usize, step: usize, turns: usize) -> usize {
-        ((i * (self.columns + 1) + j) * 2 + step) * (TURNS + 1) + turns
+impl WalkTable {
+    fn index(&self, i: usize, j: usize, step: usize, switches: usize) -> usize {
+        ((i * (self.columns + 1) + j) * 2 + step) * (MIN_SWITCHES + 1) + switches
     }
 
     fn fill(rows: usize, columns: usize, first_step: Step, cost: impl Fn(usize, usize) -> f32) -> Self {
-        let states = vec![(f32::INFINITY, 0, 0); (rows + 1) * (columns + 1) * 2 * (TURNS + 1)];
+        let states = vec![(f32::INFINITY, 0, 0); (rows + 1) * (columns + 1) * 2 * (MIN_SWITCHES + 1)];
         let mut walks = Self { rows, columns, first_step, states };
         let begin = walks.index(0, 0, first_step as usize, 0);
         walks.states[begin].0 = cost(0, 0);
         for i in 0..=rows {
             for j in 0..=columns {
-                walks.extend(i, j, &cost);
+                walks.relax(i, j, &cost);
             }
         }
         walks
     }
 
     /// Relaxes the two states that follow each state at (i, j).
-    fn extend(&mut self, i: usize, j: usize, cost: &impl Fn(usize, usize) -> f32) {
+    fn relax(&mut self, i: usize, j: usize, cost: &impl Fn(usize, usize) -> f32) {
         for last in 0..2 {
-            for turns in 0..=TURNS {
-                let so_far = self.states[self.index(i, j, last, turns)].0;
+            for switches in 0..=MIN_SWITCHES {
+                let so_far = self.states[self.index(i, j, last, switches)].0;
                 if so_far == f32::INFINITY {
                     continue;
                 }
@@ -124,46 +124,50 @@ impl Walks {
                     if to_i > self.rows || to_j > self.columns || wrong_start {
                         continue;
                     }
-                    let now = if step == last || turns == TURNS { turns } else { turns + 1 };
+                    let now = if step == last || switches == MIN_SWITCHES { switches } else { switches + 1 };
                     let closes = to_i == self.rows && to_j == self.columns;
                     // The last pair is the first pair again; it is not counted twice.
                     let total = so_far + if closes { 0.0 } else { cost(to_i, to_j) };
                     let state = self.index(to_i, to_j, step, now);
                     if total < self.states[state].0 {
-                        self.states[state] = (total, last as u8, turns as u8);
+                        self.states[state] = (total, last as u8, switches as u8);
                     }
                 }
             }
         }
     }
 
-    /// Returns the final step and number of switches of the cheapest closed walk with at least [`TURNS`] switches.
+    /// Returns the final step and number of switches of the cheapest closed walk with at least [`MIN_SWITCHES`]
+    /// switches.
     fn best_end(&self) -> Option<(usize, usize)> {
         let other = 1 - self.first_step as usize;
-        let ends = [(self.first_step as usize, TURNS), (other, TURNS - 1), (other, TURNS)];
-        let total =
-            |&(step, turns): &(usize, usize)| self.states[self.index(self.rows, self.columns, step, turns)].0;
+        let ends =
+            [(self.first_step as usize, MIN_SWITCHES), (other, MIN_SWITCHES - 1), (other, MIN_SWITCHES)];
+        let total = |&(step, switches): &(usize, usize)| {
+            self.states[self.index(self.rows, self.columns, step, switches)].0
+        };
         ends.into_iter().filter(|end| total(end) < f32::INFINITY).min_by(|a, b| total(a).total_cmp(&total(b)))
     }
 
     fn best_total(&self) -> Option<f32> {
-        self.best_end().map(|(step, turns)| self.states[self.index(self.rows, self.columns, step, turns)].0)
+        self.best_end()
+            .map(|(step, switches)| self.states[self.index(self.rows, self.columns, step, switches)].0)
     }
 
     /// Returns the pairs of the cheapest walk in order, without the closing pair, which equals the first.
     fn trace(&self) -> Vec<(usize, usize)> {
-        let Some((mut step, mut turns)) = self.best_end() else { return Vec::new() };
+        let Some((mut step, mut switches)) = self.best_end() else { return Vec::new() };
         let (mut i, mut j) = (self.rows, self.columns);
         let mut pairs = Vec::with_capacity(i + j);
         while i + j > 0 {
-            let (_, last, before) = self.states[self.index(i, j, step, turns)];
+            let (_, last, before) = self.states[self.index(i, j, step, switches)];
             if step == 0 {
                 i -= 1
             } else {
                 j -= 1
             }
             pairs.push((i, j));
-            (step, turns) = (last as usize, before as usize);
+            (step, switches) = (last as usize, before as usize);
         }
         pairs.reverse();
         pairs

@@ -22,7 +22,7 @@ impl TriangleMesh {
             kept.push(at);
             triangles.push([a, b, c].map(|v| slot(&mut slots, &mut vertices, v)));
         }
-        let mut welded = Self { triangles, ..self.gathered(&vertices) };
+        let mut welded = Self { triangles, ..self.vertex_subset(&vertices) };
         let targets: Vec<u32> = representatives.iter().map(|&v| slots[v]).collect();
         welded.normals = self.normals.as_ref().map(|n| normalized(means(n, &targets, vertices.len())));
         welded.colors = self.colors.as_ref().map(|c| means(c, &targets, vertices.len()));

@@ -1,7 +1,7 @@
 //! Validation of meshes passed in by the caller, shared by all methods.
 
 use super::MethodError;
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 
 /// The shortest mean edge accepted. With shorter ones, areas in single precision are rounded to few digits, or to 0.
 const MIN_MEAN_EDGE: f64 = 1e-12;
@@ -18,7 +18,7 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
         let problem = "the triangles face inwards; they must be counter-clockwise seen from outside";
         return Err(MethodError::invalid(parameter, problem));
     }
-    match count_crossings(mesh) {
+    match count_self_intersections(mesh) {
         0 => Ok(surface),
         pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
     }

@@ -3,13 +3,13 @@
 
 use crate::math::triangle::area_vector;
 use crate::math::{IVec3, Vec3};
-use crate::mesh::{Groups, TriangleMesh};
+use crate::mesh::{DisjointSets, TriangleMesh};
 
 /// The cosine of the largest angle by which a triangle may turn when vertices are merged, 60°.
 const LARGEST_TURN: f64 = 0.5;
 
 /// The smallest valence of a vertex of the result.
-const LEAST_VALENCE: u32 = 3;
+const MIN_VALENCE: u32 = 3;
 
 /// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
 /// model starts. Vertices in the same cell that are connected by edges within it are merged at their mean. A cluster is
@@ -18,11 +18,11 @@ const LEAST_VALENCE: u32 = 3;
 pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
     let mut clusters = Clusters::new(mesh, cell);
     clusters.keep_contractible(mesh);
-    clusters.keep_flat(mesh, furthest);
+    clusters.dissolve_bent(mesh, furthest);
     loop {
         let merged = clusters.merge(mesh);
-        if !clusters.dissolve_where_wrong(mesh, &merged) {
-            return merged.parts_where(|_| true);
+        if !clusters.dissolve_invalid(mesh, &merged) {
+            return merged.components_where(|_| true);
         }
     }
 }
@@ -36,17 +36,17 @@ struct Clusters {
 impl Clusters {
     fn new(mesh: &TriangleMesh, cell: impl Fn(Vec3) -> IVec3) -> Self {
         let cells: Vec<IVec3> = mesh.positions.iter().map(|&p| cell(p)).collect();
-        let mut groups = Groups::new(cells.len());
+        let mut groups = DisjointSets::new(cells.len());
         for [u, v] in edges(mesh) {
             if cells[u] == cells[v] {
-                groups.join(u, v);
+                groups.union(u, v);
             }
         }
         Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
     }
 
     /// Dissolves clusters with a vertex further than `furthest` from the mean along its normal.
-    fn keep_flat(&mut self, mesh: &TriangleMesh, furthest: f32) {
+    fn dissolve_bent(&mut self, mesh: &TriangleMesh, furthest: f32) {
         let means = self.means(mesh);
         let normals = mesh.vertex_normals();
         let mut is_bent = vec![false; self.first.len()];
@@ -74,11 +74,11 @@ impl Clusters {
         self.dissolve(|c| euler[c as usize] != 1);
     }
 
-    /// Dissolves the clusters for which `goes` is true, identified by their lowest vertex; returns whether one of them
-    /// had more than one vertex.
-    fn dissolve(&mut self, goes: impl Fn(u32) -> bool) -> bool {
+    /// Dissolves the clusters for which `dissolves` is true, identified by their lowest vertex; returns whether one of
+    /// them had more than one vertex.
+    fn dissolve(&mut self, dissolves: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
-        for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && goes(**c)) {
+        for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && dissolves(**c)) {
             *c = v;
             any = true;
         }
@@ -104,11 +104,11 @@ impl Clusters {
 
     /// Dissolves the clusters at edges of more than two triangles, at vertices of fewer than three, and at triangles
     /// that turn by more than 60°; returns whether there were any.
-    fn dissolve_where_wrong(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
+    fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
         for (v, &valence) in valences.iter().enumerate() {
-            is_wrong[v] = valence < LEAST_VALENCE;
+            is_wrong[v] = valence < MIN_VALENCE;
         }
         for corner in doubled_edges(merged, &valences).into_iter().flatten() {
             is_wrong[corner as usize] = true;
@@ -191,7 +191,7 @@ mod tests {
         marching_cubes(&Grid { dims: [n; 3], values }, 0.0).unwrap()
     }
 
-    fn sound(mesh: &TriangleMesh) -> Mesh {
+    fn valid_mesh(mesh: &TriangleMesh) -> Mesh {
         let mesh = Mesh::from_triangles(mesh).unwrap();
         assert_eq!(mesh.check(), Ok(()));
         mesh
@@ -201,7 +201,7 @@ mod tests {
     fn a_torus_keeps_its_handle_and_a_quarter_of_its_vertices_go() {
         let torus = contour(|p| 2.5 - Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length());
         let merged = clustered(&torus, f32::INFINITY, whole);
-        assert_eq!(sound(&merged).euler(), 0);
+        assert_eq!(valid_mesh(&merged).euler(), 0);
         let [before, after] = [&torus, &merged].map(|mesh| mesh.positions.len());
         assert!(4 * after < 3 * before, "{after} of {before}");
         let length = |p: &Vec3| Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length();
@@ -230,7 +230,7 @@ mod tests {
             let random = std::cell::RefCell::new(crate::math::Random::new(seed));
             let noisy = contour(|p| 8.0 - p.length() + 6.0 * (random.borrow_mut().unit() as f32 - 0.5));
             let merged = clustered(&noisy, f32::INFINITY, whole);
-            let (before, after) = (sound(&noisy), sound(&merged));
+            let (before, after) = (valid_mesh(&noisy), valid_mesh(&merged));
             assert_eq!(after.euler(), before.euler(), "seed {seed}");
             assert_eq!(after.component_count(), before.component_count(), "seed {seed}");
             assert!(after.vertex_count() < before.vertex_count());
@@ -242,6 +242,6 @@ mod tests {
         assert!(clustered(&TriangleMesh::default(), f32::INFINITY, whole).triangles.is_empty());
         let ball = contour(|p| 8.0 - p.length());
         let merged = clustered(&ball, f32::INFINITY, |p| (p / 8.0).round().as_ivec3());
-        assert_eq!(sound(&merged).euler(), 2);
+        assert_eq!(valid_mesh(&merged).euler(), 2);
     }
 }

@@ -1,7 +1,7 @@
 //! Contact queries between non-adjacent vertices: equation (3) and the axial change of figures 3 and 4.
 
 use super::{Resolver, Sampling, TopologyGuide};
-use crate::math::order::{by_both, rank, sort_by_rank};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
 /// Positions of the rim of a tube along the spokes, as fractions from the centre. Nearer to the centre the tube is thin
@@ -11,7 +11,7 @@ const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower id first, with their squared distance.
 #[derive(Clone, Copy)]
-struct Contact {
+struct ContactPair {
     square: f32,
     u: VertexId,
     v: VertexId,
@@ -30,7 +30,7 @@ impl Resolver {
         // Contacts next to a new tube stay pending until its edges are within bounds: joined at once, neighbouring
         // pairs of two facing sheets would create a handle each.
         let mut busy = vec![false; mesh.slots()];
-        for Contact { square, u, v } in contacts {
+        for ContactPair { square, u, v } in contacts {
             if !free(mesh, &busy, u) || !free(mesh, &busy, v) || mesh.ring(u).contains(v) {
                 self.touch_live(mesh, u);
                 continue;
@@ -55,30 +55,30 @@ impl Resolver {
     }
 
     /// Returns the pairs in contact with at least one marked vertex, nearest first.
-    fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<Contact> {
-        let mut stirred = self.take_stirred();
-        stirred.retain(|&v| mesh.is_live(v));
+    fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<ContactPair> {
+        let mut dirty = self.take_dirty();
+        dirty.retain(|&v| mesh.is_live(v));
         let mut contacts = Vec::new();
-        if stirred.is_empty() {
+        if dirty.is_empty() {
             return contacts;
         }
-        self.embedding.follow(mesh);
-        let mut is_stirred = vec![false; mesh.slots()];
-        stirred.iter().for_each(|v| is_stirred[v.index()] = true);
-        for &u in &stirred {
+        self.embedding.sync(mesh);
+        let mut is_dirty = vec![false; mesh.slots()];
+        dirty.iter().for_each(|v| is_dirty[v.index()] = true);
+        for &u in &dirty {
             self.embedding.for_each_contact(mesh, u, sampling.contact(), |v, square| {
                 let contact = sampling.between(mesh, u, v).contact();
                 if square >= contact * contact {
                     return;
                 }
-                let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_contacts(v);
+                let counted_from_v = v < u && is_dirty[v.index()] && self.embedding.may_have_contacts(v);
                 if !counted_from_v {
-                    contacts.push(Contact { square, u: u.min(v), v: u.max(v) });
+                    contacts.push(ContactPair { square, u: u.min(v), v: u.max(v) });
                 }
             });
         }
-        sort_by_rank(&mut contacts, |contact| by_both(contact.u.0, contact.v.0));
-        sort_by_rank(&mut contacts, |contact| rank(contact.square).into());
+        sort_by_rank(&mut contacts, |contact| combined_rank(contact.u.0, contact.v.0));
+        sort_by_rank(&mut contacts, |contact| rank_f32(contact.square).into());
         contacts
     }
 

@@ -19,10 +19,10 @@ const POINT_WEIGHT: f64 = 1e-4;
 
 /// The highest valence after a collapse: vertices of higher valence are surrounded by needles, and the intersection
 /// test is quadratic in it.
-const MOST_NEIGHBOURS: usize = 24;
+const MAX_NEIGHBOURS: usize = 24;
 
 /// The cosine of the largest angle by which a triangle may turn, 78°.
-const LEAST_COSINE: f64 = 0.2;
+const MIN_COSINE: f64 = 0.2;
 
 /// The number of times all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds
 /// that free one edge each would make the work quadratic.
@@ -84,7 +84,7 @@ struct Candidate {
 }
 
 /// The quadric error of a candidate position for the remaining vertex, and that position.
-type Place = (f64, Vec3);
+type RatedPosition = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
     fn new(mesh: &'a mut Mesh, target: usize) -> Self {
@@ -107,7 +107,7 @@ impl<'a> Decimation<'a> {
 
     fn queue_all(&mut self) {
         let edges: Vec<_> = self.mesh.edges().collect();
-        edges.into_iter().for_each(|(u, v)| self.offer(u, v, 0));
+        edges.into_iter().for_each(|(u, v)| self.enqueue(u, v, 0));
     }
 
     fn run(&mut self) {
@@ -125,26 +125,26 @@ impl<'a> Decimation<'a> {
         if self.mesh.can_collapse(u, v).is_err() {
             return;
         }
-        let Some(&(_, place)) = self.positions(u, v).get(choice as usize) else { return };
-        if !self.is_safe(u, v, place) {
-            self.offer(u, v, choice + 1);
+        let Some(&(_, position)) = self.positions(u, v).get(choice as usize) else { return };
+        if !self.is_safe(u, v, position) {
+            self.enqueue(u, v, choice + 1);
             return;
         }
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
-        if self.mesh.collapse(u, v, place).is_err() {
+        if self.mesh.collapse(u, v, position).is_err() {
             return;
         }
         self.quadrics[u.index()] = quadric;
         for end in [u, v] {
             self.stamps[end.index()] += 1;
         }
-        self.obstacles.follow(self.mesh, u, v);
+        self.obstacles.update(self.mesh, u, v);
         let ring = self.mesh.ring(u).clone();
-        ring.as_slice().iter().for_each(|&w| self.offer(u.min(w), u.max(w), 0));
+        ring.as_slice().iter().for_each(|&w| self.enqueue(u.min(w), u.max(w), 0));
     }
 
     /// Queues the edge with the error of its candidate position number `choice`, if there is one.
-    fn offer(&mut self, u: VertexId, v: VertexId, choice: u8) {
+    fn enqueue(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
             let stamp = self.stamp(u, v);
             self.queue.push(Reverse(Candidate { error: error.to_bits(), ends: [u, v], choice, stamp }));
@@ -157,47 +157,48 @@ impl<'a> Decimation<'a> {
 
     /// Returns candidate positions for the remaining vertex by increasing error: the minimiser, the midpoint, both
     /// ends.
-    fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[Place; 4]> {
+    fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[RatedPosition; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
-        let least = quadric.least().map(|place| place + self.origin);
+        let least = quadric.minimizer().map(|position| position + self.origin);
         let positions = least.into_iter().chain([0.5 * (p + q), p, q]).map(DVec3::as_vec3);
-        let rated = positions.map(|place| (quadric.at(place.as_dvec3() - self.origin), place));
+        let rated = positions.map(|position| (quadric.evaluate(position.as_dvec3() - self.origin), position));
         // Only the minimiser can be out of range.
-        let mut positions: SmallVec<[Place; 4]> =
-            rated.filter(|(error, place)| error.is_finite() && place.is_finite()).collect();
+        let mut positions: SmallVec<[RatedPosition; 4]> =
+            rated.filter(|(error, position)| error.is_finite() && position.is_finite()).collect();
         positions.sort_by(|a, b| a.0.total_cmp(&b.0));
         positions
     }
 
     /// Returns whether no triangle turns over, degenerates or intersects another after the collapse.
-    fn is_safe(&mut self, u: VertexId, v: VertexId, place: Vec3) -> bool {
+    fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
-        if neighbours > MOST_NEIGHBOURS {
+        if neighbours > MAX_NEIGHBOURS {
             return false;
         }
-        let mut fresh = SmallVec::<[Facet; MOST_NEIGHBOURS]>::new();
-        for (kept, gone) in [(u, v), (v, u)] {
-            for (a, b) in self.mesh.ring(kept).pairs().filter(|&(a, b)| a != gone && b != gone) {
+        let mut fresh = SmallVec::<[Facet; MAX_NEIGHBOURS]>::new();
+        for (kept, removed) in [(u, v), (v, u)] {
+            for (a, b) in self.mesh.ring(kept).pairs().filter(|&(a, b)| a != removed && b != removed) {
                 let old = self.mesh.facet([kept, a, b]);
-                let new = Facet { corners: [u.0, a.0, b.0], points: [place, old.points[1], old.points[2]] };
-                if !may_become(&old, &new) {
+                let new =
+                    Facet { corners: [u.0, a.0, b.0], points: [position, old.points[1], old.points[2]] };
+                if !may_replace(&old, &new) {
                     return false;
                 }
                 fresh.push(new);
             }
         }
-        !self.obstacles.block(self.mesh, &fresh, &[u, v])
+        !self.obstacles.blocks(self.mesh, &fresh, &[u, v])
     }
 }
 
 /// Returns whether a triangle may be replaced by another: it keeps its orientation and a nonzero area. A degenerate
 /// triangle has no orientation to keep.
-fn may_become(old: &Facet, new: &Facet) -> bool {
+fn may_replace(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));
-    let turns = before.dot(after) < LEAST_COSINE * before.length() * after.length();
-    !turns && !collinear(new.points)
+    let flips = before.dot(after) < MIN_COSINE * before.length() * after.length();
+    !flips && !collinear(new.points)
 }
 
 /// Returns, by vertex slot, the quadric of the planes of its triangles and, with a small weight, of its position; each
@@ -233,11 +234,11 @@ mod tests {
             (-Vec3::Y, false),
             (Vec3::X * 2.0, false),
         ] {
-            assert_eq!(may_become(&old, &with_tip(tip)), expected, "{tip}");
+            assert_eq!(may_replace(&old, &with_tip(tip)), expected, "{tip}");
         }
         let flat = with_tip(Vec3::X * 2.0);
         assert!(
-            may_become(&flat, &old) && may_become(&flat, &with_tip(-Vec3::Y)) && !may_become(&flat, &flat)
+            may_replace(&flat, &old) && may_replace(&flat, &with_tip(-Vec3::Y)) && !may_replace(&flat, &flat)
         );
     }
 

@@ -3,7 +3,7 @@
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
-use crate::mesh::{EditError, Mesh, Opposite, VertexId};
+use crate::mesh::{EditError, Mesh, OppositeVertices, VertexId};
 
 /// The longest edge that a collapse may produce, as a factor of the upper bound. While all edges are within bounds,
 /// none exceeds 1.4; in a surface much finer than δ and too crowded for splits, repeated collapses would produce
@@ -12,15 +12,15 @@ const LENGTHENED: f32 = 1.6;
 
 /// The largest number of edits around one vertex in a call; it is then skipped until it is marked again. Edits of edges
 /// with different bounds may undo each other; on a head scan they used up the work of a whole call, 20 s.
-const MOST_EDITS: u8 = 40;
+const MAX_EDITS: u8 = 40;
 
 impl Resolver {
     /// Processes the queue until all edges around its vertices are within bounds.
-    pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
-        while self.embedding.effort() < self.most_effort {
+    pub(super) fn restore_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
+        while self.embedding.effort() < self.max_effort {
             let Some(u) = self.pop() else { return };
             if mesh.is_live(u) && self.may_edit(u) {
-                self.settle_vertex(mesh, sampling, guide, u);
+                self.restore_vertex(mesh, sampling, guide, u);
             }
         }
     }
@@ -32,7 +32,7 @@ impl Resolver {
         at: VertexId,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        if self.tested.as_ref().is_none_or(|cells| cells.contains(mesh.position(at))) {
+        if self.tested_cells.as_ref().is_none_or(|cells| cells.contains(mesh.position(at))) {
             self.embedding.attempt(mesh, edit)
         } else {
             self.embedding.attempt_in_one_rings(mesh, edit)
@@ -41,7 +41,7 @@ impl Resolver {
 
     /// Returns whether edges around `u` may still be edited in this call.
     fn may_edit(&self, u: VertexId) -> bool {
-        self.edits.get(u.index()).is_none_or(|&edits| edits < MOST_EDITS)
+        self.edits.get(u.index()).is_none_or(|&edits| edits < MAX_EDITS)
     }
 
     fn count_edit(&mut self, u: VertexId) {
@@ -52,20 +52,26 @@ impl Resolver {
     }
 
     /// Brings the first edge around `u` that is out of bounds and can be edited within bounds.
-    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide, u: VertexId) {
+    fn restore_vertex(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        u: VertexId,
+    ) {
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
             let v = mesh.ring(u).as_slice()[k];
             let length = from.distance_squared(mesh.position(v));
             let bounds = sampling.between(mesh, u, v);
-            let mended = if length > square(bounds.longest()) {
+            let edited = if length > square(bounds.longest()) {
                 self.shorten(mesh, sampling, u, v)
             } else if length < square(bounds.shortest()) {
                 self.remove_short(mesh, sampling, guide, [u, v])
             } else {
                 Ok(false)
             };
-            if mended == Ok(true) {
+            if edited == Ok(true) {
                 self.count_edit(u);
                 return;
             }
@@ -81,7 +87,7 @@ impl Resolver {
         u: VertexId,
         v: VertexId,
     ) -> Result<bool, EditError> {
-        let Opposite { left, right } = mesh.opposite(u, v)?;
+        let OppositeVertices { left, right } = mesh.opposite_vertices(u, v)?;
         let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
         let (a, b) = (mesh.position(left), mesh.position(right));
         let shortest = sampling.between(mesh, u, v).shortest();
@@ -89,7 +95,7 @@ impl Resolver {
         let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
         if crowded && flat && self.edit(mesh, u, |mesh| mesh.flip(u, v)).is_ok() {
             self.changes.inversions += 1;
-        } else if !self.has_room(mesh) {
+        } else if !self.may_add_vertex(mesh) {
             return Ok(false);
         } else {
             let w = self.edit(mesh, u, |mesh| mesh.split(u, v, middle))?;
@@ -112,9 +118,9 @@ impl Resolver {
         match mesh.can_collapse(u, v) {
             Ok(_) if !guide.may_collapse(mesh, [u, v]) => Ok(false),
             Ok(_) => self.collapse(mesh, sampling, u, v),
-            Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, guide, [u, v]),
+            Err(EditError::LinkCondition(_)) => self.cut_neck(mesh, sampling, guide, [u, v]),
             Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
-                self.remove_part(mesh, u);
+                self.remove_component(mesh, u);
                 Ok(true)
             }
             Err(refusal) => Err(refusal),
@@ -141,11 +147,11 @@ impl Resolver {
                     self.touch_edited(u);
                     return Ok(true);
                 }
-                Err(EditError::WouldCross) => {}
+                Err(EditError::WouldSelfIntersect) => {}
                 Err(refusal) => return Err(refusal),
             }
         }
-        Err(EditError::WouldCross)
+        Err(EditError::WouldSelfIntersect)
     }
 }
 

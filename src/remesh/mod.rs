@@ -3,7 +3,7 @@
 //!
 //! [`Resolver::resolve`] repeats these steps until all bounds hold: edges out of bounds are split, flipped or collapsed
 //! (`edges`), necks that block a collapse are cut (`necks`), vertices in contact are joined (`contact`). After eight
-//! rounds the rest stays pending for the next call. Small components without volume are removed (`specks`).
+//! rounds the rest stays pending for the next call. Small components without volume are removed (`small_components`).
 //! [`Embedding`] keeps the mesh free of self-intersections.
 //!
 //! [`decimate()`] reduces a static mesh, [`remesh`] remeshes it isotropically, with even edge lengths and well-shaped
@@ -21,14 +21,14 @@ mod obstacles;
 mod resolve;
 mod restructure;
 mod sampling;
-mod specks;
+mod small_components;
 
 pub use changes::Changes;
 pub use clustering::clustered;
 pub use decimate::decimate;
 pub use embedding::Embedding;
 pub use isotropic::remesh;
-pub use resolve::{Contact, Resolver, TopologyGuide, Unguided, Waiting};
+pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};
 pub use restructure::{
     EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,
 };

@@ -2,7 +2,7 @@
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
-use crate::math::order::{rank, sort_by_rank};
+use crate::math::order::{rank_f32, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, VertexId};
 
 /// Distances by which the two sides of a cut are moved apart, in δ; the first that causes no self-intersection is used.
@@ -23,22 +23,22 @@ impl Resolver {
         guide: &dyn TopologyGuide,
         [u, v]: [VertexId; 2],
     ) -> Result<bool, EditError> {
-        let opposite = mesh.opposite(u, v)?;
+        let opposite = mesh.opposite_vertices(u, v)?;
         let around = |o: &VertexId| {
             let p = mesh.position(*o);
             p.distance(mesh.position(u)) + p.distance(mesh.position(v))
         };
         let mut thirds = mesh.common_neighbours(u, v);
         thirds.retain(|&mut o| o != opposite.left && o != opposite.right && guide.may_cut(mesh, [u, v, o]));
-        sort_by_rank(&mut thirds, |o| rank(around(o)).into());
+        sort_by_rank(&mut thirds, |o| rank_f32(around(o)).into());
         if thirds.is_empty() {
             return Ok(false);
         }
         let cut = thirds.into_iter().find_map(|o| self.cut_apart(mesh, sampling, [u, v, o]));
-        let cut = cut.ok_or(EditError::WouldCross)?;
+        let cut = cut.ok_or(EditError::WouldSelfIntersect)?;
         self.changes.annular += 1;
         for side in [cut.kept, cut.copies] {
-            if !self.remove_speck(mesh, sampling, guide, side[0]) {
+            if !self.remove_if_negligible(mesh, sampling, guide, side[0]) {
                 side.into_iter().for_each(|w| self.touch_edited(w));
             }
         }
@@ -51,7 +51,7 @@ impl Resolver {
         let mut apart = |push: f32| {
             self.embedding.attempt(mesh, |mesh| {
                 let cut = mesh.cut(u, v, o)?;
-                part(mesh, cut, push * sampling.shortest());
+                move_apart(mesh, cut, push * sampling.shortest());
                 Ok(cut)
             })
         };
@@ -60,7 +60,7 @@ impl Resolver {
 
     /// Cuts necks at vertices that could not move: in a neck compressed until its vertices are held, no edge becomes
     /// short, and it would never be cut otherwise.
-    pub(super) fn cut_crushed(
+    pub(super) fn cut_stuck_necks(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
@@ -68,7 +68,7 @@ impl Resolver {
         stuck: &[VertexId],
     ) {
         for &u in stuck {
-            if !mesh.is_live(u) || self.embedding.effort() >= self.most_effort {
+            if !mesh.is_live(u) || self.embedding.effort() >= self.max_effort {
                 continue;
             }
             let ring = mesh.ring(u).as_slice().to_vec();
@@ -78,7 +78,7 @@ impl Resolver {
 }
 
 /// Moves the two sides of a cut apart along the axis of the neck.
-fn part(mesh: &mut Mesh, cut: Cut, push: f32) {
+fn move_apart(mesh: &mut Mesh, cut: Cut, push: f32) {
     let [a, b, c] = cut.kept.map(|v| mesh.position(v));
     let centre = (a + b + c) * (1.0 / 3.0);
     let axis = (b - a).cross(c - a).normalize_or_zero();

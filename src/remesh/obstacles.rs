@@ -2,7 +2,7 @@
 //! that is updated with the edits.
 
 use crate::math::{Bounds, Vec3, triangle};
-use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
+use crate::mesh::{Facet, Mesh, VertexId, facets_intersect};
 
 /// A bounding volume hierarchy over the one-rings of all vertices: a balanced tree of boxes in the order of a
 /// space-filling curve.
@@ -26,16 +26,16 @@ pub(super) struct Obstacles {
 impl Obstacles {
     /// Builds the tree of `mesh`, with a work budget of `work` pairs.
     pub fn new(mesh: &Mesh, work: u64) -> Self {
-        let vertices = along_a_curve(mesh);
+        let vertices = in_curve_order(mesh);
         let first_leaf = vertices.len().next_power_of_two();
         let mut leaves = vec![0; mesh.slots()];
         let mut nodes = vec![Bounds::EMPTY; 2 * first_leaf];
         for (leaf, &v) in vertices.iter().enumerate() {
             leaves[v.index()] = leaf as u32;
-            nodes[first_leaf + leaf] = star(mesh, v);
+            nodes[first_leaf + leaf] = one_ring_bounds(mesh, v);
         }
         for i in (1..first_leaf).rev() {
-            nodes[i] = nodes[2 * i].joined(&nodes[2 * i + 1]);
+            nodes[i] = nodes[2 * i].union(&nodes[2 * i + 1]);
         }
         let components = components(mesh);
         Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
@@ -46,9 +46,9 @@ impl Obstacles {
     /// whole component would change sides without being touched.
     ///
     /// `mesh` is the mesh before the edit; the first of `replaced` is in the edited component.
-    pub fn block(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
-        let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::of(&facet.points)).collect();
-        if cross_each_other(fresh, &boxes) {
+    pub fn blocks(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
+        let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::from_points(&facet.points)).collect();
+        if intersect_each_other(fresh, &boxes) {
             return true;
         }
         let edit = Edit { fresh, boxes: &boxes, replaced, around: around(mesh, &boxes, replaced) };
@@ -56,7 +56,7 @@ impl Obstacles {
         self.stack.push(1);
         while let Some(i) = self.stack.pop() {
             self.work_left = self.work_left.saturating_sub(1);
-            if !self.nodes[i as usize].meets(&edit.around) {
+            if !self.nodes[i as usize].overlaps(&edit.around) {
                 continue;
             }
             let blocked = match (i as usize).checked_sub(self.nodes.len() / 2) {
@@ -64,7 +64,7 @@ impl Obstacles {
                     self.stack.extend([2 * i, 2 * i + 1]);
                     false
                 }
-                Some(leaf) => self.star_blocks(mesh, self.vertices[leaf], &edit),
+                Some(leaf) => self.one_ring_blocks(mesh, self.vertices[leaf], &edit),
             };
             if blocked {
                 return true;
@@ -73,28 +73,28 @@ impl Obstacles {
         false
     }
 
-    fn star_blocks(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
+    fn one_ring_blocks(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         if edit.replaced.contains(&v) {
             return false;
         }
         let component = |w: VertexId| self.components[w.index()];
         let is_apart = edit.replaced.first().is_some_and(|&u| component(u) != component(v));
-        self.star_crosses(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
+        self.one_ring_intersects(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
     }
 
     /// Returns whether a triangle that has `v` as its lowest vertex, and no vertex in `replaced`, intersects a new
     /// triangle.
-    fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
+    fn one_ring_intersects(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             self.work_left = self.work_left.saturating_sub(1);
             let other = mesh.facet([v, a, b]);
-            let bounds = Bounds::of(&other.points);
-            if !bounds.meets(&edit.around) || edit.replaced.contains(&a) || edit.replaced.contains(&b) {
+            let bounds = Bounds::from_points(&other.points);
+            if !bounds.overlaps(&edit.around) || edit.replaced.contains(&a) || edit.replaced.contains(&b) {
                 continue;
             }
             self.work_left = self.work_left.saturating_sub(edit.fresh.len() as u64);
-            let mut near = edit.fresh.iter().zip(edit.boxes).filter(|(_, near)| near.meets(&bounds));
-            if near.any(|(fresh, _)| facets_cross(fresh, &other)) {
+            let mut near = edit.fresh.iter().zip(edit.boxes).filter(|(_, near)| near.overlaps(&bounds));
+            if near.any(|(fresh, _)| facets_intersect(fresh, &other)) {
                 return true;
             }
         }
@@ -107,12 +107,12 @@ impl Obstacles {
         self.work_left == 0
     }
 
-    /// Updates the tree after `gone` was removed and the triangles around `centre` changed.
-    pub fn follow(&mut self, mesh: &Mesh, centre: VertexId, gone: VertexId) {
-        self.set(gone, Bounds::EMPTY);
-        self.set(centre, star(mesh, centre));
+    /// Updates the tree after `removed` was removed and the triangles around `centre` changed.
+    pub fn update(&mut self, mesh: &Mesh, centre: VertexId, removed: VertexId) {
+        self.set(removed, Bounds::EMPTY);
+        self.set(centre, one_ring_bounds(mesh, centre));
         for &v in mesh.ring(centre).as_slice() {
-            self.set(v, star(mesh, v));
+            self.set(v, one_ring_bounds(mesh, v));
         }
     }
 
@@ -121,7 +121,7 @@ impl Obstacles {
         self.nodes[i] = bounds;
         while i > 1 {
             i /= 2;
-            let joined = self.nodes[2 * i].joined(&self.nodes[2 * i + 1]);
+            let joined = self.nodes[2 * i].union(&self.nodes[2 * i + 1]);
             if self.nodes[i] == joined {
                 return;
             }
@@ -140,8 +140,8 @@ struct Edit<'a> {
 }
 
 fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
-    let before = replaced.iter().map(|&v| star(mesh, v));
-    boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.joined(&one))
+    let before = replaced.iter().map(|&v| one_ring_bounds(mesh, v));
+    boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.union(&one))
 }
 
 /// Returns whether `p` is enclosed between the old and the new triangles, and would change sides of the surface.
@@ -171,22 +171,23 @@ fn components(mesh: &Mesh) -> Vec<u32> {
     components
 }
 
-fn cross_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
-    (0..fresh.len()).any(|i| (0..i).any(|j| boxes[i].meets(&boxes[j]) && facets_cross(&fresh[i], &fresh[j])))
+fn intersect_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
+    (0..fresh.len())
+        .any(|i| (0..i).any(|j| boxes[i].overlaps(&boxes[j]) && facets_intersect(&fresh[i], &fresh[j])))
 }
 
 /// Returns the bounding box of the one-ring of `v`.
-fn star(mesh: &Mesh, v: VertexId) -> Bounds {
+fn one_ring_bounds(mesh: &Mesh, v: VertexId) -> Bounds {
     let point = |p: Vec3| Bounds { min: p, max: p };
     let ring = mesh.ring(v).as_slice().iter();
-    ring.fold(point(mesh.position(v)), |all, &w| all.joined(&point(mesh.position(w))))
+    ring.fold(point(mesh.position(v)), |all, &w| all.union(&point(mesh.position(w))))
 }
 
 /// Returns the vertices in the order of a Z-curve through their bounding box.
-fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
+fn in_curve_order(mesh: &Mesh) -> Vec<VertexId> {
     let bounds = mesh
         .vertices()
-        .fold(Bounds::EMPTY, |all, v| all.joined(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
+        .fold(Bounds::EMPTY, |all, v| all.union(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
     // In `f64`, where the size of a box of finite coordinates cannot overflow.
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element());
     let mut keyed: Vec<(u64, u32)> = mesh
@@ -221,15 +222,15 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `place`.
-    fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
+    /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `position`.
+    fn moved(position: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
         let nearest = mesh.vertices().max_by(|&a, &b| f32::total_cmp(&first_x(&mesh, a), &first_x(&mesh, b)));
         let v = nearest.unwrap();
         let fan = mesh.ring(v).pairs().map(|(a, b)| {
             let mut facet = mesh.facet([v, a, b]);
-            facet.points[0] = place;
+            facet.points[0] = position;
             facet
         });
         let fan = fan.collect();
@@ -248,7 +249,7 @@ mod tests {
             [(1.0, false), (1.05, false), (1.3, true), (5.0, true), (-0.5, false), (-1.3, true)]
         {
             let (mesh, v, fan) = moved(Vec3::X * x);
-            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
         }
     }
 
@@ -259,35 +260,34 @@ mod tests {
             let other = mesh.vertices().find(|&w| mesh.position(w).x > 1.1).unwrap();
             mesh.remove_component(other);
             mesh.append(&Mesh::icosahedron(Vec3::X * 1.1, 0.01)).unwrap();
-            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
         }
     }
 
     #[test]
-    fn a_tree_that_followed_is_one_made_anew() {
+    fn an_updated_tree_equals_a_new_one() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
-        let mut followed = Obstacles::new(&mesh, u64::MAX);
+        let mut updated = Obstacles::new(&mesh, u64::MAX);
         for i in 0..300 {
             let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
-            let place = mesh.position(v);
-            if mesh.collapse(u, v, place).is_ok() {
-                followed.follow(&mesh, u, v);
+            let position = mesh.position(v);
+            if mesh.collapse(u, v, position).is_ok() {
+                updated.update(&mesh, u, v);
             }
         }
-        let leaf =
-            |v: VertexId| followed.nodes[followed.nodes.len() / 2 + followed.leaves[v.index()] as usize];
-        assert!(mesh.vertices().all(|v| leaf(v) == star(&mesh, v)));
-        let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.joined(&star(&mesh, v)));
-        assert_eq!(followed.nodes[1], root);
+        let leaf = |v: VertexId| updated.nodes[updated.nodes.len() / 2 + updated.leaves[v.index()] as usize];
+        assert!(mesh.vertices().all(|v| leaf(v) == one_ring_bounds(&mesh, v)));
+        let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.union(&one_ring_bounds(&mesh, v)));
+        assert_eq!(updated.nodes[1], root);
     }
 
     #[test]
     fn work_ends() {
         let (mesh, v, fan) = moved(Vec3::X);
         let mut obstacles = Obstacles::new(&mesh, 1000);
-        let looks =
-            (0..1000).take_while(|_| !obstacles.block(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
-        assert!((2..50).contains(&looks.count()));
+        let visited =
+            (0..1000).take_while(|_| !obstacles.blocks(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
+        assert!((2..50).contains(&visited.count()));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The loop of figure 9: restores edge bounds, then resolves contacts, until all bounds hold.
 
-use super::specks::SmallParts;
+use super::small_components::SmallComponents;
 use super::{Changes, Embedding, Sampling};
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{Mesh, MeshError, VertexId};
@@ -17,30 +17,30 @@ const PASSES: usize = 8;
 /// Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the surface
 /// edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
-const LEAST_EFFORT: u64 = 100_000;
+const MIN_EFFORT: u64 = 100_000;
 
 /// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
 /// after moves.
 #[derive(Clone, Debug)]
 pub struct Resolver {
-    most_vertices: usize,
-    contact: Contact,
+    max_vertices: usize,
+    contact_policy: ContactPolicy,
     /// The cells in which splits, flips and collapses are tested in full for self-intersections; everywhere if `None`.
-    pub(super) tested: Option<CellSet>,
-    full: bool,
+    pub(super) tested_cells: Option<CellSet>,
+    overflowed: bool,
     /// The value of [`Embedding::effort`] at which this call ends.
-    pub(super) most_effort: u64,
+    pub(super) max_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
     /// Number of edits around each vertex in this call.
     pub(super) edits: Vec<u8>,
     /// Vertices moved or created since the last contact query.
-    stirred: Vec<VertexId>,
-    is_stirred: Vec<bool>,
+    dirty: Vec<VertexId>,
+    is_dirty: Vec<bool>,
     /// Vertices that could not move at all in the last move.
     pub(super) stuck: Vec<VertexId>,
     /// Components small enough to be removed.
-    pub(super) small: SmallParts,
+    pub(super) small: SmallComponents,
     /// Vertices created or displaced by the last call.
     pub(super) edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
@@ -49,7 +49,7 @@ pub struct Resolver {
 
 /// Treatment of contacts between non-adjacent vertices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Contact {
+pub enum ContactPolicy {
     /// The two vertices are joined by a tube (axial change).
     #[default]
     Join,
@@ -98,37 +98,37 @@ impl TopologyGuide for Unguided {
 
 /// The vertices left pending by the last call, in order; part of a saved run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Waiting {
+pub struct Pending {
     /// Vertices whose edges have to be checked.
     pub queue: Vec<VertexId>,
     /// Vertices whose contacts have to be queried.
-    pub stirred: Vec<VertexId>,
+    pub dirty: Vec<VertexId>,
 }
 
-impl Waiting {
-    /// Returns the pending vertices after renumbering, without deleted ones; `names` maps old ids to new ones.
-    pub fn renamed(&self, names: &[Option<VertexId>]) -> Self {
-        let rename = |list: &[VertexId]| list.iter().filter_map(|v| *names.get(v.index())?).collect();
-        Self { queue: rename(&self.queue), stirred: rename(&self.stirred) }
+impl Pending {
+    /// Returns the pending vertices after renumbering, without deleted ones; `new_ids` maps old ids to new ones.
+    pub fn renumbered(&self, new_ids: &[Option<VertexId>]) -> Self {
+        let rename = |list: &[VertexId]| list.iter().filter_map(|v| *new_ids.get(v.index())?).collect();
+        Self { queue: rename(&self.queue), dirty: rename(&self.dirty) }
     }
 }
 
 impl Resolver {
-    /// Creates a resolver that stops splitting edges once the mesh has `most_vertices`.
-    pub fn with_room_for(most_vertices: usize) -> Self {
+    /// Creates a resolver that stops splitting edges once the mesh has `max_vertices`.
+    pub fn with_max_vertices(max_vertices: usize) -> Self {
         Self {
-            most_vertices,
-            contact: Contact::Join,
-            tested: None,
-            full: false,
-            most_effort: 0,
+            max_vertices,
+            contact_policy: ContactPolicy::Join,
+            tested_cells: None,
+            overflowed: false,
+            max_effort: 0,
             queue: VecDeque::new(),
             queued: Vec::new(),
             edits: Vec::new(),
-            stirred: Vec::new(),
-            is_stirred: Vec::new(),
+            dirty: Vec::new(),
+            is_dirty: Vec::new(),
             stuck: Vec::new(),
-            small: SmallParts::default(),
+            small: SmallComponents::default(),
             edited: Vec::new(),
             embedding: Embedding::default(),
             changes: Changes::default(),
@@ -136,20 +136,20 @@ impl Resolver {
     }
 
     /// Sets how contacts are resolved.
-    pub fn set_contact(&mut self, contact: Contact) {
-        self.contact = contact;
+    pub fn set_contact_policy(&mut self, contact: ContactPolicy) {
+        self.contact_policy = contact;
     }
 
     /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`]
     /// does; everywhere in full if `None`. Restricting the tests halves the time; the whole mesh has to be tested
     /// afterwards.
-    pub fn test_in(&mut self, cells: Option<CellSet>) {
-        self.tested = cells;
+    pub fn set_tested_cells(&mut self, cells: Option<CellSet>) {
+        self.tested_cells = cells;
     }
 
     /// Returns the collision guard, synchronised with `mesh`, for edits made by the caller.
-    pub fn guard(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
-        self.embedding.follow_with(mesh, sampling.longest());
+    pub fn embedding(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
+        self.embedding.sync_with_edge(mesh, sampling.longest());
         &mut self.embedding
     }
 
@@ -159,19 +159,20 @@ impl Resolver {
     }
 
     /// Returns the number of vertices at which splitting stops.
-    pub fn most_vertices(&self) -> usize {
-        self.most_vertices
+    pub fn max_vertices(&self) -> usize {
+        self.max_vertices
     }
 
-    /// Returns [`Self::most_vertices`] if the last call left an edge too long because of this limit; reported once.
+    /// Returns [`Self::max_vertices`] if the last call left an edge too long because of this limit; reported once.
     pub fn take_overflow(&mut self) -> Option<usize> {
-        std::mem::take(&mut self.full).then_some(self.most_vertices)
+        std::mem::take(&mut self.overflowed).then_some(self.max_vertices)
     }
 
-    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it.
-    pub(super) fn has_room(&mut self, mesh: &Mesh) -> bool {
-        self.full |= mesh.vertex_count() >= self.most_vertices;
-        !self.full
+    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it, and none may be
+    /// until the next call of [`Self::resolve`].
+    pub(super) fn may_add_vertex(&mut self, mesh: &Mesh) -> bool {
+        self.overflowed |= mesh.vertex_count() >= self.max_vertices;
+        !self.overflowed
     }
 
     /// Restores the edge bounds and resolves contacts around the `active` vertices, and returns the changes made.
@@ -189,55 +190,60 @@ impl Resolver {
         active: &[VertexId],
         guide: &dyn TopologyGuide,
     ) -> Changes {
-        self.embedding.follow_with(mesh, sampling.longest());
+        self.embedding.sync_with_edge(mesh, sampling.longest());
         self.changes = Changes::default();
-        self.full = false;
-        let effort = LEAST_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
-        self.most_effort = self.embedding.effort() + effort;
+        self.overflowed = false;
+        let effort = MIN_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
+        self.max_effort = self.embedding.effort() + effort;
         self.edited.clear();
         self.edits.clear();
         let stuck = std::mem::take(&mut self.stuck);
         self.remove_crushed(mesh, sampling, guide, &stuck);
-        self.cut_crushed(mesh, sampling, guide, &stuck);
+        self.cut_stuck_necks(mesh, sampling, guide, &stuck);
         for &v in active {
             self.touch(v);
         }
         for _ in 0..PASSES {
-            self.settle_edges(mesh, sampling, guide);
+            self.restore_edges(mesh, sampling, guide);
             // While edges are out of bounds, nearly all pairs of vertices are in contact, and joins add more.
-            if self.is_waiting()
-                || self.contact == Contact::Leave
+            if self.has_pending_edges()
+                || self.contact_policy == ContactPolicy::Leave
                 || !self.join_contacts(mesh, sampling, guide)
             {
                 break;
             }
         }
-        if self.contact == Contact::Leave {
-            self.take_stirred();
+        if self.contact_policy == ContactPolicy::Leave {
+            self.take_dirty();
         }
-        self.note_small_parts(mesh, sampling, guide);
+        self.update_small_components(mesh, sampling, guide);
         self.changes
     }
 
-    /// Moves all vertices by the displacements `ways`, scaled down to prevent self-intersections, as
-    /// [`Embedding::carry`] does.
-    pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+    /// Moves all vertices by `displacements`, scaled down to prevent self-intersections, as
+    /// [`Embedding::move_all`] does.
+    pub fn move_all(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        displacements: &mut [Vec3],
+    ) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        self.carry_some(mesh, sampling, &all, ways)
+        self.move_some(mesh, sampling, &all, displacements)
     }
 
-    /// Moves the vertices `moving` by the displacements `ways`, as [`Embedding::carry_some`] does, and records those
+    /// Moves the vertices `moving` by `displacements`, as [`Embedding::move_some`] does, and records those
     /// that could not move.
-    pub fn carry_some(
+    pub fn move_some(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         moving: &[VertexId],
-        ways: &mut [Vec3],
+        displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
         self.small.find(mesh);
-        self.embedding.follow_with(mesh, sampling.longest());
-        let held = self.embedding.carry_some(mesh, moving, ways);
+        self.embedding.sync_with_edge(mesh, sampling.longest());
+        let held = self.embedding.move_some(mesh, moving, displacements);
         self.stuck.clear();
         self.stuck.extend(held.iter().filter(|(_, share)| *share == 0.0).map(|(v, _)| *v));
         held
@@ -253,7 +259,7 @@ impl Resolver {
     /// # Errors
     /// As [`Mesh::refine`].
     pub fn refine(&mut self, mesh: &mut Mesh, sampling: Sampling) -> Result<bool, MeshError> {
-        self.embedding.follow_with(mesh, sampling.longest());
+        self.embedding.sync_with_edge(mesh, sampling.longest());
         self.embedding.refine(mesh)
     }
 
@@ -263,23 +269,23 @@ impl Resolver {
     }
 
     /// Returns whether edges are pending for the next call.
-    pub fn is_waiting(&self) -> bool {
+    pub fn has_pending_edges(&self) -> bool {
         !self.queue.is_empty()
     }
 
     /// Returns the vertices pending for the next call, to be saved with a run.
-    pub fn waiting(&self) -> Waiting {
-        Waiting { queue: self.queue.iter().copied().collect(), stirred: self.stirred.clone() }
+    pub fn pending(&self) -> Pending {
+        Pending { queue: self.queue.iter().copied().collect(), dirty: self.dirty.clone() }
     }
 
     /// Replaces the pending vertices, when a saved run is restored.
-    pub fn set_waiting(&mut self, waiting: Waiting) {
+    pub fn set_pending(&mut self, pending: Pending) {
         self.queued.clear();
-        self.is_stirred.clear();
-        waiting.queue.iter().for_each(|&v| _ = mark(&mut self.queued, v));
-        waiting.stirred.iter().for_each(|&v| _ = mark(&mut self.is_stirred, v));
-        self.queue = waiting.queue.into();
-        self.stirred = waiting.stirred;
+        self.is_dirty.clear();
+        pending.queue.iter().for_each(|&v| _ = mark(&mut self.queued, v));
+        pending.dirty.iter().for_each(|&v| _ = mark(&mut self.is_dirty, v));
+        self.queue = pending.queue.into();
+        self.dirty = pending.dirty;
     }
 
     /// Marks `v` as dirty: appends it to the queue of edges to check, and marks it for the next contact query.
@@ -287,8 +293,8 @@ impl Resolver {
         if mark(&mut self.queued, v) {
             self.queue.push_back(v);
         }
-        if mark(&mut self.is_stirred, v) {
-            self.stirred.push(v);
+        if mark(&mut self.is_dirty, v) {
+            self.dirty.push(v);
         }
     }
 
@@ -305,12 +311,12 @@ impl Resolver {
     }
 
     /// Removes and returns the vertices marked for a contact query, in the order they were marked.
-    pub(super) fn take_stirred(&mut self) -> Vec<VertexId> {
-        let stirred = std::mem::take(&mut self.stirred);
-        for v in &stirred {
-            self.is_stirred[v.index()] = false;
+    pub(super) fn take_dirty(&mut self) -> Vec<VertexId> {
+        let dirty = std::mem::take(&mut self.dirty);
+        for v in &dirty {
+            self.is_dirty[v.index()] = false;
         }
-        stirred
+        dirty
     }
 }
 
@@ -336,7 +342,7 @@ mod tests {
         let x = |v: VertexId| mesh.position(v).x;
         let tip = mesh.vertices().min_by(|&a, &b| x(a).total_cmp(&x(b))).unwrap();
         mesh.set_position(tip, Vec3::new(-40.0, 3.0, 1.0));
-        let mut resolver = Resolver::with_room_for(500);
+        let mut resolver = Resolver::with_max_vertices(500);
         let mut active: Vec<VertexId> = mesh.vertices().collect();
         let mut effort = 0;
         for _ in 0..12 {
@@ -345,7 +351,7 @@ mod tests {
             assert!(resolver.is_embedded(&mesh));
             active.clear();
             // The last edit may exceed the budget: in all its variants it may visit and change all triangles.
-            let most = LEAST_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
+            let most = MIN_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
             assert!(resolver.embedding.effort() - effort < most);
             effort = resolver.embedding.effort();
         }

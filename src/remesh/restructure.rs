@@ -6,9 +6,9 @@
 //! guaranteed: that all edges are brought within bounds, and, with [`Unchecked`] edits, that no triangles intersect.
 
 use super::{Changes, Embedding};
-use crate::math::order::{by_both, rank, sort_by_rank};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
+use crate::mesh::{EditError, Mesh, MeshError, OppositeVertices, VertexId};
 
 /// The shortest and the longest edge allowed (ε_min and ε_max of the paper), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl EdgeBounds {
 
 /// The largest number of vertices of a result, and the memory in bytes per vertex during remeshing: limits for use in a
 /// browser.
-pub(super) const MOST_VERTICES: usize = 8_000_000;
+pub(super) const MAX_VERTICES: usize = 8_000_000;
 const BYTES_PER_VERTEX: f64 = 250.0;
 
 /// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length): 2 / √3.
@@ -44,9 +44,7 @@ impl EdgeBounds {
         let Self { min, max } = self;
         // Also rejects NaN.
         if !(min > 0.0 && max > 2.0 * min && max.is_finite()) {
-            let problem = format!(
-                "min {min} and max {max}; a min above 0 and a finite max of more than twice as much are needed"
-            );
+            let problem = format!("min must be > 0 and max finite and > 2 min, got min {min}, max {max}");
             return Err(MeshError::InvalidArgument { parameter: "edge", problem });
         }
         let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();
@@ -55,7 +53,7 @@ impl EdgeBounds {
         let length: f64 = mesh.edges().map(length).sum();
         let [min, max] = [min, max].map(f64::from);
         let vertices = VERTICES_PER_AREA * area / (min * max) + length / max;
-        if vertices < MOST_VERTICES as f64 {
+        if vertices < MAX_VERTICES as f64 {
             return Ok(());
         }
         Err(MeshError::TooLarge { bytes: bytes(vertices) })
@@ -80,7 +78,7 @@ pub trait EditPolicy {
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError>;
 
-    /// Returns whether `gone` may be collapsed into `kept`, in addition to the tests of the mesh itself.
+    /// Returns whether `removed` may be collapsed into `kept`, in addition to the tests of the mesh itself.
     fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
         true
     }
@@ -124,14 +122,14 @@ impl EditPolicy for Embedding {
 
 /// The cosine of the largest angle by which an edit may turn a triangle, 78°. A larger angle lets folds develop over
 /// many edits; with a smaller one, edges on ridges stay out of bounds.
-const LEAST_COSINE: f32 = 0.2;
+const MIN_COSINE: f32 = 0.2;
 
 /// The lowest valence after a collapse: a vertex of valence three lies inside a triangle.
-pub(super) const LEAST_VALENCE: usize = 4;
+pub(super) const MIN_VALENCE: usize = 4;
 
 /// The highest valence after a collapse: among many short edges it would grow without bound, and rings are searched
 /// linearly.
-const MOST_VALENCE: usize = 16;
+const MAX_VALENCE: usize = 16;
 
 /// The largest number of passes of splits or flips in one call. Each pass halves the longest edges, so this many reach
 /// any bound; flips never needed more than six.
@@ -154,11 +152,11 @@ pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edit
     for slot in 0..mesh.slots() {
         let u = VertexId::from_index(slot);
         // The remaining vertex is processed again until none of its edges can be collapsed.
-        while let Some((kept, gone)) = short_edge(mesh, u, shortest, |kept, gone| {
-            may_collapse(mesh, bounds, kept, gone) && edits.may_collapse(mesh, kept, gone)
+        while let Some((kept, removed)) = short_edge(mesh, u, shortest, |kept, removed| {
+            may_collapse(mesh, bounds, kept, removed) && edits.may_collapse(mesh, kept, removed)
         }) {
-            let place = mesh.position(kept);
-            if edits.attempt(mesh, |mesh| mesh.collapse(kept, gone, place)).is_err() {
+            let position = mesh.position(kept);
+            if edits.attempt(mesh, |mesh| mesh.collapse(kept, removed, position)).is_err() {
                 break;
             }
             edits.collapsed(kept);
@@ -182,28 +180,28 @@ fn short_edge(
     let short = |v: &&VertexId| from.distance_squared(mesh.position(**v)) < shortest;
     mesh.ring(u).as_slice().iter().filter(short).find_map(|&v| {
         let u_stays = mesh.ring(u).valence() >= mesh.ring(v).valence();
-        let (kept, gone) = if u_stays { (u, v) } else { (v, u) };
-        [(kept, gone), (gone, kept)].into_iter().find(|&(kept, gone)| may(kept, gone))
+        let (kept, removed) = if u_stays { (u, v) } else { (v, u) };
+        [(kept, removed), (removed, kept)].into_iter().find(|&(kept, removed)| may(kept, removed))
     })
 }
 
-/// Returns whether `gone` may be collapsed into `kept` within the bounds on edge lengths, angles and valences.
-pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
+/// Returns whether `removed` may be collapsed into `kept` within the bounds on edge lengths, angles and valences.
+pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) -> bool {
     // The most frequent reasons for rejection first.
-    if !may_move(mesh, bounds, kept, gone) {
+    if !may_move(mesh, bounds, kept, removed) {
         return false;
     }
-    let Ok(Opposite { left, right }) = mesh.can_collapse(kept, gone) else { return false };
-    let valences = mesh.ring(kept).valence() + mesh.ring(gone).valence() - 4;
-    (LEAST_VALENCE..=MOST_VALENCE).contains(&valences)
-        && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE)
+    let Ok(OppositeVertices { left, right }) = mesh.can_collapse(kept, removed) else { return false };
+    let valences = mesh.ring(kept).valence() + mesh.ring(removed).valence() - 4;
+    (MIN_VALENCE..=MAX_VALENCE).contains(&valences)
+        && [left, right].iter().all(|&w| mesh.ring(w).valence() > MIN_VALENCE)
 }
 
-/// Returns whether collapsing `gone` into `kept` makes no edge too long and turns over no triangle.
-fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
-    let (to, from) = (mesh.position(kept), mesh.position(gone));
+/// Returns whether collapsing `removed` into `kept` makes no edge too long and turns over no triangle.
+fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) -> bool {
+    let (to, from) = (mesh.position(kept), mesh.position(removed));
     let longest = bounds.max * bounds.max;
-    mesh.ring(gone).pairs().all(|(a, b)| {
+    mesh.ring(removed).pairs().all(|(a, b)| {
         if a == kept || b == kept {
             return true;
         }
@@ -218,7 +216,7 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
     // Squares avoid square roots; the comparison is false for NaN.
     cosine > 0.0
-        && cosine * cosine > LEAST_COSINE * LEAST_COSINE * before.length_squared() * after.length_squared()
+        && cosine * cosine > MIN_COSINE * MIN_COSINE * before.length_squared() * after.length_squared()
 }
 
 /// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (figure 5) or the
@@ -231,8 +229,8 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
         let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
         let all = mesh.edges().map(|edge| (square(edge), edge));
         let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
-        sort_by_rank(&mut long, |&(_, (u, v))| by_both(u.0, v.0));
-        sort_by_rank(&mut long, |&(square, _)| (!rank(square)).into());
+        sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
+        sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
         for (_, (u, v)) in long {
             if mesh.vertex_count() >= most {
                 return changes;
@@ -286,7 +284,7 @@ fn flip_if_wanted(
     edits: &mut impl EditPolicy,
     stale: &mut [bool],
 ) -> bool {
-    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    let Ok(OppositeVertices { left, right }) = mesh.opposite_vertices(u, v) else { return false };
     if !wants_flip(mesh, bounds, [u, v], [left, right], edits)
         || edits.attempt(mesh, |mesh| mesh.flip(u, v)).is_err()
     {
@@ -313,8 +311,8 @@ fn wants_flip(
     let now = excess(u, 0) + excess(v, 0) + excess(left, 0) + excess(right, 0);
     let then = excess(u, -1) + excess(v, -1) + excess(left, 1) + excess(right, 1);
     then < now
-        && mesh.ring(u).valence() > LEAST_VALENCE
-        && mesh.ring(v).valence() > LEAST_VALENCE
+        && mesh.ring(u).valence() > MIN_VALENCE
+        && mesh.ring(v).valence() > MIN_VALENCE
         && may_flip(mesh, bounds, [u, v], [left, right])
         && edits.may_flip(mesh, [u, v], [left, right])
 }

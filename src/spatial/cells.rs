@@ -17,7 +17,7 @@ impl CellSet {
     }
 
     /// Adds the cell that contains a point and its 26 adjacent cells.
-    pub fn add(&mut self, p: Vec3) {
+    pub fn insert_around(&mut self, p: Vec3) {
         let at: [i32; 3] = self.cell(p);
         for k in 0..27 {
             let shift = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
@@ -43,12 +43,12 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn what_is_no_further_than_a_side_is_in_it() {
+    fn points_within_a_side_are_contained() {
         let mut random = Random::new(1);
         let mut any = |size: f32| Vec3::from([(); 3].map(|()| (random.unit() as f32 - 0.5) * size));
         let points: Vec<Vec3> = (0..20).map(|_| any(60.0)).collect();
         let mut cells = CellSet::new(2.5);
-        points.iter().for_each(|&p| cells.add(p));
+        points.iter().for_each(|&p| cells.insert_around(p));
         let mut beyond = 0;
         for _ in 0..5000 {
             let p = any(70.0);

@@ -52,7 +52,7 @@ fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshErr
     if !mesh.triangles.is_empty() {
         return Ok(());
     }
-    Err(MeshError::InvalidArgument { parameter, problem: "there is no triangle to measure to".into() })
+    Err(MeshError::InvalidArgument { parameter, problem: "the mesh has no triangles".into() })
 }
 
 fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn loose_vertices_have_a_distance_and_do_not_count() {
+    fn unused_vertices_have_a_distance_but_no_weight() {
         let mut mesh = square(0.0);
         mesh.positions.push(Vec3::new(0.0, 0.0, 50.0));
         let found = surface_distance(&mesh, &square(0.0)).unwrap();

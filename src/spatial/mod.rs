@@ -16,5 +16,5 @@ pub use points::PointGrid;
 pub use section::cross_section;
 pub use surface_walker::SurfaceWalker;
 pub use sweep::near_pairs;
-pub use tree::{FirstHit, SurfacePoint, TriangleTree};
+pub use tree::{NearestHit, SurfacePoint, TriangleTree};
 pub use vertex_grid::{Proximity, VertexBall, VertexGrid};

@@ -1,7 +1,7 @@
 //! A hashed grid of points with incremental insertion.
 
 use crate::math::Vec3;
-use crate::math::order::by_both;
+use crate::math::order::combined_rank;
 
 /// The end of a bucket's list of points.
 const NONE: u32 = u32::MAX;
@@ -101,7 +101,8 @@ impl PointGrid {
             }
             reach *= 1.5;
         }
-        let mut ranked: Vec<u64> = found.iter().map(|&(squared, i)| by_both(squared.to_bits(), i)).collect();
+        let mut ranked: Vec<u64> =
+            found.iter().map(|&(squared, i)| combined_rank(squared.to_bits(), i)).collect();
         if ranked.len() > count {
             ranked.select_nth_unstable(count);
             ranked.truncate(count);
@@ -152,7 +153,7 @@ mod tests {
 
     fn points(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(4);
-        let mut unit = || random.bits() as f32 / 4_294_967_296.0;
+        let mut unit = || random.next_u32() as f32 / 4_294_967_296.0;
         // Uniformly distributed points, a distant cluster, and duplicates.
         let mut all: Vec<Vec3> = (0..count).map(|_| Vec3::new(unit(), unit(), unit()) * 2.0 - 1.0).collect();
         all.extend((0..count / 4).map(|_| Vec3::new(9.0 + 1e-4 * unit(), -3.0, 1e-4 * unit())));

@@ -15,7 +15,7 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
         return Vec::new();
     }
     let heights: Vec<f64> = mesh.positions.iter().map(|p| normal.dot(p.as_dvec3() - origin)).collect();
-    let cut = |from: u32, to: u32| cut(mesh, &heights, from, to);
+    let cut = |from: u32, to: u32| edge_intersection(mesh, &heights, from, to);
     let segments = mesh.triangles.iter().filter_map(|&[a, b, c]| {
         let above = [a, b, c].map(|v| heights[v as usize] >= 0.0);
         let lone = lone_corner(above)?;
@@ -37,7 +37,7 @@ fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
 }
 
 /// Returns the intersection of an edge with the plane; it does not depend on the direction of the edge.
-fn cut(mesh: &TriangleMesh, heights: &[f64], from: u32, to: u32) -> Vec3 {
+fn edge_intersection(mesh: &TriangleMesh, heights: &[f64], from: u32, to: u32) -> Vec3 {
     let (low, high) = (from.min(to) as usize, from.max(to) as usize);
     let fraction = heights[low] / (heights[low] - heights[high]);
     mesh.positions[low].as_dvec3().lerp(mesh.positions[high].as_dvec3(), fraction).as_vec3()

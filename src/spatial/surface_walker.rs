@@ -59,7 +59,7 @@ impl SurfaceWalker {
     }
 
     /// Returns the closest point to `p` by testing every triangle, for a single query without building the tree.
-    pub fn closest_of_all(&self, p: Vec3) -> Option<SurfacePoint> {
+    pub fn closest_brute_force(&self, p: Vec3) -> Option<SurfacePoint> {
         let found = |t: u32| self.nearest_on(t, p);
         (0..self.mesh.triangles.len() as u32)
             .map(found)
@@ -69,7 +69,7 @@ impl SurfaceWalker {
     }
 
     /// Returns a local minimum of the distance to `p`, found by walking over the surface from the triangle `start`.
-    pub fn march(&self, start: u32, p: Vec3) -> SurfacePoint {
+    pub fn walk(&self, start: u32, p: Vec3) -> SurfacePoint {
         let mut here = self.nearest_on(start, p);
         while let Some(next) = self.step(&here, p) {
             here = next;
@@ -79,7 +79,7 @@ impl SurfaceWalker {
 
     /// Returns the closest point on the triangles that share the edge or corner on which `here` lies, if it is strictly
     /// closer.
-    fn step(&self, here: &Nearest, p: Vec3) -> Option<Nearest> {
+    fn step(&self, here: &TrianglePoint, p: Vec3) -> Option<TrianglePoint> {
         let weights = here.barycentric.to_array();
         let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
         let best = match zeros {
@@ -95,7 +95,7 @@ impl SurfaceWalker {
     }
 
     /// Returns the closest point on the triangles around a corner of the triangle `start`.
-    fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> Nearest {
+    fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> TrianglePoint {
         let hub = self.mesh.triangles[start as usize][corner];
         let mut best = self.nearest_on(start, p);
         let (mut t, mut k) = (start, corner);
@@ -116,18 +116,18 @@ impl SurfaceWalker {
     }
 
     #[inline]
-    fn nearest_on(&self, triangle: u32, p: Vec3) -> Nearest {
+    fn nearest_on(&self, triangle: u32, p: Vec3) -> TrianglePoint {
         let corners = self.corners(triangle);
-        let barycentric = triangle::closest(corners, p);
-        let square = triangle::at(corners, barycentric).distance_squared(p.as_dvec3());
-        Nearest { triangle, barycentric, square }
+        let barycentric = triangle::closest_barycentric(corners, p);
+        let square = triangle::point_at(corners, barycentric).distance_squared(p.as_dvec3());
+        TrianglePoint { triangle, barycentric, square }
     }
 
-    fn point(&self, found: &Nearest) -> SurfacePoint {
+    fn point(&self, found: &TrianglePoint) -> SurfacePoint {
         SurfacePoint {
             triangle: found.triangle,
             barycentric: found.barycentric.as_vec3(),
-            point: triangle::at(self.corners(found.triangle), found.barycentric).as_vec3(),
+            point: triangle::point_at(self.corners(found.triangle), found.barycentric).as_vec3(),
             distance: found.square.sqrt(),
         }
     }
@@ -135,7 +135,7 @@ impl SurfaceWalker {
 
 /// The closest point on one triangle.
 #[derive(Clone, Copy, Debug)]
-struct Nearest {
+struct TrianglePoint {
     triangle: u32,
     barycentric: DVec3,
     /// The squared distance from the query point.
@@ -144,15 +144,15 @@ struct Nearest {
 
 /// Returns for each triangle the triangles across the edges opposite its corners.
 fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
-    let (first, sides) = sides_by_start(mesh);
+    let (first, half_edges) = half_edges_by_start(mesh);
     let across = |from: u32, to: u32| {
-        let around = &sides[first[from as usize] as usize..first[from as usize + 1] as usize];
+        let around = &half_edges[first[from as usize] as usize..first[from as usize + 1] as usize];
         around.iter().find(|side| side.0 == to).map(|side| side.1)
     };
     let all = mesh.triangles.iter().map(|&[a, b, c]| {
         let beyond = [across(c, b), across(a, c), across(b, a)];
         let [Some(x), Some(y), Some(z)] = beyond else {
-            let problem = format!("an edge of the triangle {:?} has no other side", [a, b, c]);
+            let problem = format!("triangle {:?} has a boundary edge", [a, b, c]);
             return Err(MeshError::NotClosed { problem });
         };
         Ok([x, y, z])
@@ -162,21 +162,21 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
 
 /// Returns the half-edges sorted by start vertex: the index of the first one of each vertex, and all as pairs of end
 /// vertex and triangle.
-fn sides_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
+fn half_edges_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut first = vec![0_u32; mesh.positions.len() + 1];
     mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
     for v in 0..mesh.positions.len() {
         first[v + 1] += first[v];
     }
     let mut next = first.clone();
-    let mut sides = vec![(0, 0); 3 * mesh.triangles.len()];
+    let mut half_edges = vec![(0, 0); 3 * mesh.triangles.len()];
     for (&[a, b, c], triangle) in mesh.triangles.iter().zip(0..) {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            sides[next[from as usize] as usize] = (to, triangle);
+            half_edges[next[from as usize] as usize] = (to, triangle);
             next[from as usize] += 1;
         }
     }
-    (first, sides)
+    (first, half_edges)
 }
 
 #[cfg(test)]
@@ -193,15 +193,15 @@ mod tests {
     }
 
     #[test]
-    fn on_a_ball_marching_from_anywhere_ends_at_the_nearest_point() {
+    fn walks_on_a_ball_end_at_the_closest_point() {
         let walker = ball();
         let mut random = Random::new(5);
         for start in 0..walker.mesh().triangles.len() as u32 {
-            let way = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
-            let p = Vec3::new(1.0, 2.0, 3.0) + way.normalize() * 2.5;
-            let (found, expected) = (walker.march(start, p), walker.closest(p).unwrap());
+            let direction = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
+            let p = Vec3::new(1.0, 2.0, 3.0) + direction.normalize() * 2.5;
+            let (found, expected) = (walker.walk(start, p), walker.closest(p).unwrap());
             assert!((found.distance - expected.distance).abs() < 1e-6, "{start}");
-            assert_eq!(walker.closest_of_all(p), Some(expected));
+            assert_eq!(walker.closest_brute_force(p), Some(expected));
             let again = walker.blend(&walker.mesh().positions, &found);
             assert!(again.distance(found.point) < 1e-5);
         }
@@ -213,11 +213,11 @@ mod tests {
         let walker = SurfaceWalker::new(cube.clone()).unwrap();
         for start in 0..20 {
             for &corner in &cube.positions {
-                assert!(walker.march(start, corner * 3.0).point.distance(corner) < 1e-6);
+                assert!(walker.walk(start, corner * 3.0).point.distance(corner) < 1e-6);
             }
             let [a, b, _] = walker.corners(7);
             let middle = (a + b) * 0.5;
-            assert!(walker.march(start, middle * 3.0).point.distance(middle) < 1e-6);
+            assert!(walker.walk(start, middle * 3.0).point.distance(middle) < 1e-6);
         }
     }
 

@@ -7,11 +7,11 @@
 //! once.
 
 use super::vertex_grid::{Proximity, VertexBall};
-use crate::math::order::{by_both, rank, sort_by_rank};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 
 /// The radius bound of the first class, as a multiple of the median radius. If smaller, the few long edges of an
 /// ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
-const FIRST: f32 = 1.6;
+const FIRST_CLASS_BOUND: f32 = 1.6;
 
 /// The ratio of the radius bounds of consecutive classes. If smaller, there are more classes; if larger, more pairs are
 /// tested and rejected.
@@ -19,26 +19,26 @@ const FACTOR: f32 = 4.0;
 
 /// The width of columns, as a multiple of the search distance of their class; above 1, so that balls in non-adjacent
 /// columns are out of reach in spite of rounding.
-const WIDER: f64 = 1.001;
+const COLUMN_MARGIN: f64 = 1.001;
 
 /// The largest absolute column index, so that adjacent indices do not overflow. At this distance from the origin,
 /// columns are narrower than the spacing of single-precision numbers.
-const LAST: f64 = 1_073_741_824.0;
+const MAX_COLUMN: f64 = 1_073_741_824.0;
 
 /// The largest number of columns per ball, including empty ones, for which a counting sort is used.
-const MOST_EMPTY: usize = 8;
+const MAX_COLUMNS_PER_BALL: usize = 8;
 
 /// The number of bits of the [`Filter`] per column near a large ball; with fewer, more small balls pass it needlessly.
-const BITS: usize = 8;
+const FILTER_BITS: usize = 8;
 
-/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::between`]. The order is
+/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::distance_for`]. The order is
 /// unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
-    let mut bound = FIRST * middle(&balls);
+    let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
         let (class, larger): (Vec<VertexBall>, Vec<VertexBall>) =
-            left.into_iter().partition(|ball| ball.longest <= bound);
+            left.into_iter().partition(|ball| ball.radius <= bound);
         left = larger;
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
@@ -50,8 +50,8 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
 }
 
 /// Returns the median radius, but at least the smallest positive normal number.
-fn middle(balls: &[VertexBall]) -> f32 {
-    let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.longest).collect();
+fn median_radius(balls: &[VertexBall]) -> f32 {
+    let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.radius).collect();
     let half = sizes.len() / 2;
     if sizes.is_empty() {
         return 1.0;
@@ -67,11 +67,11 @@ fn sweep_class(
     near: Proximity,
     found: &mut impl FnMut(&VertexBall, &VertexBall),
 ) {
-    let largest = class.iter().fold(0.0, |most, ball| if ball.longest > most { ball.longest } else { most });
-    let reach = near.between(largest, largest);
-    let width = Width(1.0 / (WIDER * f64::from(reach)));
+    let largest = class.iter().fold(0.0, |most, ball| if ball.radius > most { ball.radius } else { most });
+    let reach = near.distance_for(largest, largest);
+    let width = Width(1.0 / (COLUMN_MARGIN * f64::from(reach)));
     let mut test = |a: &VertexBall, b: &VertexBall| {
-        let reach = near.between(a.longest, b.longest);
+        let reach = near.distance_for(a.radius, b.radius);
         if a.position.distance_squared(b.position) <= reach * reach {
             found(a, b);
         }
@@ -80,7 +80,7 @@ fn sweep_class(
     large.pairs(reach, &mut test);
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
-        let around = smaller.iter().filter(|ball| filter.lets_through(width.column(ball)));
+        let around = smaller.iter().filter(|ball| filter.may_contain(width.column(ball)));
         large.pairs_with(&Columns::new(width, around), reach, &mut test);
     }
 }
@@ -94,8 +94,8 @@ impl Width {
     fn column(self, ball: &VertexBall) -> [i32; 2] {
         [ball.position.x, ball.position.y].map(|x| {
             let scaled = f64::from(x) * self.0;
-            let clamped = if scaled > LAST { LAST } else { scaled };
-            floor(if clamped < -LAST { -LAST } else { clamped })
+            let clamped = if scaled > MAX_COLUMN { MAX_COLUMN } else { scaled };
+            floor(if clamped < -MAX_COLUMN { -MAX_COLUMN } else { clamped })
         })
     }
 }
@@ -107,34 +107,34 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// Returns the indices that sort `places`, columns of balls. A counting sort, several times as fast, is used if the
+/// Returns the indices that sort `columns`, the columns of balls. A counting sort, several times as fast, is used if the
 /// columns are as densely occupied as those of a mesh.
-fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
+fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
-        let of_axis = || places.iter().map(|place| i64::from(place[axis]));
+        let of_axis = || columns.iter().map(|column| i64::from(column[axis]));
         let (low, high) = (of_axis().min().unwrap_or(0), of_axis().max().unwrap_or(0));
         (low, high - low + 1)
     };
     let ([x, wide], [y, deep]) = (extent(0).into(), extent(1).into());
-    if wide * deep > 64 + (MOST_EMPTY * places.len()) as i64 {
-        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+    if wide * deep > 64 + (MAX_COLUMNS_PER_BALL * columns.len()) as i64 {
+        let mut order: Vec<u32> = (0..columns.len() as u32).collect();
         let from_least = |x: i32| x as u32 ^ 1 << 31;
         sort_by_rank(&mut order, |&i| {
-            by_both(from_least(places[i as usize][0]), from_least(places[i as usize][1]))
+            combined_rank(from_least(columns[i as usize][0]), from_least(columns[i as usize][1]))
         });
         return order;
     }
-    let number = |place: &[i32; 2]| ((i64::from(place[0]) - x) * deep + i64::from(place[1]) - y) as usize;
+    let number = |column: &[i32; 2]| ((i64::from(column[0]) - x) * deep + i64::from(column[1]) - y) as usize;
     let mut ends = vec![0u32; (wide * deep) as usize];
-    places.iter().for_each(|place| ends[number(place)] += 1);
+    columns.iter().for_each(|column| ends[number(column)] += 1);
     let mut end = 0;
     for count in &mut ends {
         end += *count;
         *count = end;
     }
-    let mut order = vec![0; places.len()];
-    for (i, place) in places.iter().enumerate().rev() {
-        let slot = &mut ends[number(place)];
+    let mut order = vec![0; columns.len()];
+    for (i, column) in columns.iter().enumerate().rev() {
+        let slot = &mut ends[number(column)];
         *slot -= 1;
         order[*slot as usize] = i as u32;
     }
@@ -151,21 +151,22 @@ struct Columns {
 impl Columns {
     fn new<'a>(width: Width, balls: impl Iterator<Item = &'a VertexBall>) -> Self {
         let balls: Vec<&VertexBall> = balls.collect();
-        let places: Vec<[i32; 2]> = balls.iter().map(|ball| width.column(ball)).collect();
-        let mut order = in_order_of_columns(&places);
+        let column_of: Vec<[i32; 2]> = balls.iter().map(|ball| width.column(ball)).collect();
+        let mut order = column_order(&column_of);
         let mut by_height = Vec::new();
-        for column in order.chunk_by_mut(|&a, &b| places[a as usize] == places[b as usize]) {
+        for column in order.chunk_by_mut(|&a, &b| column_of[a as usize] == column_of[b as usize]) {
             by_height.clear();
-            by_height.extend(column.iter().map(|&i| by_both(rank(balls[i as usize].position.z), i)));
+            by_height
+                .extend(column.iter().map(|&i| combined_rank(rank_f32(balls[i as usize].position.z), i)));
             by_height.sort_unstable();
             column.iter_mut().zip(&by_height).for_each(|(i, &ranked)| *i = ranked as u32);
         }
         let mut columns: Vec<([i32; 2], usize)> = Vec::new();
         let mut before = None;
         for (k, &i) in order.iter().enumerate() {
-            let place = places[i as usize];
-            if before.replace(place) != Some(place) {
-                columns.push((place, k));
+            let column = column_of[i as usize];
+            if before.replace(column) != Some(column) {
+                columns.push((column, k));
             }
         }
         columns.push(([i32::MAX; 2], order.len()));
@@ -177,7 +178,7 @@ impl Columns {
     }
 
     #[inline]
-    fn place(&self, k: usize) -> [i32; 2] {
+    fn column(&self, k: usize) -> [i32; 2] {
         self.columns[k].0
     }
 
@@ -190,16 +191,16 @@ impl Columns {
     fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut row = 0;
         for k in 0..self.count() {
-            let [x, y] = self.place(k);
+            let [x, y] = self.column(k);
             let own = self.balls(k);
             for (i, a) in own.iter().enumerate() {
                 let top = a.position.z + reach;
                 own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
             }
-            if self.place(k + 1) == [x, y + 1] {
-                meet(own, self.balls(k + 1), reach, test);
+            if self.column(k + 1) == [x, y + 1] {
+                visit_column_pairs(own, self.balls(k + 1), reach, test);
             }
-            self.meet_row(own, [x + 1, y], &mut row, reach, test);
+            self.visit_row_pairs(own, [x + 1, y], &mut row, reach, test);
         }
     }
 
@@ -208,16 +209,16 @@ impl Columns {
     fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {
-            let [x, y] = self.place(k);
+            let [x, y] = self.column(k);
             for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
-                other.meet_row(self.balls(k), [x, y], row, reach, test);
+                other.visit_row_pairs(self.balls(k), [x, y], row, reach, test);
             }
         }
     }
 
     /// Visits the pairs of `balls` with those of the columns `[x, y − 1]` to `[x, y + 1]`. `row` is an index at or
     /// before the first of these columns and is advanced to it; columns are visited in order.
-    fn meet_row(
+    fn visit_row_pairs(
         &self,
         balls: &[VertexBall],
         [x, y]: [i32; 2],
@@ -225,12 +226,12 @@ impl Columns {
         reach: f32,
         test: &mut impl FnMut(&VertexBall, &VertexBall),
     ) {
-        while self.place(*row) < [x, y - 1] {
+        while self.column(*row) < [x, y - 1] {
             *row += 1;
         }
         let mut k = *row;
-        while self.place(k) <= [x, y + 1] {
-            meet(balls, self.balls(k), reach, test);
+        while self.column(k) <= [x, y + 1] {
+            visit_column_pairs(balls, self.balls(k), reach, test);
             k += 1;
         }
     }
@@ -238,7 +239,7 @@ impl Columns {
 
 /// Visits the pairs of two columns whose heights differ by at most `reach`; both columns are sorted by height.
 #[inline]
-fn meet(
+fn visit_column_pairs(
     balls: &[VertexBall],
     others: &[VertexBall],
     reach: f32,
@@ -262,10 +263,10 @@ struct Filter {
 
 impl Filter {
     fn around(columns: &Columns) -> Self {
-        let count = (9 * BITS * columns.count()).next_power_of_two().max(64);
+        let count = (9 * FILTER_BITS * columns.count()).next_power_of_two().max(64);
         let mut filter = Self { bits: vec![0; count / 64], mask: count as u32 - 1 };
         for k in 0..columns.count() {
-            let [x, y] = columns.place(k);
+            let [x, y] = columns.column(k);
             for x in x - 1..=x + 1 {
                 for y in y - 1..=y + 1 {
                     let bit = filter.bit([x, y]);
@@ -276,7 +277,7 @@ impl Filter {
         filter
     }
 
-    fn lets_through(&self, column: [i32; 2]) -> bool {
+    fn may_contain(&self, column: [i32; 2]) -> bool {
         let bit = self.bit(column);
         self.bits[bit / 64] >> (bit % 64) & 1 == 1
     }
@@ -312,7 +313,7 @@ mod tests {
             if unit() < 0.02 {
                 position *= 1e12;
             }
-            VertexBall { position, longest, vertex: VertexId(i) }
+            VertexBall { position, radius: longest, vertex: VertexId(i) }
         };
         (0..count).map(&mut ball).collect()
     }
@@ -334,7 +335,7 @@ mod tests {
             });
             found.sort_unstable();
             let is_near = |a: &VertexBall, b: &VertexBall| {
-                let reach = near.between(a.longest, b.longest);
+                let reach = near.distance_for(a.radius, b.radius);
                 a.position.distance_squared(b.position) <= reach * reach
             };
             let mut expected = Vec::new();

@@ -34,7 +34,7 @@ impl TriangleTree {
     pub fn new(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         mesh.validate()?;
         let corners: Vec<_> = mesh.corners().collect();
-        let bounds: Vec<_> = corners.iter().map(|c| Bounds::of(c)).collect();
+        let bounds: Vec<_> = corners.iter().map(|c| Bounds::from_points(c)).collect();
         Ok(Self { boxes: BoxTree::new(&bounds), corners })
     }
 
@@ -51,8 +51,8 @@ impl TriangleTree {
         let mut best: Option<(f64, u32, DVec3)> = None;
         self.boxes.nearest(p, |item, bound| {
             let corners = self.corners[item as usize];
-            let barycentric = triangle::closest(corners, p);
-            let distance = triangle::at(corners, barycentric).distance_squared(p.as_dvec3());
+            let barycentric = triangle::closest_barycentric(corners, p);
+            let distance = triangle::point_at(corners, barycentric).distance_squared(p.as_dvec3());
             if best.is_none_or(|(d, t, _)| (distance, item) < (d, t)) {
                 best = Some((distance, item, barycentric));
             }
@@ -69,7 +69,7 @@ impl TriangleTree {
         let mut found = false;
         self.boxes.within(p, reach, |item| {
             let corners = self.corners[item as usize];
-            let closest = triangle::at(corners, triangle::closest(corners, p));
+            let closest = triangle::point_at(corners, triangle::closest_barycentric(corners, p));
             found |= closest.distance_squared(p.as_dvec3()) <= reach;
             found
         });
@@ -85,7 +85,7 @@ impl TriangleTree {
             let own = label(item);
             if !found.contains(&own) {
                 let corners = self.corners[item as usize];
-                let closest = triangle::at(corners, triangle::closest(corners, p));
+                let closest = triangle::point_at(corners, triangle::closest_barycentric(corners, p));
                 if closest.distance_squared(p.as_dvec3()) <= reach {
                     found.push(own);
                 }
@@ -98,71 +98,73 @@ impl TriangleTree {
     /// Triangles are hit from either side. `None` if there is no intersection, if `direction` is zero, or if either is
     /// not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
-        let (origin, direction) = finite(origin, direction)?;
-        let (line, mut first) = (Line::new(origin, direction), FirstHit::within(f64::INFINITY));
+        let (origin, direction) = normalized_ray(origin, direction)?;
+        let (line, mut nearest) = (Line::new(origin, direction), NearestHit::within(f64::INFINITY));
         self.boxes.along_ray(&Ray::new(origin, direction), |item| {
             let hit = line.hit(self.corners[item as usize]);
-            first.look_at(item, hit.filter(|hit| hit.distance >= 0.0))
+            nearest.add(item, hit.filter(|hit| hit.distance >= 0.0))
         });
-        first.found(|item| self.corners[item as usize])
+        nearest.point(|item| self.corners[item as usize])
     }
 
     /// Returns the intersection with the line through `origin` along `direction` that is nearest to `origin`, at most
-    /// `most` away. Its `distance` is negative behind `origin`. Otherwise as [`Self::ray_hit`].
-    pub fn line_hit(&self, origin: Vec3, direction: Vec3, most: f64) -> Option<SurfacePoint> {
-        let (origin, direction) = finite(origin, direction)?;
-        let (line, mut first) = (Line::new(origin, direction), FirstHit::within(most));
-        self.boxes.along_line(&Ray::new(origin, direction), most, |item| {
-            first.look_at(item, line.hit(self.corners[item as usize]))
+    /// `max_distance` away. Its `distance` is negative behind `origin`. Otherwise as [`Self::ray_hit`].
+    pub fn line_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<SurfacePoint> {
+        let (origin, direction) = normalized_ray(origin, direction)?;
+        let (line, mut nearest) = (Line::new(origin, direction), NearestHit::within(max_distance));
+        self.boxes.along_line(&Ray::new(origin, direction), max_distance, |item| {
+            nearest.add(item, line.hit(self.corners[item as usize]))
         });
-        first.found(|item| self.corners[item as usize])
+        nearest.point(|item| self.corners[item as usize])
     }
 
     /// Calls `visit` with every triangle whose bounding box intersects `bounds`.
-    pub fn meeting(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
-        self.boxes.meeting(bounds, visit);
+    pub fn for_each_overlapping(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
+        self.boxes.for_each_overlapping(bounds, visit);
     }
 }
 
 impl SurfacePoint {
     fn on(triangle: u32, corners: [Vec3; 3], barycentric: DVec3, distance: f64) -> Self {
-        let point = triangle::at(corners, barycentric).as_vec3();
+        let point = triangle::point_at(corners, barycentric).as_vec3();
         Self { triangle, barycentric: barycentric.as_vec3(), point, distance }
     }
 }
 
 /// Returns the origin and unit direction of a ray; `None` if they are not finite or the direction is zero.
-fn finite(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
+fn normalized_ray(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
     let direction = direction.as_dvec3().try_normalize()?;
     origin.is_finite().then(|| (origin.as_dvec3(), direction))
 }
 
 /// The nearest hit found so far by a ray or line query; among equally near ones, that of the lowest index.
-pub struct FirstHit {
-    most: f64,
+pub struct NearestHit {
+    max_distance: f64,
     found: Option<(u32, LineHit)>,
 }
 
-impl FirstHit {
-    /// Starts a query for hits at most `most` away.
-    pub fn within(most: f64) -> Self {
-        Self { most, found: None }
+impl NearestHit {
+    /// Starts a query for hits at most `max_distance` away.
+    pub fn within(max_distance: f64) -> Self {
+        Self { max_distance, found: None }
     }
 
     /// Takes a hit of triangle `item` into account, if there is one; returns the distance up to which nearer hits
     /// remain possible.
     #[inline]
-    pub fn look_at(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
-        let Some(hit) = hit else { return self.most };
+    pub fn add(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
+        let Some(hit) = hit else { return self.max_distance };
         let distance = hit.distance.abs();
-        if distance < self.most || distance == self.most && self.found.is_none_or(|(first, _)| item < first) {
-            (self.most, self.found) = (distance, Some((item, hit)));
+        if distance < self.max_distance
+            || distance == self.max_distance && self.found.is_none_or(|(nearest, _)| item < nearest)
+        {
+            (self.max_distance, self.found) = (distance, Some((item, hit)));
         }
-        self.most
+        self.max_distance
     }
 
     /// Returns the nearest hit as a surface point; `corners` returns the corner positions of a triangle.
-    pub fn found(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
+    pub fn point(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
         let (item, hit) = self.found?;
         Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))
     }
@@ -198,7 +200,9 @@ mod tests {
         let tree = TriangleTree::new(&mesh).unwrap();
         for p in points {
             let found = tree.closest(p).unwrap();
-            let distance = |c: [Vec3; 3]| triangle::at(c, triangle::closest(c, p)).distance(p.as_dvec3());
+            let distance = |c: [Vec3; 3]| {
+                triangle::point_at(c, triangle::closest_barycentric(c, p)).distance(p.as_dvec3())
+            };
             let expected = mesh.corners().map(distance).fold(f64::INFINITY, f64::min);
             assert_eq!(found.distance, expected);
             assert!((found.point.distance(p) - expected as f32).abs() < 1e-5);
@@ -249,15 +253,16 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_meet_are_all_found() {
+    fn all_overlapping_boxes_are_found() {
         let (mesh, points) = scattered();
         let tree = TriangleTree::new(&mesh).unwrap();
         for pair in points.windows(2) {
-            let bounds = Bounds::of(pair);
+            let bounds = Bounds::from_points(pair);
             let mut found = Vec::new();
-            tree.meeting(&bounds, |t| found.push(t));
+            tree.for_each_overlapping(&bounds, |t| found.push(t));
             found.sort_unstable();
-            let meets = |t: &u32| Bounds::of(&mesh.corners().nth(*t as usize).unwrap()).meets(&bounds);
+            let meets =
+                |t: &u32| Bounds::from_points(&mesh.corners().nth(*t as usize).unwrap()).overlaps(&bounds);
             assert_eq!(found, (0..mesh.triangles.len() as u32).filter(meets).collect::<Vec<_>>());
         }
     }

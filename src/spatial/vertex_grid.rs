@@ -28,29 +28,29 @@ const NONE: u32 = u32::MAX;
 /// A hierarchical hashed grid of vertices; the longest edge at a vertex determines its level.
 ///
 /// Vertices are inserted, moved and removed one by one, so that the grid can follow a mesh with few changes. Queries
-/// find all vertices as long as none has moved further than `blur` from the position last set. The order of results
-/// depends on earlier changes and must not be relied upon.
+/// find all vertices as long as none has moved further than `max_displacement` from the position last set. The order of
+/// results depends on earlier changes and must not be relied upon.
 ///
-/// If most of the mesh changes, first unlink the cells by [`Self::empty_cells`], and relink them by
-/// [`Self::fill_cells`] before the next queries.
+/// If most of the mesh changes, first unlink the cells by [`Self::unlink_cells`], and relink them by
+/// [`Self::link_cells`] before the next queries.
 #[derive(Clone, Debug, Default)]
 pub struct VertexGrid {
     /// The distance that a vertex may have moved since its position was set.
-    blur: f32,
+    max_displacement: f32,
     /// By level, the largest ball radius assigned to it.
-    bound: [f32; LEVELS],
+    max_radius: [f32; LEVELS],
     /// By level, the largest radius inserted since the cells were filled.
-    reach: [f32; LEVELS],
+    largest_radius: [f32; LEVELS],
     /// By level, the inverse of the cell side.
     inverse_cell: [f32; LEVELS],
     /// By level, the number of vertices.
-    population: [u32; LEVELS],
+    counts: [u32; LEVELS],
     /// The number of buckets, a power of two, minus 1.
     mask: u32,
     /// By bucket, the head of its list: the vertex inserted last.
     heads: Vec<u32>,
     /// Whether vertices are linked into buckets.
-    filled: bool,
+    linked: bool,
     /// By vertex slot, the entry of the vertex.
     entries: Vec<Entry>,
 }
@@ -61,7 +61,7 @@ pub struct VertexBall {
     /// The position of the vertex, the centre of the ball.
     pub position: Vec3,
     /// The length of the longest edge at the vertex, the radius of the ball.
-    pub longest: f32,
+    pub radius: f32,
     /// The id of the vertex.
     pub vertex: VertexId,
 }
@@ -73,7 +73,7 @@ struct Entry {
     level: u32,
     key: u32,
     position: Vec3,
-    longest: f32,
+    radius: f32,
     /// The next vertex in the list of the bucket.
     next: u32,
 }
@@ -93,22 +93,22 @@ pub struct Proximity {
 impl Proximity {
     /// Returns the distance up to which two vertices with the given longest edges are near each other.
     #[inline]
-    pub fn between(self, longest: f32, other: f32) -> f32 {
-        let reach = self.margin + self.share * if other > longest { other } else { longest };
+    pub fn distance_for(self, radius: f32, other: f32) -> f32 {
+        let reach = self.margin + self.share * if other > radius { other } else { radius };
         if reach > self.least { reach } else { self.least }
     }
 }
 
-const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
+const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, radius: 0.0, next: NONE };
 
 impl VertexGrid {
-    /// Creates an empty grid for about `vertices` vertices that may move by `blur` after insertion. It is fastest if
-    /// most longest edges are slightly shorter than `edge`, which must be positive.
-    pub fn new(edge: f32, blur: f32, vertices: usize) -> Self {
-        let mut grid = Self { blur, ..Self::default() };
+    /// Creates an empty grid for about `vertices` vertices that may move by `max_displacement` after insertion. It is
+    /// fastest if most longest edges are slightly shorter than `edge`, which must be positive.
+    pub fn new(edge: f32, max_displacement: f32, vertices: usize) -> Self {
+        let mut grid = Self { max_displacement, ..Self::default() };
         let mut bound = edge;
         for level in 0..LEVELS {
-            grid.bound[level] = bound;
+            grid.max_radius[level] = bound;
             grid.inverse_cell[level] = 1.0 / (CELL * bound);
             bound *= FACTOR;
         }
@@ -117,23 +117,23 @@ impl VertexGrid {
     }
 
     /// Inserts `v`, or updates its position and the length of its longest edge.
-    pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
+    pub fn set(&mut self, v: VertexId, position: Vec3, radius: f32) {
         if v.index() >= self.entries.len() {
             self.entries.resize(v.index() + 1, ABSENT_ENTRY);
-            // The lists are too long: cells are unlinked, so that the next `fill_cells` builds more buckets.
-            self.filled &= self.entries.len() <= 2 * LOAD * self.heads.len();
+            // The lists are too long: cells are unlinked, so that the next `link_cells` builds more buckets.
+            self.linked &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }
-        let level = self.level_of(longest);
+        let level = self.level_of(radius);
         let old = self.entries[v.index()];
-        let mut entry = Entry { level: level as u32, position, longest, ..old };
-        if self.filled {
-            if longest > self.reach[level] {
-                self.reach[level] = longest;
+        let mut entry = Entry { level: level as u32, position, radius, ..old };
+        if self.linked {
+            if radius > self.largest_radius[level] {
+                self.largest_radius[level] = radius;
             }
             entry.key = self.key(self.cell(position, level), level);
             if (old.level, old.key) != (entry.level, entry.key) {
-                self.leave(v, old);
-                self.population[level] += 1;
+                self.unlink(v, old);
+                self.counts[level] += 1;
                 let head = self.head_mut(entry.key);
                 entry.next = std::mem::replace(head, v.0);
             }
@@ -141,44 +141,44 @@ impl VertexGrid {
         self.entries[v.index()] = entry;
     }
 
-    /// Unlinks all vertices from their cells until [`Self::fill_cells`] is called. Meanwhile updates are cheap, and
+    /// Unlinks all vertices from their cells until [`Self::link_cells`] is called. Meanwhile updates are cheap, and
     /// queries visit all vertices.
-    pub fn empty_cells(&mut self) {
-        self.filled = false;
+    pub fn unlink_cells(&mut self) {
+        self.linked = false;
     }
 
     /// Links all vertices into their cells, if they are not linked.
-    pub fn fill_cells(&mut self) {
-        if self.filled {
+    pub fn link_cells(&mut self) {
+        if self.linked {
             return;
         }
         let count = (self.entries.len() / LOAD).max(64).next_power_of_two();
         self.mask = count as u32 - 1;
         self.heads.clear();
         self.heads.resize(count, NONE);
-        (self.population, self.reach) = ([0; LEVELS], [0.0; LEVELS]);
+        (self.counts, self.largest_radius) = ([0; LEVELS], [0.0; LEVELS]);
         // In reverse, so that lists are in memory order.
         for i in (0..self.entries.len()).rev() {
-            let Entry { level, position, longest, .. } = self.entries[i];
+            let Entry { level, position, radius, .. } = self.entries[i];
             if level == ABSENT {
                 continue;
             }
             let level = level as usize;
-            self.population[level] += 1;
-            if longest > self.reach[level] {
-                self.reach[level] = longest;
+            self.counts[level] += 1;
+            if radius > self.largest_radius[level] {
+                self.largest_radius[level] = radius;
             }
             let key = self.key(self.cell(position, level), level);
             let next = std::mem::replace(self.head_mut(key), i as u32);
             self.entries[i] = Entry { key, next, ..self.entries[i] };
         }
-        self.filled = true;
+        self.linked = true;
     }
 
     /// Increases the longest edge of `v`, which must be in the grid, to `edge` if that is longer.
-    pub fn stretch(&mut self, v: VertexId, edge: f32) {
-        let Entry { position, longest, .. } = self.entries[v.index()];
-        if edge > longest {
+    pub fn raise_radius(&mut self, v: VertexId, edge: f32) {
+        let Entry { position, radius, .. } = self.entries[v.index()];
+        if edge > radius {
             self.set(v, position, edge);
         }
     }
@@ -191,31 +191,31 @@ impl VertexGrid {
 
     /// Returns the longest edge last set for `v`, which must be in the grid.
     #[inline]
-    pub fn longest(&self, v: VertexId) -> f32 {
-        self.entries[v.index()].longest
+    pub fn radius(&self, v: VertexId) -> f32 {
+        self.entries[v.index()].radius
     }
 
     /// Returns the bounding ball last set for `v`, which must be in the grid.
     #[inline]
     pub fn ball(&self, v: VertexId) -> VertexBall {
-        let Entry { position, longest, .. } = self.entries[v.index()];
-        VertexBall { position, longest, vertex: v }
+        let Entry { position, radius, .. } = self.entries[v.index()];
+        VertexBall { position, radius, vertex: v }
     }
 
     /// Removes `v` if it is in the grid.
     pub fn remove(&mut self, v: VertexId) {
         if let Some(entry) = self.entries.get_mut(v.index()) {
             let old = std::mem::replace(entry, ABSENT_ENTRY);
-            self.leave(v, old);
+            self.unlink(v, old);
         }
     }
 
     /// Unlinks `v` from its bucket, given its entry `old`.
-    fn leave(&mut self, v: VertexId, old: Entry) {
-        if old.level == ABSENT || !self.filled {
+    fn unlink(&mut self, v: VertexId, old: Entry) {
+        if old.level == ABSENT || !self.linked {
             return;
         }
-        self.population[old.level as usize] -= 1;
+        self.counts[old.level as usize] -= 1;
         let mut at = *self.head_mut(old.key);
         if at == v.0 {
             *self.head_mut(old.key) = old.next;
@@ -237,7 +237,7 @@ impl VertexGrid {
     /// With a share of 1/√3, these include a corner of every triangle that intersects the box: no point of a triangle
     /// is further from its nearest corner, relative to the longest edge.
     pub fn near_box(&self, bounds: &Bounds, share: f32, mut found: impl FnMut(VertexId)) {
-        let radius = |reach| share * (reach + 2.0 * self.blur);
+        let radius = |reach| share * (reach + 2.0 * self.max_displacement);
         self.search(bounds, radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
@@ -247,11 +247,13 @@ impl VertexGrid {
         self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `longest`: all
-    /// whose distance from the box, in each axis, is at most [`Proximity::between`], and some further away.
-    pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
+    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `own_radius`: all
+    /// whose distance from the box, in each axis, is at most [`Proximity::distance_for`], and some further away.
+    pub fn near_balls(&self, bounds: &Bounds, own_radius: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
-        let radius = |other: f32| near.between(longest, other + 2.0 * self.blur) + self.blur;
+        let radius = |other: f32| {
+            near.distance_for(own_radius, other + 2.0 * self.max_displacement) + self.max_displacement
+        };
         self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
 
@@ -265,24 +267,24 @@ impl VertexGrid {
     /// the longest edge; with cells filled, it is evaluated only for the largest ball of each level.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
-        if !self.filled {
-            return self.search_unfilled(bounds, radius, found);
+        if !self.linked {
+            return self.search_unlinked(bounds, radius, found);
         }
-        for level in (0..LEVELS).filter(|&level| self.population[level] > 0) {
-            let around = Vec3::splat(radius(self.reach[level]) + self.blur);
+        for level in (0..LEVELS).filter(|&level| self.counts[level] > 0) {
+            let around = Vec3::splat(radius(self.largest_radius[level]) + self.max_displacement);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
             self.search_level(level, &wide, found);
         }
     }
 
-    fn search_unfilled(
+    fn search_unlinked(
         &self,
         bounds: &Bounds,
         radius: impl Fn(f32) -> f32,
         found: &mut impl FnMut(&VertexBall),
     ) {
         for (i, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.level != ABSENT) {
-            let around = Vec3::splat(radius(entry.longest) + self.blur);
+            let around = Vec3::splat(radius(entry.radius) + self.max_displacement);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
             if wide.contains(entry.position) {
                 found(&self.ball(VertexId::from_index(i)));
@@ -295,7 +297,7 @@ impl VertexGrid {
         let (low, high) = (self.cell(wide.min, level), self.cell(wide.max, level));
         let counts = [0, 1, 2].map(|k| i64::from(high[k]) - i64::from(low[k]) + 1);
         let cells = counts[0] as f64 * counts[1] as f64 * counts[2] as f64;
-        if cells > 64.0 + f64::from(self.population[level]) {
+        if cells > 64.0 + f64::from(self.counts[level]) {
             return self.search_all(level, wide, found);
         }
         for x in low[0]..=high[0] {
@@ -313,9 +315,9 @@ impl VertexGrid {
     fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let mut at = self.heads[(key & self.mask) as usize];
         while at != NONE {
-            let &Entry { position, longest, next, .. } = &self.entries[at as usize];
+            let &Entry { position, radius, next, .. } = &self.entries[at as usize];
             if self.entries[at as usize].key == key && wide.contains(position) {
-                found(&VertexBall { position, longest, vertex: VertexId(at) });
+                found(&VertexBall { position, radius, vertex: VertexId(at) });
             }
             at = next;
         }
@@ -329,8 +331,8 @@ impl VertexGrid {
         }
     }
 
-    fn level_of(&self, longest: f32) -> usize {
-        (0..LEVELS).find(|&level| longest <= self.bound[level]).unwrap_or(LEVELS - 1)
+    fn level_of(&self, radius: f32) -> usize {
+        (0..LEVELS).find(|&level| radius <= self.max_radius[level]).unwrap_or(LEVELS - 1)
     }
 
     #[inline]
@@ -383,8 +385,8 @@ mod tests {
         for _ in 0..3000 {
             let v = (next() * 600.0) as usize;
             match next() {
-                x if x < 0.002 => grid.empty_cells(),
-                x if x < 0.01 => grid.fill_cells(),
+                x if x < 0.002 => grid.unlink_cells(),
+                x if x < 0.01 => grid.link_cells(),
                 _ => {}
             }
             if next() < 0.2 {
@@ -392,16 +394,16 @@ mod tests {
                 known[v] = None;
                 continue;
             }
-            let longest = [0.001, 0.5, 0.9, 1.0, 1.4, 7.0, 1e9][(next() * next() * 7.0) as usize] * next();
+            let radius = [0.001, 0.5, 0.9, 1.0, 1.4, 7.0, 1e9][(next() * next() * 7.0) as usize] * next();
             let position = Vec3::new(next(), next(), next()) * 20.0 - 10.0;
-            grid.set(VertexId::from_index(v), position, longest);
-            known[v] = Some((position, longest));
+            grid.set(VertexId::from_index(v), position, radius);
+            known[v] = Some((position, radius));
         }
         known
     }
 
     fn expected(known: &Known, near: impl Fn(Vec3, f32) -> bool) -> Vec<usize> {
-        (0..known.len()).filter(|&v| known[v].is_some_and(|(p, longest)| near(p, longest))).collect()
+        (0..known.len()).filter(|&v| known[v].is_some_and(|(p, radius)| near(p, radius))).collect()
     }
 
     /// Asserts that `found` has no duplicates and contains all `expected` vertices.
@@ -419,7 +421,7 @@ mod tests {
             let known = shuffled(&mut grid, &mut next);
             for turn in 0..100 {
                 if turn == 20 {
-                    grid.fill_cells();
+                    grid.link_cells();
                 }
                 let p = Vec3::new(next(), next(), next()) * 24.0 - 12.0;
                 let mut found = Vec::new();
@@ -429,14 +431,14 @@ mod tests {
                 let bounds = Bounds { min: p, max: p + Vec3::new(next(), next(), next()) };
                 let mut found = Vec::new();
                 grid.near_box(&bounds, 0.5, |v| found.push(v.index()));
-                let in_box = |q, longest| bounds.distance_squared(q).sqrt() < 0.5 * f64::from(longest);
+                let in_box = |q, radius| bounds.distance_squared(q).sqrt() < 0.5 * f64::from(radius);
                 assert_complete(found, &expected(&known, in_box));
 
                 let near = Proximity { least: 0.7, margin: 0.1, share: 0.8 };
                 let mut found = Vec::new();
                 grid.near_balls(&bounds, 1.1, near, &mut found);
                 let in_reach =
-                    |q, longest| bounds.distance_squared(q).sqrt() < f64::from(near.between(1.1, longest));
+                    |q, radius| bounds.distance_squared(q).sqrt() < f64::from(near.distance_for(1.1, radius));
                 let found = found.into_iter().map(|ball| ball.vertex.index()).collect();
                 assert_complete(found, &expected(&known, in_reach));
             }
@@ -444,11 +446,11 @@ mod tests {
     }
 
     #[test]
-    fn searches_allow_for_positions_that_are_a_blur_old() {
+    fn queries_allow_for_displacements_since_the_update() {
         let mut next = numbers(4);
         let mut grid = VertexGrid::new(1.0, 0.25, 10);
         let mut known = shuffled(&mut grid, &mut next);
-        grid.fill_cells();
+        grid.link_cells();
         for entry in known.iter_mut().flatten() {
             let shift = Vec3::new(next(), next(), next()) - 0.5;
             entry.0 += shift * (0.25 / shift.length());

@@ -5,7 +5,7 @@ use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
 /// Largest binning factor along an axis.
-const MOST: usize = 16;
+const MAX_FACTOR: usize = 16;
 
 impl Volume {
     /// Returns the volume binned by `factors` along x, y and z: each voxel is the mean of a block, in every frame, and
@@ -18,9 +18,9 @@ impl Volume {
     /// A factor not in 1..=16, or larger than the number of voxels along its axis; [`VolumeError::TooLarge`].
     pub fn binned(&self, factors: [usize; 3]) -> Result<Volume, VolumeError> {
         let dims = self.dims();
-        if (0..3).any(|axis| !(1..=MOST).contains(&factors[axis]) || factors[axis] > dims[axis]) {
+        if (0..3).any(|axis| !(1..=MAX_FACTOR).contains(&factors[axis]) || factors[axis] > dims[axis]) {
             let problem = format!(
-                "{factors:?} given; 1 to {MOST}, and no more than there are voxels ({dims:?}), is accepted"
+                "must be 1 to {MAX_FACTOR} and at most the number of voxels ({dims:?}) on each axis, got {factors:?}"
             );
             return Err(VolumeError::invalid("factors", problem));
         }

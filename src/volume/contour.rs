@@ -25,7 +25,7 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
 pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
     let mut mesh = marching_cubes(&volume.grid(frame)?, iso as f32)?;
-    place(&mut mesh, &volume.affine());
+    to_world(&mut mesh, &volume.affine());
     Ok(mesh)
 }
 
@@ -39,14 +39,14 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
 pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
-        return Err(VolumeError::invalid("iso", format!("{iso} given; a finite number is needed")));
+        return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
     grid.check()?;
-    let mut march = March::new(grid, iso)?;
+    let mut marching = MarchingCubes::new(grid, iso)?;
     for z in 0..=grid.dims[2] {
-        march.layer(z)?;
+        marching.layer(z)?;
     }
-    Ok(march.mesh)
+    Ok(marching.mesh)
 }
 
 /// Reserves memory for `additional` elements, growing by at least a quarter: doubling the arrays of a large surface would
@@ -60,7 +60,7 @@ fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError
 }
 
 /// Maps positions to world space, and reverses the triangles if the map is a reflection.
-fn place(mesh: &mut TriangleMesh, affine: &DAffine3) {
+fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3) {
     for p in &mut mesh.positions {
         *p = affine.transform_point3(p.as_dvec3()).as_vec3();
     }
@@ -73,7 +73,7 @@ fn place(mesh: &mut TriangleMesh, affine: &DAffine3) {
 
 /// State of marching cubes over one grid, processed layer by layer. Nodes are voxels of the padded grid: node (x, y, z)
 /// is voxel (x-1, y-1, z-1).
-struct March<'a> {
+struct MarchingCubes<'a> {
     grid: &'a Grid,
     iso: f32,
     cases: &'static [Case],
@@ -89,7 +89,7 @@ struct March<'a> {
     mesh: TriangleMesh,
 }
 
-impl<'a> March<'a> {
+impl<'a> MarchingCubes<'a> {
     fn new(grid: &'a Grid, iso: f32) -> Result<Self, VolumeError> {
         let size = [grid.dims[0] + 2, grid.dims[1] + 2];
         let plane = size[0] * size[1];
@@ -111,7 +111,7 @@ impl<'a> March<'a> {
         let offsets = self.edge_offsets(z);
         for y in 0..self.size[1] - 1 {
             self.find_cases(y, z);
-            self.make_room()?;
+            self.reserve_row()?;
             self.emit_row(y, z, &offsets);
         }
         Ok(())
@@ -150,7 +150,7 @@ impl<'a> March<'a> {
     }
 
     /// Reserves memory for the most that one row of cubes can add: three vertices and five triangles per cube.
-    fn make_room(&mut self) -> Result<(), VolumeError> {
+    fn reserve_row(&mut self) -> Result<(), VolumeError> {
         let (vertices, triangles) = (3 * self.row.len(), 5 * self.row.len());
         let mesh = &mut self.mesh;
         let bytes = 12 * (mesh.positions.len() + mesh.triangles.len() + vertices + triangles) as u64;
@@ -158,8 +158,8 @@ impl<'a> March<'a> {
         if mesh.positions.len() + vertices > u32::MAX as usize {
             return Err(too_large);
         }
-        let room = grow(&mut mesh.positions, vertices).and_then(|()| grow(&mut mesh.triangles, triangles));
-        room.map_err(|_| too_large)
+        let grown = grow(&mut mesh.positions, vertices).and_then(|()| grow(&mut mesh.triangles, triangles));
+        grown.map_err(|_| too_large)
     }
 
     /// Appends the vertices and triangles of one row of cubes.
@@ -249,7 +249,7 @@ fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, VolumeError> {
 mod tests {
     use super::*;
     use crate::math::{DMat3, DVec3};
-    use crate::mesh::count_crossings;
+    use crate::mesh::count_self_intersections;
     use crate::volume::{Space, VolumeInit, Voxels};
     use std::collections::BTreeMap;
     #[cfg(target_arch = "wasm32")]
@@ -373,18 +373,18 @@ mod tests {
     }
 
     #[test]
-    fn noise_crosses_itself_neither_in_index_nor_in_world_coordinates() {
+    fn noise_has_no_self_intersections_in_index_or_world_coordinates() {
         for seed in 0..12 {
             let grid = noise([14, 12, 13], seed, 7);
             let mut mesh = marching_cubes(&grid, 2.0 + (seed % 3) as f32 * 0.75).unwrap();
-            assert_eq!(count_crossings(&mesh), 0, "seed {seed}, in index coordinates");
+            assert_eq!(count_self_intersections(&mesh), 0, "seed {seed}, in index coordinates");
             let axes = DMat3::from_cols(
                 DVec3::new(0.54, 0.72, 1.2),
                 DVec3::new(-1.6, 1.2, 0.0),
                 DVec3::new(-1.44, -1.92, 1.8),
             );
-            place(&mut mesh, &DAffine3::from_mat3_translation(axes, DVec3::new(-120.0, 90.0, 300.0)));
-            assert_eq!(count_crossings(&mesh), 0, "seed {seed}, in world coordinates");
+            to_world(&mut mesh, &DAffine3::from_mat3_translation(axes, DVec3::new(-120.0, 90.0, 300.0)));
+            assert_eq!(count_self_intersections(&mesh), 0, "seed {seed}, in world coordinates");
         }
     }
 

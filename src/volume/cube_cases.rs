@@ -9,7 +9,7 @@
 //! diagonal joins two edges of one face. A diagonal within a face could be used by the neighbouring cube, too, and the
 //! edge would then have four triangles. For loops of up to six, any such triangulation is free of self-intersections
 //! wherever the vertices lie on their edges. Of the sixteen for a loop of seven some are not, and that of least area is
-//! free of them; `tests::no_case_crosses_itself` verifies this.
+//! free of them; `tests::no_case_intersects_itself` verifies this.
 
 use std::sync::OnceLock;
 
@@ -92,7 +92,7 @@ fn faces() -> [[usize; 4]; 6] {
 
 /// Returns the closed loops of cut edges of a case, oriented so that their triangles face outwards.
 fn loops(case: usize) -> Vec<Vec<usize>> {
-    let mut next = follow_faces(case);
+    let mut next = next_on_loop(case);
     let mut out = Vec::new();
     for start in 0..EDGES.len() {
         let mut contour = Vec::new();
@@ -109,7 +109,7 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
 }
 
 /// Returns, for each cut edge, the next cut edge on its loop.
-fn follow_faces(case: usize) -> [Option<usize>; 12] {
+fn next_on_loop(case: usize) -> [Option<usize>; 12] {
     let inside = |corner: usize| case >> corner & 1 == 1;
     let between = edges_between();
     let mut next = [None; 12];
@@ -223,15 +223,15 @@ mod tests {
     }
 
     #[test]
-    fn no_case_crosses_itself() {
+    fn no_case_intersects_itself() {
         let mut state = 7;
         for (number, case) in cases().iter().enumerate() {
             for _ in 0..200 {
                 let points: [DVec3; 12] = std::array::from_fn(|e| point_on(e, random_fraction(&mut state)));
                 for (i, &a) in case.triangles.iter().enumerate() {
                     for &b in &case.triangles[..i] {
-                        let crosses = one_pierces(a, b, &points) || one_pierces(b, a, &points);
-                        assert!(!crosses, "case {number}: {a:?} and {b:?} cross at {points:?}");
+                        let intersect = one_pierces(a, b, &points) || one_pierces(b, a, &points);
+                        assert!(!intersect, "case {number}: {a:?} and {b:?} intersect at {points:?}");
                     }
                 }
             }

@@ -1,7 +1,7 @@
 //! Interpolated slices for volumes with thick slices (dynamic surfaces from 4D cardiac MRI, section 5.2).
 
 use super::error::{VolumeError, reserve};
-use super::flow::{Flow, Picture, symmetric_flow};
+use super::flow::{Flow, Image, symmetric_flow};
 use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DVec3};
@@ -17,7 +17,7 @@ pub enum Enrichment {
 }
 
 /// Largest factor of slice interpolation: beyond, further slices add no information.
-const MOST: usize = 16;
+const MAX_FACTOR: usize = 16;
 
 impl Volume {
     /// Returns the volume with `factor` − 1 slices interpolated between each pair of neighbouring slices along the axis
@@ -32,8 +32,8 @@ impl Volume {
     pub fn enrich_slices(&self, factor: Option<usize>, method: Enrichment) -> Result<Volume, VolumeError> {
         let axis = self.thick_axis();
         let factor = factor.unwrap_or_else(|| self.isotropic_factor(axis));
-        if !(1..=MOST).contains(&factor) {
-            let problem = format!("{factor} given; 1 to {MOST} is accepted");
+        if !(1..=MAX_FACTOR).contains(&factor) {
+            let problem = format!("must be 1 to {MAX_FACTOR}, got {factor}");
             return Err(VolumeError::invalid("factor", problem));
         }
         if factor == 1 {
@@ -41,8 +41,7 @@ impl Volume {
         }
         let count = self.dims[axis];
         if count < 2 {
-            let problem =
-                "the volume has one slice along its largest spacing; between two or more there is room";
+            let problem = "must be 1 for a single slice along the axis of the largest spacing";
             return Err(VolumeError::invalid("factor", problem));
         }
         let mut dims = self.dims;
@@ -77,7 +76,7 @@ impl Volume {
         let spacing = self.spacing();
         let others = (spacing[(axis + 1) % 3] + spacing[(axis + 2) % 3]) / 2.0;
         let factor = (spacing[axis] / others).round();
-        if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MOST as f64) as usize }
+        if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MAX_FACTOR as f64) as usize }
     }
 
     /// Returns one frame with its interpolated slices, as stored values.
@@ -99,22 +98,24 @@ impl Volume {
         let stored = |index: usize| self.voxels.get(start + index).unwrap_or(f64::NAN);
         // The flow is computed on normalised intensities, which are finite even for NaN voxels.
         let intensities = self.normalised_grid(frame)?.values;
-        let mut before = slices.picture(0, &intensities)?;
+        let mut before = slices.image(0, &intensities)?;
         for slice in 0..dims[axis] {
-            let given = slices.places(slice).map(stored);
-            out.places(slice * factor).zip(given).for_each(|(at, value)| values[at] = value);
+            let given = slices.voxel_indices(slice).map(stored);
+            out.voxel_indices(slice * factor).zip(given).for_each(|(at, value)| values[at] = value);
             if slice + 1 == dims[axis] {
                 break;
             }
-            let after = slices.picture(slice + 1, &intensities)?;
+            let after = slices.image(slice + 1, &intensities)?;
             let flow = match method {
-                Enrichment::Flow => Some(believable(&before, &after, symmetric_flow(&before, &after)?)?),
+                Enrichment::Flow => {
+                    Some(weighted_by_confidence(&before, &after, symmetric_flow(&before, &after)?)?)
+                }
                 Enrichment::Linear => None,
             };
             for step in 1..factor {
-                let picture = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
-                let made = picture.values.iter().map(|&value| self.stored(f64::from(value)));
-                out.places(slice * factor + step).zip(made).for_each(|(at, value)| values[at] = value);
+                let image = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
+                let made = image.values.iter().map(|&value| self.stored(f64::from(value)));
+                out.voxel_indices(slice * factor + step).zip(made).for_each(|(at, value)| values[at] = value);
             }
             before = after;
         }
@@ -148,21 +149,21 @@ impl Slices {
     }
 
     /// Returns the voxel indices of a slice, row by row.
-    fn places(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
+    fn voxel_indices(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
         let Self { across, down, steps: [step, row, along] } = *self;
         (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
     }
 
-    fn picture(&self, slice: usize, values: &[f32]) -> Result<Picture, VolumeError> {
+    fn image(&self, slice: usize, values: &[f32]) -> Result<Image, VolumeError> {
         let mut out = reserve(self.across * self.down)?;
-        out.extend(self.places(slice).map(|at| values[at]));
-        Ok(Picture { width: self.across, height: self.down, values: out })
+        out.extend(self.voxel_indices(slice).map(|at| values[at]));
+        Ok(Image { width: self.across, height: self.down, values: out })
     }
 }
 
 /// Scales the flow at each pixel by its confidence: the share of the squared difference between the two images that
 /// warping removes. 1 if the warped images agree, 0 if warping does not reduce the difference.
-fn believable(before: &Picture, after: &Picture, mut flow: Flow) -> Result<Flow, VolumeError> {
+fn weighted_by_confidence(before: &Image, after: &Image, mut flow: Flow) -> Result<Flow, VolumeError> {
     let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
     let moved = squared_differences(&left, &right)?;
     let still = squared_differences(before, after)?;
@@ -176,23 +177,18 @@ fn believable(before: &Picture, after: &Picture, mut flow: Flow) -> Result<Flow,
 }
 
 /// Returns the squared differences of two images, summed over the window around each pixel.
-fn squared_differences(one: &Picture, other: &Picture) -> Result<Picture, VolumeError> {
+fn squared_differences(one: &Image, other: &Image) -> Result<Image, VolumeError> {
     let mut values = reserve(one.values.len())?;
     values.extend(one.values.iter().zip(&other.values).map(|(a, b)| (a - b) * (a - b)));
-    Picture { values, ..*one }.window_sums()
+    Image { values, ..*one }.window_sums()
 }
 
 /// Returns the image interpolated at fraction `share` from `before` to `after`, along the flow if there is one.
-fn in_between(
-    before: &Picture,
-    after: &Picture,
-    flow: Option<&Flow>,
-    share: f32,
-) -> Result<Picture, VolumeError> {
-    let mix = |left: &Picture, right: &Picture| {
+fn in_between(before: &Image, after: &Image, flow: Option<&Flow>, share: f32) -> Result<Image, VolumeError> {
+    let mix = |left: &Image, right: &Image| {
         let mut values = reserve(left.values.len())?;
         values.extend(left.values.iter().zip(&right.values).map(|(a, b)| a + (b - a) * share));
-        Ok(Picture { values, ..*left })
+        Ok(Image { values, ..*left })
     };
     match flow {
         Some(flow) => mix(&before.warped(flow, -share)?, &after.warped(flow, 1.0 - share)?),

@@ -12,7 +12,7 @@ pub enum VolumeError {
         problem: String,
     },
     /// An allocation failed.
-    #[error("the volume needs {bytes} bytes, more than can be had")]
+    #[error("the volume needs {bytes} bytes, more than is available")]
     TooLarge {
         /// Bytes that the operation would need.
         bytes: u64,

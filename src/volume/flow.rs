@@ -11,30 +11,30 @@ use super::sampling::locate;
 const RADIUS: usize = 5;
 
 /// Number of rows whose running sums are computed together, which hides the latency of dependent additions.
-const TOGETHER: usize = 4;
+const ROWS_AT_ONCE: usize = 4;
 
 /// Iterations on each level of the pyramid.
-const STEPS: usize = 4;
+const ITERATIONS: usize = 4;
 
 /// Iterations on the finest level if there are coarser ones: they take most of the time and change least.
-const LAST_STEPS: usize = 2;
+const FINEST_ITERATIONS: usize = 2;
 
 /// Largest change of the flow per iteration, in pixels of the level: the gradients are not valid further away.
-const LONGEST: f32 = 1.0;
+const MAX_STEP: f32 = 1.0;
 
 /// Smallest image size of a coarser level, pixels: images are halved only while both sides are at least twice this.
-const SMALLEST: usize = 24;
+const MIN_IMAGE_SIZE: usize = 24;
 
 /// Largest number of pyramid levels: an iteration on the coarsest moves by up to 4 pixels of the finest.
-const LEVELS: usize = 3;
+const MAX_LEVELS: usize = 3;
 
 /// Regularisation added to the diagonal of the normal equations, relative to the mean squared gradient of the image:
 /// the flow is 0 in regions without contrast.
-const STILLNESS: f32 = 0.2;
+const REGULARISATION: f32 = 0.2;
 
 /// A 2D image, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Picture {
+pub(super) struct Image {
     pub width: usize,
     pub height: usize,
     pub values: Vec<f32>,
@@ -42,11 +42,11 @@ pub(super) struct Picture {
 
 /// Optical flow along x and y for each pixel of the midpoint image, pixels.
 pub(super) struct Flow {
-    pub x: Picture,
-    pub y: Picture,
+    pub x: Image,
+    pub y: Image,
 }
 
-impl Picture {
+impl Image {
     /// Returns an image of constant value.
     pub fn flat(width: usize, height: usize, value: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(width * height)?;
@@ -76,8 +76,9 @@ impl Picture {
     pub fn warped(&self, flow: &Flow, share: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(self.values.len())?;
         for (y, (us, vs)) in flow.x.rows().zip(flow.y.rows()).enumerate() {
-            let ways = us.iter().zip(vs).enumerate();
-            values.extend(ways.map(|(x, (u, v))| self.at(x as f32 + share * u, y as f32 + share * v)));
+            let displacements = us.iter().zip(vs).enumerate();
+            values
+                .extend(displacements.map(|(x, (u, v))| self.at(x as f32 + share * u, y as f32 + share * v)));
         }
         Ok(Self { values, ..*self })
     }
@@ -120,10 +121,12 @@ impl Picture {
     pub fn window_sums(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width, self.height);
         let mut along = Self::flat(width, height, 0.0)?;
-        let whole = height / TOGETHER * TOGETHER * width;
+        let whole = height / ROWS_AT_ONCE * ROWS_AT_ONCE * width;
         let ((rows, last), (to, last_to)) = (self.values.split_at(whole), along.values.split_at_mut(whole));
-        for (rows, to) in rows.chunks_exact(TOGETHER * width).zip(to.chunks_exact_mut(TOGETHER * width)) {
-            running_sums::<TOGETHER>(rows, to);
+        for (rows, to) in
+            rows.chunks_exact(ROWS_AT_ONCE * width).zip(to.chunks_exact_mut(ROWS_AT_ONCE * width))
+        {
+            running_sums::<ROWS_AT_ONCE>(rows, to);
         }
         for (row, to) in last.chunks_exact(width).zip(last_to.chunks_exact_mut(width)) {
             running_sums::<1>(row, to);
@@ -165,7 +168,7 @@ fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
 }
 
 /// Computes a quarter of the difference between the two neighbours of each pixel, the border replicated.
-fn slopes_along(row: &[f32], out: &mut [f32]) {
+fn row_gradient(row: &[f32], out: &mut [f32]) {
     let last = row.len() - 1;
     for (slope, pair) in out[1..].iter_mut().zip(row.windows(3)) {
         *slope = 0.25 * (pair[2] - pair[0]);
@@ -185,34 +188,34 @@ fn between(x: f32, n: usize) -> (usize, usize, f32) {
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`].
-pub(super) fn symmetric_flow(a: &Picture, b: &Picture) -> Result<Flow, VolumeError> {
+pub(super) fn symmetric_flow(a: &Image, b: &Image) -> Result<Flow, VolumeError> {
     let mut levels = vec![(a.clone(), b.clone())];
     while let Some((a, b)) = levels.last()
-        && levels.len() < LEVELS
-        && a.width.min(a.height) >= 2 * SMALLEST
+        && levels.len() < MAX_LEVELS
+        && a.width.min(a.height) >= 2 * MIN_IMAGE_SIZE
     {
         levels.push((a.halved()?, b.halved()?));
     }
     let (coarsest, _) = &levels[levels.len() - 1];
-    let still = Picture::flat(coarsest.width, coarsest.height, 0.0)?;
+    let still = Image::flat(coarsest.width, coarsest.height, 0.0)?;
     let mut flow = Flow { x: still.clone(), y: still };
     for (level, (a, b)) in levels.iter().enumerate().rev() {
         if flow.x.width != a.width || flow.x.height != a.height {
             flow = Flow { x: flow.x.doubled(a.width, a.height)?, y: flow.y.doubled(a.width, a.height)? };
         }
-        for _ in 0..if level == 0 && levels.len() > 1 { LAST_STEPS } else { STEPS } {
-            improve(a, b, &mut flow)?;
+        for _ in 0..if level == 0 && levels.len() > 1 { FINEST_ITERATIONS } else { ITERATIONS } {
+            iterate(a, b, &mut flow)?;
         }
     }
     Ok(flow)
 }
 
 /// Performs one least-squares iteration on the flow and smooths it by window means.
-fn improve(a: &Picture, b: &Picture, flow: &mut Flow) -> Result<(), VolumeError> {
+fn iterate(a: &Image, b: &Image, flow: &mut Flow) -> Result<(), VolumeError> {
     let (before, after) = (a.warped(flow, -0.5)?, b.warped(flow, 0.5)?);
-    let normal = Normal::of(&before, &after)?;
+    let equations = NormalEquations::of(&before, &after)?;
     for i in 0..before.values.len() {
-        let (x, y) = normal.step(i);
+        let (x, y) = equations.step(i);
         flow.x.values[i] += x;
         flow.y.values[i] += y;
     }
@@ -224,19 +227,19 @@ fn improve(a: &Picture, b: &Picture, flow: &mut Flow) -> Result<(), VolumeError>
 
 /// Normal equations of the flow at each pixel, summed over its window: products of gradients (`xx`, `xy`, `yy`), and of
 /// gradients with differences (`xd`, `yd`).
-struct Normal {
-    xx: Picture,
-    xy: Picture,
-    yy: Picture,
-    xd: Picture,
-    yd: Picture,
-    stillness: f32,
+struct NormalEquations {
+    xx: Image,
+    xy: Image,
+    yy: Image,
+    xd: Image,
+    yd: Image,
+    regularisation: f32,
 }
 
-impl Normal {
-    fn of(before: &Picture, after: &Picture) -> Result<Self, VolumeError> {
+impl NormalEquations {
+    fn of(before: &Image, after: &Image) -> Result<Self, VolumeError> {
         let (width, height) = (before.width, before.height);
-        let empty = || Picture::flat(width, height, 0.0);
+        let empty = || Image::flat(width, height, 0.0);
         let [mut xx, mut xy, mut yy, mut xd, mut yd] = [empty()?, empty()?, empty()?, empty()?, empty()?];
         let mut both = reserve(before.values.len())?;
         both.extend(before.values.iter().zip(&after.values).map(|(a, b)| a + b));
@@ -245,7 +248,7 @@ impl Normal {
         for y in 0..height {
             // Gradient of the mean of both images, by central differences over two pixels.
             let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(height - 1)));
-            slopes_along(row(y), &mut slopes);
+            row_gradient(row(y), &mut slopes);
             for x in 0..width {
                 let i = y * width + x;
                 let (gx, gy) = (slopes[x], 0.25 * (below[x] - above[x]));
@@ -259,15 +262,15 @@ impl Normal {
         }
         let squares: f32 = xx.values.iter().zip(&yy.values).map(|(a, b)| a + b).sum();
         let window = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as f32;
-        let stillness = STILLNESS * window * squares / (width * height) as f32;
+        let regularisation = REGULARISATION * window * squares / (width * height) as f32;
         let [xx, xy, yy] = [xx.window_sums()?, xy.window_sums()?, yy.window_sums()?];
-        Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, stillness })
+        Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, regularisation })
     }
 
-    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`LONGEST`].
+    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`MAX_STEP`].
     #[inline]
     fn step(&self, i: usize) -> (f32, f32) {
-        let (xx, yy) = (self.xx.values[i] + self.stillness, self.yy.values[i] + self.stillness);
+        let (xx, yy) = (self.xx.values[i] + self.regularisation, self.yy.values[i] + self.regularisation);
         let xy = self.xy.values[i];
         let determinant = xx * yy - xy * xy;
         if determinant <= 0.0 {
@@ -277,7 +280,7 @@ impl Normal {
         let x = (xy * yd - yy * xd) / determinant;
         let y = (xy * xd - xx * yd) / determinant;
         let length = (x * x + y * y).sqrt();
-        let scale = if length > LONGEST { LONGEST / length } else { 1.0 };
+        let scale = if length > MAX_STEP { MAX_STEP / length } else { 1.0 };
         (x * scale, y * scale)
     }
 }
@@ -289,13 +292,13 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Returns an image of a disc with a smooth edge.
-    fn disc(center: [f32; 2], radius: f32) -> Picture {
+    fn disc(center: [f32; 2], radius: f32) -> Image {
         let (width, height) = (64, 48);
         let value = |i: usize| {
             let (x, y) = ((i % width) as f32 - center[0], (i / width) as f32 - center[1]);
             100.0 / (1.0 + libm::expf(libm::hypotf(x, y) - radius))
         };
-        Picture { width, height, values: (0..width * height).map(value).collect() }
+        Image { width, height, values: (0..width * height).map(value).collect() }
     }
 
     #[test]
@@ -314,19 +317,19 @@ mod tests {
     }
 
     #[test]
-    fn pictures_alike_or_empty_stay_where_they_are() {
-        for picture in [disc([30.0, 20.0], 8.0), Picture::flat(64, 48, 3.0).unwrap()] {
-            let flow = symmetric_flow(&picture, &picture).unwrap();
+    fn equal_or_constant_images_have_no_flow() {
+        for image in [disc([30.0, 20.0], 8.0), Image::flat(64, 48, 3.0).unwrap()] {
+            let flow = symmetric_flow(&image, &image).unwrap();
             assert!(flow.x.values.iter().chain(&flow.y.values).all(|u| *u == 0.0));
         }
     }
 
     #[test]
-    fn pictures_of_one_pixel_are_pictures() {
+    fn images_of_one_pixel_have_a_flow() {
         for (width, height) in [(1, 1), (1, 9), (200, 1)] {
-            let picture = Picture::flat(width, height, 1.0).unwrap();
-            let other = Picture::flat(width, height, 2.0).unwrap();
-            assert_eq!(symmetric_flow(&picture, &other).unwrap().x.values, vec![0.0; width * height]);
+            let image = Image::flat(width, height, 1.0).unwrap();
+            let other = Image::flat(width, height, 2.0).unwrap();
+            assert_eq!(symmetric_flow(&image, &other).unwrap().x.values, vec![0.0; width * height]);
         }
     }
 
@@ -334,12 +337,12 @@ mod tests {
     fn sums_over_windows_are_those_of_their_pixels() {
         let mut random = crate::math::Random::new(5);
         let values = (0..13 * 17).map(|_| random.unit() as f32).collect();
-        let picture = Picture { width: 13, height: 17, values };
-        let sums = picture.window_sums().unwrap();
+        let image = Image { width: 13, height: 17, values };
+        let sums = image.window_sums().unwrap();
         for (x, y) in [(0, 0), (6, 8), (12, 16), (3, 15)] {
             let near = |a: usize, b: usize| a.abs_diff(b) <= RADIUS;
             let cells = (0..13 * 17).filter(|i| near(i % 13, x) && near(i / 13, y));
-            let sum: f32 = cells.map(|i| picture.values[i]).sum();
+            let sum: f32 = cells.map(|i| image.values[i]).sum();
             assert!((sums.values[y * 13 + x] - sum).abs() < 1e-3);
         }
     }

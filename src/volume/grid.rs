@@ -17,12 +17,12 @@ pub struct Grid {
 /// Cache of the eight voxel values around the last sampled point, for [`Grid::sample_padded`]: reading a large grid
 /// from memory is slow.
 #[derive(Clone, Copy, Debug)]
-pub struct KnownCell {
+pub struct CellCache {
     base: usize,
     corners: [f32; 8],
 }
 
-impl Default for KnownCell {
+impl Default for CellCache {
     /// Returns an empty cache, which matches no cell.
     fn default() -> Self {
         Self { base: usize::MAX, corners: [0.0; 8] }
@@ -55,11 +55,7 @@ impl Grid {
         if count == Some(self.values.len()) && !self.values.is_empty() {
             return Ok(());
         }
-        let problem = format!(
-            "{} values given for dims {:?}; their product, not 0, is needed",
-            self.values.len(),
-            self.dims
-        );
+        let problem = format!("must have one value per voxel ({:?}), got {}", self.dims, self.values.len());
         Err(VolumeError::invalid("values", problem))
     }
 
@@ -70,25 +66,25 @@ impl Grid {
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `beyond` on all sides.
-    /// Faster if `p` is in the same cell as in the previous call with this `known`, which must only be used with one
-    /// grid.
+    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `padding` on all
+    /// sides. Faster if `p` is in the same cell as in the previous call with this `cache`, which must only be used with
+    /// one grid.
     ///
     /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]
-    pub fn sample_padded(&self, p: Vec3, beyond: f32, known: &mut KnownCell) -> f32 {
+    pub fn sample_padded(&self, p: Vec3, padding: f32, cache: &mut CellCache) -> f32 {
         let last = |n: usize| (n - 1) as f32;
-        let share = inside(p.x, last(self.dims[0]))
-            * inside(p.y, last(self.dims[1]))
-            * inside(p.z, last(self.dims[2]));
+        let share = padding_weight(p.x, last(self.dims[0]))
+            * padding_weight(p.y, last(self.dims[1]))
+            * padding_weight(p.z, last(self.dims[2]));
         if share > 0.0 {
             let cell = Cell::at(self.dims, p);
-            if known.base != cell.base() {
-                *known = KnownCell { base: cell.base(), corners: cell.corners(|index| self.values[index]) };
+            if cache.base != cell.base() {
+                *cache = CellCache { base: cell.base(), corners: cell.corners(|index| self.values[index]) };
             }
-            beyond + share * (cell.blend(&known.corners) - beyond)
+            padding + share * (cell.blend(&cache.corners) - padding)
         } else {
-            beyond
+            padding
         }
     }
 
@@ -179,7 +175,7 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
 /// Returns the weight of the grid against its padding along one axis: 1 between the outermost voxel centres, falling to
 /// 0 one voxel beyond.
 #[inline]
-fn inside(x: f32, last: f32) -> f32 {
+fn padding_weight(x: f32, last: f32) -> f32 {
     let beyond = if x < 0.0 { -x } else { x - last };
     if beyond <= 0.0 {
         1.0
@@ -244,21 +240,21 @@ mod tests {
             let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
             let p = p - Vec3::splat(1.9);
             let expected = padded.sample(p + Vec3::splat(2.0));
-            assert!((g.sample_padded(p, 0.0, &mut KnownCell::default()) - expected).abs() < 1e-4, "at {p}");
+            assert!((g.sample_padded(p, 0.0, &mut CellCache::default()) - expected).abs() < 1e-4, "at {p}");
         }
-        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), 0.0, &mut KnownCell::default()), 0.0);
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), 0.0, &mut CellCache::default()), 0.0);
     }
 
     #[test]
-    fn what_is_known_of_a_cell_has_no_influence() {
+    fn the_cell_cache_has_no_influence() {
         let g = grid([6, 5, 4], |p| (p.x * 7.0 + p.y * p.y * 3.0 + p.z * p.x * 5.0) % 11.0);
-        let mut known = KnownCell::default();
+        let mut cache = CellCache::default();
         for i in 0..2000 {
             let t = i as f32;
             let p = Vec3::new((t * 0.013) % 8.0, (t * 0.007) % 6.0, (t * 0.011) % 5.0) - 1.0;
             assert_eq!(
-                g.sample_padded(p, 0.0, &mut known).to_bits(),
-                g.sample_padded(p, 0.0, &mut KnownCell::default()).to_bits(),
+                g.sample_padded(p, 0.0, &mut cache).to_bits(),
+                g.sample_padded(p, 0.0, &mut CellCache::default()).to_bits(),
                 "at {p}"
             );
         }

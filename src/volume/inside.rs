@@ -12,12 +12,12 @@ use fixedbitset::FixedBitSet;
 /// Exact except for centres within rounding of the surface: exact predicates decide rays through edges and vertices.
 pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     let count = dims.iter().product();
-    let mut passed = FixedBitSet::with_capacity(count);
+    let mut crossings_parity = FixedBitSet::with_capacity(count);
     for [a, b, c] in &surface.triangles {
-        pass_triangle(&surface.positions, [*a, *b, *c], dims, &mut passed);
+        cross_triangle(&surface.positions, [*a, *b, *c], dims, &mut crossings_parity);
     }
     let mut inside = FixedBitSet::with_capacity(count);
-    let mut ahead = passed.ones().peekable();
+    let mut ahead = crossings_parity.ones().peekable();
     while let Some(first) = ahead.next() {
         let end_of_row = (first / dims[0] + 1) * dims[0];
         let end = ahead.next_if(|next| *next < end_of_row).unwrap_or(end_of_row);
@@ -27,7 +27,12 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
 }
 
 /// Toggles, for each row of voxels along x that the triangle crosses, the first voxel beyond the triangle.
-fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed: &mut FixedBitSet) {
+fn cross_triangle(
+    positions: &[Vec3],
+    corners: [u32; 3],
+    dims: [usize; 3],
+    crossings_parity: &mut FixedBitSet,
+) {
     let [a, b, c] = corners.map(|v| positions[v as usize].as_dvec3());
     let normal = (b - a).cross(c - a);
     let span = |axis: usize| {
@@ -39,13 +44,13 @@ fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed
     for z in span(2) {
         for y in span(1) {
             let at = DVec2::new(y as f64, z as f64);
-            if normal.x == 0.0 || !is_over(positions, corners, at) {
+            if normal.x == 0.0 || !projection_contains(positions, corners, at) {
                 continue;
             }
             let x = a.x - (normal.y * (at.x - a.y) + normal.z * (at.y - a.z)) / normal.x;
             let first = x.ceil().max(0.0) as usize;
             if first < dims[0] {
-                passed.toggle(first + dims[0] * (y + dims[1] * z));
+                crossings_parity.toggle(first + dims[0] * (y + dims[1] * z));
             }
         }
     }
@@ -53,7 +58,7 @@ fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed
 
 /// Returns whether the projection of the triangle along x contains the point (y, z). The point is perturbed
 /// symbolically by an infinitesimal amount along y and a smaller one along z, so that it lies on no edge.
-fn is_over(positions: &[Vec3], [a, b, c]: [u32; 3], at: DVec2) -> bool {
+fn projection_contains(positions: &[Vec3], [a, b, c]: [u32; 3], at: DVec2) -> bool {
     let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| is_left(positions, edge, at));
     ab.is_some() && ab == bc && bc == ca
 }

@@ -28,22 +28,22 @@ mod cube_cases;
 mod enrich;
 mod error;
 mod flow;
-mod follow;
 mod grid;
 mod inside;
 mod pyramid;
 mod sampling;
 mod sequence;
 mod slices;
+mod surface_extractor;
 mod voxels;
 
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use enrich::Enrichment;
 pub use error::VolumeError;
-pub use follow::{Follower, Lattice};
-pub use grid::{Grid, KnownCell, VectorGrid};
+pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::voxels_inside;
 pub(crate) use sampling::trilinear;
+pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 
 use crate::math::{DAffine3, DVec3};
@@ -259,10 +259,7 @@ impl Volume {
     pub fn sample(&self, world: DVec3, frame: usize) -> Result<f64, VolumeError> {
         let start = self.frame_start(frame)?;
         if !world.is_finite() {
-            return Err(VolumeError::invalid(
-                "world",
-                format!("{world} is not a point; three finite numbers are needed"),
-            ));
+            return Err(VolumeError::invalid("world", format!("must be three finite numbers, got {world}")));
         }
         let p = self.inverse.transform_point3(world);
         Ok(trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
@@ -317,28 +314,22 @@ fn converted<T: Copy + Into<f64>>(
 
 fn check_dims(dims: [usize; 4], len: usize) -> Result<(), VolumeError> {
     if dims.contains(&0) {
-        return Err(VolumeError::invalid("dims", format!("{dims:?} has a 0; every one must be at least 1")));
+        return Err(VolumeError::invalid("dims", format!("must all be at least 1, got {dims:?}")));
     }
     let count = dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
     if count == Some(len) {
         return Ok(());
     }
-    let needed = count.map_or_else(|| "more than can be counted".to_owned(), |n| n.to_string());
-    Err(VolumeError::invalid("data", format!("{len} voxels given, dims {dims:?} need {needed}")))
+    let needed = count.map_or_else(|| "too many".to_owned(), |n| n.to_string());
+    Err(VolumeError::invalid("data", format!("must have {needed} voxels for dims {dims:?}, got {len}")))
 }
 
 fn check_scale(slope: f64, intercept: f64) -> Result<(), VolumeError> {
     if !slope.is_finite() || slope == 0.0 {
-        return Err(VolumeError::invalid(
-            "slope",
-            format!("{slope} given; a finite number other than 0 is needed"),
-        ));
+        return Err(VolumeError::invalid("slope", format!("must be finite and not 0, got {slope}")));
     }
     if !intercept.is_finite() {
-        return Err(VolumeError::invalid(
-            "intercept",
-            format!("{intercept} given; a finite number is needed"),
-        ));
+        return Err(VolumeError::invalid("intercept", format!("must be finite, got {intercept}")));
     }
     Ok(())
 }
@@ -349,7 +340,7 @@ fn check_frame_seconds(seconds: f64) -> Result<(), VolumeError> {
     }
     Err(VolumeError::invalid(
         "frameSeconds",
-        format!("{seconds} given; a finite number of seconds, or 0 for none, is needed"),
+        format!("must be finite and >= 0 (0: no frame time), got {seconds}"),
     ))
 }
 
@@ -380,7 +371,7 @@ fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> 
     if furthest <= f64::from(f32::MAX) {
         return Ok(());
     }
-    let problem = format!("puts a corner of the volume at {furthest:e}; at most 3.4e38 (f32) is accepted");
+    let problem = format!("maps a corner of the volume to {furthest:e}, beyond the range of f32 (3.4e38)");
     Err(VolumeError::invalid("affine", problem))
 }
 
@@ -395,17 +386,14 @@ const MIN_AXIS_VOLUME: f64 = 1e-8;
 
 fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 2], VolumeError> {
     let Some(stored) = voxels.finite_range() else {
-        return Err(VolumeError::invalid("data", "no voxel is a finite number; at least one must be"));
+        return Err(VolumeError::invalid("data", "at least one voxel must be finite"));
     };
     let ends = stored.map(|v| v * slope + intercept);
     let range = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
     if range.iter().all(|v| v.abs() <= f64::from(f32::MAX)) {
         return Ok(range);
     }
-    Err(VolumeError::invalid(
-        "data",
-        format!("intensities reach {range:?}; at most 3.4e38 (f32) is accepted"),
-    ))
+    Err(VolumeError::invalid("data", format!("intensities {range:?} exceed the range of f32 (3.4e38)")))
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ impl Volume {
             return Ok(());
         }
         let problem = format!(
-            "{levels} given; 1 to {possible} are possible with dims {:?} and factor {factor} (every axis keeps 2 voxels)",
+            "must be 1 to {possible} for dims {:?} and factor {factor} (at least 2 voxels per axis), got {levels}",
             self.dims()
         );
         Err(VolumeError::invalid("levels", problem))
@@ -113,7 +113,8 @@ impl Grid {
             return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
         }
         let dims = reduced_dims(self.dims, factor);
-        let taps = [0, 1, 2].map(|axis| Taps::new(self.dims[axis], dims[axis], unit / spacing[axis]));
+        let taps =
+            [0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis]));
         let along_x = self.resample_x(&taps[0], dims[0])?;
         let along_xy = along_x.resample_rows(&taps[1], dims[1], 1)?;
         let coarse = along_xy.resample_rows(&taps[2], dims[2], 2)?;
@@ -121,7 +122,7 @@ impl Grid {
         Ok((coarse, next))
     }
 
-    fn resample_x(&self, taps: &Taps, nx: usize) -> Result<Grid, VolumeError> {
+    fn resample_x(&self, taps: &ResamplingWeights, nx: usize) -> Result<Grid, VolumeError> {
         let mut values = reserve(nx * self.dims[1] * self.dims[2])?;
         for row in self.values.chunks_exact(self.dims[0]) {
             values.extend((0..nx).map(|i| {
@@ -133,7 +134,12 @@ impl Grid {
     }
 
     /// Resamples along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at once.
-    fn resample_rows(&self, taps: &Taps, count: usize, axis: usize) -> Result<Grid, VolumeError> {
+    fn resample_rows(
+        &self,
+        taps: &ResamplingWeights,
+        count: usize,
+        axis: usize,
+    ) -> Result<Grid, VolumeError> {
         let run = if axis == 1 { self.dims[0] } else { self.dims[0] * self.dims[1] };
         let mut dims = self.dims;
         dims[axis] = count;
@@ -162,13 +168,13 @@ fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
 
 /// Resampling weights along one axis: for each output voxel, the range of source voxels and their weights, which sum to
 /// 1.
-struct Taps {
+struct ResamplingWeights {
     /// Per output voxel: the first source voxel, and start and end of its range in `weights`.
     spans: Vec<(usize, usize, usize)>,
     weights: Vec<f32>,
 }
 
-impl Taps {
+impl ResamplingWeights {
     /// Computes the weights that reduce `source` voxels to `count`; `unit` is the kernel's step in source voxels.
     fn new(source: usize, count: usize, unit: f64) -> Self {
         let mut taps = Self { spans: Vec::with_capacity(count), weights: Vec::new() };
@@ -207,7 +213,7 @@ fn check_factor(factor: f64) -> Result<(), VolumeError> {
     if factor > 1.0 && factor <= 2.0 {
         return Ok(());
     }
-    Err(VolumeError::invalid("factor", format!("{factor} given; more than 1 and at most 2 is accepted")))
+    Err(VolumeError::invalid("factor", format!("must be > 1 and <= 2, got {factor}")))
 }
 
 /// Returns ⌊n/factor⌋ for each dimension, at least 1.
@@ -339,7 +345,7 @@ mod tests {
         assert!(v.pyramid(0, 2.0).is_err());
         assert_eq!(v.pyramid(3, 2.0).unwrap()[2].dims(), [5, 4, 2]);
         let message = v.pyramid(4, 2.0).unwrap_err().to_string();
-        assert!(message.contains("1 to 3 are possible"), "{message}");
+        assert!(message.contains("must be 1 to 3"), "{message}");
         assert!(v.pyramid(usize::MAX, 1.000_001).is_err());
         let flat = volume([20, 16, 1], DAffine3::IDENTITY, |p| p.x);
         assert_eq!(flat.pyramid(1, 2.0).unwrap().len(), 1);

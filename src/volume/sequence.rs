@@ -19,7 +19,7 @@ impl Volume {
     /// [`VolumeError::TooLarge`].
     pub fn from_frames(frames: &[Volume], frame_seconds: Option<f64>) -> Result<Volume, VolumeError> {
         let Some(first) = frames.first() else {
-            return Err(VolumeError::invalid("frames", "none given; at least one volume is needed"));
+            return Err(VolumeError::invalid("frames", "must contain at least one volume"));
         };
         for (index, frame) in frames.iter().enumerate() {
             check_same_grid(first, frame, index)?;
@@ -63,20 +63,20 @@ fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
 
 fn check_same_grid(first: &Volume, frame: &Volume, index: usize) -> Result<(), VolumeError> {
     let differs = |what: &str| {
-        let problem = format!("frame {index} has {what} than frame 0; all must share one grid");
+        let problem = format!("frame {index} differs from frame 0 in {what}; all frames must share one grid");
         Err(VolumeError::invalid("frames", problem))
     };
     if frame.dims() != first.dims() {
-        return differs("other dimensions");
+        return differs("dimensions");
     }
     if frame.space != first.space || frame.unit != first.unit {
-        return differs("another space or unit");
+        return differs("space or unit");
     }
     let last = DVec3::from(first.dims().map(|n| n as f64));
     let corners = [DVec3::ZERO, last.with_y(0.0).with_z(0.0), last.with_x(0.0).with_z(0.0), last];
     let moved = |p: DVec3| first.inverse.transform_point3(frame.affine.transform_point3(p)).distance(p);
     if corners.iter().any(|&p| moved(p) > GRID_TOLERANCE) {
-        return differs("another place in the world");
+        return differs("position");
     }
     Ok(())
 }

@@ -18,7 +18,7 @@ impl Volume {
     /// `bins` not in 1..=65536, `frame` out of range.
     pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, VolumeError> {
         if bins == 0 || bins > MAX_BINS {
-            return Err(VolumeError::invalid("bins", format!("{bins} given; 1 to {MAX_BINS} are accepted")));
+            return Err(VolumeError::invalid("bins", format!("must be 1 to {MAX_BINS}, got {bins}")));
         }
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
@@ -54,7 +54,7 @@ impl Volume {
             0 => (1, 2),
             1 => (0, 2),
             2 => (0, 1),
-            _ => return Err(VolumeError::invalid("axis", format!("{axis} given; 0, 1 or 2 is accepted"))),
+            _ => return Err(VolumeError::invalid("axis", format!("must be 0, 1 or 2, got {axis}"))),
         };
         self.check_slice(axis, index)?;
         let mut out = reserve(self.dims[across] * self.dims[down])?;

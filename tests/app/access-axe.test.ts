@@ -3,7 +3,7 @@ import axe from 'axe-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, LABS, open, openApp, QUICK, reach, unfold } from './browser';
 
-/** All that WCAG 2.2 asks for up to AA, what is good besides, and what axe only tries out. */
+/** The rules of WCAG 2.2 up to level AA, best practices, and axe's experimental rules. */
 const TAGS = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice', 'experimental'];
 const WIDE = { width: 1280, height: 800 };
 const NARROW = { width: 390, height: 844 };
@@ -18,9 +18,9 @@ let app: App;
 
 beforeAll(async () => {
   app = await openApp(WIDE, 'bench.html');
-  // Before the page's own scripts: its policy lets in none that comes later.
+  // Before the page's own scripts, since its policy does not allow later ones.
   await app.page.addInitScript({ content: axe.source });
-  // The frames of Track stand still.
+  // Pauses the playback of Track's frames.
   await app.page.emulateMedia({ reducedMotion: 'reduce' });
 });
 afterAll(() => app.close());
@@ -28,7 +28,7 @@ afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
 
-/** What axe finds wrong with a part of the page as it is, one line each. */
+/** Returns axe's findings for a part of the page in its current state, one line each. */
 function violations(part: string): Promise<string[]> {
   return app.page.evaluate(
     async ([part, values]) => {
@@ -40,7 +40,7 @@ function violations(part: string): Promise<string[]> {
   );
 }
 
-/** Fails with all that is wrong with a part of the page in any of its looks. */
+/** Fails with all findings for a part of the page in the given colour schemes. */
 async function expectNothing(part = 'html', looks: readonly (typeof LOOKS)[number][] = LOOKS): Promise<void> {
   for (const { colorScheme, size } of looks) {
     await app.page.emulateMedia({ colorScheme });
@@ -51,13 +51,13 @@ async function expectNothing(part = 'html', looks: readonly (typeof LOOKS)[numbe
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('has nothing against it while it runs', async () => {
+  test('has no violations while it runs', async () => {
     await open(app, lab);
     await reach(app.page, 'running');
     await expectNothing('html', [LOOKS[1]]);
   });
 
-  test('has nothing against it when it is done, all unfolded, nor against a message', async () => {
+  test('has no violations when it is done and everything is expanded, nor in its message', async () => {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
     await app.page.evaluate((address) => {
@@ -68,13 +68,13 @@ describe.each(LABS)('the %s lab', (lab) => {
     await expectNothing();
   });
 
-  test('has nothing against its list of keys', async () => {
+  test('has no violations in its list of keyboard shortcuts', async () => {
     await app.page.click('#help');
     await expectNothing('dialog');
   });
 });
 
-test('the measurements have nothing against them', async () => {
+test('the benchmark page has no violations', async () => {
   await app.page.goto(`${app.address}bench.html`);
   await app.page.waitForSelector('[data-bench]');
   await unfold(app.page);

@@ -13,7 +13,7 @@ afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
 
-/** Counts what the page draws, of its canvases, within some animation frames. */
+/** Counts the draw calls of the page's canvases within some animation frames. */
 function drawings(frames: number): Promise<number> {
   return app.page.evaluate(async (frames) => {
     const { prototype } = WebGL2RenderingContext;
@@ -29,7 +29,7 @@ function drawings(frames: number): Promise<number> {
   }, frames);
 }
 
-/** Every text that is seen, but numbers, which may go on changing. */
+/** Returns all visible texts without numbers, since numbers may keep changing. */
 function words(): Promise<string[]> {
   return app.page.evaluate(() => {
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -43,7 +43,7 @@ function words(): Promise<string[]> {
   });
 }
 
-/** What sticks out of its box and is hidden there. */
+/** Returns the elements whose content overflows and is hidden. */
 function cut(): Promise<string[]> {
   return app.page.evaluate(() => {
     const hides = (one: Element) => /hidden|clip/.test(getComputedStyle(one).overflowX);
@@ -55,17 +55,17 @@ function cut(): Promise<string[]> {
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('stands still for who asks for little motion, when its example is done', async () => {
+  test('does not animate with reduced motion when its example is done', async () => {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
-    // What was still to be drawn is drawn.
+    // Pending frames are drawn first.
     await expect.poll(() => drawings(5)).toBe(0);
     expect(await drawings(60)).toBe(0);
     const animations = await app.page.evaluate(() => document.getAnimations().length);
     expect(animations).toBe(0);
   });
 
-  test('shows in colours of the own what is pressed, where the page is, and what colours mean', async () => {
+  test('shows pressed buttons, the current lab and colour legends in forced colours', async () => {
     await app.page.emulateMedia({ forcedColors: 'active' });
     const styles = await app.page.evaluate(() => {
       const all = (selector: string) =>
@@ -88,13 +88,13 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(styles.swatches).toBe(['extract', 'track'].includes(lab) ? 3 : 0);
   });
 
-  test('tells all that its pictures show', async () => {
+  test('describes all its pictures in words', async () => {
     await unfold(app.page);
     const untold = await app.page.evaluate(() => {
       const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
       const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
       const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
-      // A picture on a button is told by the button.
+      // A picture on a button is described by the button's label.
       const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
       return shown.filter((one) => !named(one) && !button(one) && caption(one).length < 20).map((one) => one.outerHTML);
     });
@@ -114,7 +114,7 @@ describe.each(LABS)('the %s lab', (lab) => {
   test.each([
     [640, 400],
     [320, 256],
-  ])('loses nothing at %i by %i, as when it is zoomed', async (width, height) => {
+  ])('shows all its texts at %i by %i, as when zoomed in', async (width, height) => {
     await app.page.setViewportSize({ width: 1280, height: 800 });
     const wide = await words();
     expect(wide).toContain('How it works');
@@ -125,22 +125,22 @@ describe.each(LABS)('the %s lab', (lab) => {
   });
 });
 
-describe('who asks for little motion', () => {
-  test('sees Track beat when that is asked for, and others see it without', async () => {
+describe('with reduced motion', () => {
+  test('Track plays on request; without it, it plays by itself', async () => {
     const beat = () => app.page.textContent('[data-frame=beat]');
     await open(app, QUICK.track);
     await reach(app.page, 'done');
-    expect(await beat()).toBe('Beat');
+    expect(await beat()).toBe('Loop');
     await app.page.locator('canvas[tabindex]').first().press('b');
-    expect(await beat()).toBe('Hold');
+    expect(await beat()).toBe('Stop');
     await expect.poll(() => drawings(5)).toBeGreaterThan(0);
     await app.page.emulateMedia({ reducedMotion: 'no-preference' });
     await open(app, QUICK.track);
-    await expect.poll(beat).toBe('Hold');
+    await expect.poll(beat).toBe('Stop');
     await app.page.emulateMedia({ reducedMotion: 'reduce' });
   });
 
-  test('sees a film without end in Sculpt only when it is played', async () => {
+  test('an endless animation in Sculpt only plays on request', async () => {
     await open(app, 'sculpt?loop=true');
     await reach(app.page, 'done', 'paused');
     await expect.poll(() => drawings(5)).toBe(0);
@@ -149,11 +149,11 @@ describe('who asks for little motion', () => {
   });
 });
 
-describe('who listens', () => {
+describe('with a screen reader', () => {
   test.each(['extract?example=tooth&levels=0', 'sculpt?example=lava-lamp'])(
-    'hears now and then how far %s is, not with each step',
+    'progress of %s is announced now and then, not with each step',
     async (address) => {
-      // A clock that runs a hundred times as fast, or a test would wait for minutes, and the tooth be done.
+      // A clock a hundred times as fast; otherwise the test would take minutes, and the tooth would be done.
       const page = await (app.page.context().browser() as Browser).newPage();
       await page.addInitScript(() => {
         const now = performance.now.bind(performance);

@@ -7,9 +7,9 @@ const SLICED = ['extract', 'track'];
 let app: App;
 
 beforeAll(async () => {
-  // Small: what draws in software is sooner done.
+  // Small, so that software rendering is fast.
   app = await openApp({ width: 900, height: 640 }, 'bench.html');
-  // The frames of Track stand still.
+  // Pauses the playback of Track's frames.
   await app.page.emulateMedia({ reducedMotion: 'reduce' });
 });
 afterAll(() => app.close());
@@ -17,7 +17,10 @@ afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
 
-/** All that a pointer can use, in the order of the page, numbered; of buttons that arrow keys go along, one. */
+/**
+ * Numbers all elements that can be operated, in document order, and returns their descriptions; of a toolbar's buttons,
+ * only the one in the tab order.
+ */
 function numberControls(page: Page): Promise<string[]> {
   return page.evaluate(() => {
     const all = document.querySelectorAll<HTMLElement>(
@@ -33,11 +36,11 @@ function numberControls(page: Page): Promise<string[]> {
   });
 }
 
-/** The number of what has the focus, and how its ring stands out from what is behind it: width, and contrast. */
+/** Returns the number of the focused element, and width and contrast of its focus ring. */
 function focused(page: Page): Promise<{ number: string; width: number; contrast: number }> {
   return page.evaluate(() => {
     const active = document.activeElement as HTMLElement;
-    // The ring of a chooser is that of its label.
+    // The ring of a file chooser is drawn around its label.
     const seen = active.matches('[type=file]') ? (active.nextElementSibling ?? active) : active;
     const { outlineWidth, outlineStyle, outlineColor } = getComputedStyle(seen);
     const context = new OffscreenCanvas(1, 1).getContext('2d', { willReadFrequently: true });
@@ -58,7 +61,7 @@ function focused(page: Page): Promise<{ number: string; width: number; contrast:
   });
 }
 
-/** Presses a key as often as there are controls; the numbers of those that it stops at. */
+/** Presses a key as often as there are controls; returns the numbers of the elements that receive the focus. */
 async function walk(key: string, controls: string[]): Promise<string[]> {
   const stops: string[] = [];
   for (const _ of controls) {
@@ -72,7 +75,7 @@ async function walk(key: string, controls: string[]): Promise<string[]> {
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('is gone through with Tab, there when light and back when dark, and each stop is seen', async () => {
+  test('can be traversed with Tab in light and dark mode, with a visible focus at each stop', async () => {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
     await unfold(app.page);
@@ -81,7 +84,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     const all = controls.map((_, i) => String(i));
     await app.page.emulateMedia({ colorScheme: 'light' });
     expect(await walk('Tab', controls)).toEqual(all);
-    // No trap at the end: out of the page, and in again.
+    // No keyboard trap at the end: the focus leaves the page and enters it again.
     await app.page.keyboard.press('Tab');
     expect(['BODY', '0']).toContain((await focused(app.page)).number);
     await app.page.locator(`[data-number="${controls.length - 1}"]`).focus();
@@ -89,7 +92,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await walk('Shift+Tab', controls.slice(1))).toEqual(all.slice(0, -1).reverse());
   });
 
-  test('gives the focus back when the list of keys is closed', async () => {
+  test('returns the focus when the keyboard shortcuts are closed', async () => {
     for (const opener of ['#help', 'canvas[tabindex]']) {
       await app.page.locator(opener).focus();
       await app.page.keyboard.press(opener === '#help' ? 'Enter' : '?');
@@ -101,7 +104,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     }
   });
 
-  test('turns, zooms and brings back its view by keys', async () => {
+  test('rotates, zooms and resets its view by keys', async () => {
     const view = app.page.locator('canvas[tabindex]').first();
     await view.press('Home');
     const picture = async () => (await view.screenshot()).toString('base64');
@@ -114,7 +117,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     }
   });
 
-  test.runIf(SLICED.includes(lab))('moves its slices by keys, and says where they are', async () => {
+  test.runIf(SLICED.includes(lab))('moves its slices by keys, and announces their positions', async () => {
     for (const name of ['Axial', 'Coronal', 'Sagittal']) {
       const slider = app.page.locator('.slice').getByLabel(name, { exact: true });
       const before = Number(await slider.inputValue());
@@ -124,7 +127,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     }
   });
 
-  test.runIf(lab === 'track')('moves its frames by keys, in place of a click on the curve', async () => {
+  test.runIf(lab === 'track')('changes the frame by keys, the alternative to clicking the curve', async () => {
     await app.page.locator('canvas[tabindex]').first().focus();
     const shown = () => app.page.textContent('[data-frames]');
     const [before = 0, frames = 0] = ((await shown()) ?? '').split(' of ').map(Number);
@@ -132,15 +135,15 @@ describe.each(LABS)('the %s lab', (lab) => {
     await expect.poll(shown).toBe(`${(before % frames) + 1} of ${frames}`);
   });
 
-  test.runIf(lab === 'reconstruct')('sets a point with Enter in the middle of the view', async () => {
+  test.runIf(lab === 'reconstruct')('adds a point in the centre of the view with Enter', async () => {
     await app.page.locator('[data-tool=add]').focus();
     await app.page.keyboard.press(' ');
     await app.page.locator('canvas[tabindex]').first().press('Enter');
     await expect.poll(() => app.page.textContent('.edit-tools [role=status]')).toContain('1 point added');
   });
 
-  test('runs by keys: reset, a step, ten steps, and back where steps can be undone', async () => {
-    // The globe rests after a step.
+  test('can be run by keys: reset, a step, ten steps, and undo of steps where possible', async () => {
+    // The globe has converged after a step.
     if (lab === 'sculpt') await open(app, 'sculpt?example=lava');
     await reach(app.page, 'running', 'paused', 'done');
     await app.page.locator('canvas[tabindex]').first().focus();

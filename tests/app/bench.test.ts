@@ -5,14 +5,14 @@ import { at } from '../../scripts/shell.mjs';
 import { type App, openApp, overflow } from './browser';
 
 let app: App;
-/** The page of measurements, in a tab of its own. */
+/** The benchmark page, in a tab of its own. */
 let page: Page;
 let report: Record<string, unknown>;
 
 beforeAll(async () => {
   report = JSON.parse(await readFile(at('bench.json'), 'utf8'));
   app = await openApp({ width: 1100, height: 900 });
-  // From the list of keys, as a reader comes there.
+  // Opened from the keyboard shortcuts, as by a reader.
   await app.page.click('#help');
   const opened = app.page.waitForEvent('popup');
   await app.page.click('dialog a[href$="bench.html"]');
@@ -22,14 +22,14 @@ beforeAll(async () => {
 });
 afterAll(() => app.close());
 
-/** The numbers that are drawn in a part of the page. */
+/** Returns the numbers that are drawn in a part of the page. */
 const drawn = (part: string) =>
   page.locator(`${part} data`).evaluateAll((all) => all.map((one) => Number((one as HTMLDataElement).value)));
 
-/** The names of benches in the report: what is a list, or has rows or a host. */
+/** Returns the names of benches in the report: entries that are objects. */
 const benches = () => Object.keys(report).filter((name) => typeof report[name] === 'object');
 
-test('every bench of the report is drawn, with numbers and tables of them', async () => {
+test('every bench of the report is plotted, with a table of its numbers', async () => {
   const found = await page
     .locator('[data-bench]')
     .evaluateAll((all) => all.map((one) => one.getAttribute('data-bench') ?? ''));
@@ -51,27 +51,27 @@ test('the numbers are those of the report', async () => {
   expect(await drawn('#peers')).toEqual(rows.flatMap(({ ratio }) => ratio ?? []));
 });
 
-test('what does not keep to its bound is said not to', async () => {
+test('missed bounds are marked', async () => {
   const count = (outcome: string) => page.locator(`#summary tr[data-verdict="${outcome}"]`).count();
   const all = await page.locator('#summary tr[data-verdict]').count();
   const title = await page.textContent('#summary h2');
-  expect(title).toBe(`${await count('met')} of ${all} bounds kept`);
+  expect(title).toBe(`${await count('met')} of ${all} targets met`);
   const [model] = await page.locator('#head .verdict').allTextContents();
   const slow = (report.head as { model: { milliseconds: number } }[]).some(({ model }) => model.milliseconds > 2000);
-  expect(model).toBe(`asked: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
+  expect(model).toBe(`target: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
 });
 
 test.each([
   [360, 800],
   [1100, 900],
-])('nothing is wider than a page of %i by %i, tables unfolded', async (width, height) => {
+])('fits a page of %i by %i, tables expanded', async (width, height) => {
   await page.locator('details').evaluateAll((all) => {
     for (const one of all) (one as HTMLDetailsElement).open = true;
   });
   expect(await overflow(page, width, height)).toBeLessThanOrEqual(0);
 });
 
-test('nothing was complained of, under the same policy as the labs', async () => {
+test('no errors are logged, under the same policy as the labs', async () => {
   const policy = await page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
   expect(policy).toContain("default-src 'self'");
   expect(policy).not.toContain('unsafe-inline');

@@ -5,18 +5,18 @@ import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 
-/** Milliseconds until something on the page is given up. */
+/** Timeout in milliseconds for anything on the page. */
 const PATIENCE = 120_000;
 
 export interface App {
   page: Page;
   address: string;
-  /** What should never happen: console errors, uncaught errors, requests to anywhere but the page's own address. */
+  /** Console errors, uncaught errors, and requests to other origins than the page's own; tests expect none. */
   complaints: string[];
   close: () => Promise<void>;
 }
 
-/** The labs, with the address of an example that each is soon done with. */
+/** The labs, each with the address of a fast example. */
 export const QUICK = {
   extract: 'extract?example=linked-rings',
   reconstruct: 'reconstruct?example=two-balls',
@@ -25,16 +25,16 @@ export const QUICK = {
 };
 export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
 
-/** The built app in a browser of its own, at an address within the app. */
+/** Opens the built app in a browser of its own, at an address within the app. */
 export async function openApp(viewport = { width: 1280, height: 800 }, address = ''): Promise<App> {
   if (!existsSync(at('dist/index.html'))) await buildApp();
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
   const context = await browser.newContext({ viewport });
-  // A machine that draws in software, and is busy, is slow, not wrong.
+  // A busy machine with software rendering is slow, not wrong.
   context.setDefaultTimeout(PATIENCE);
   const complaints: string[] = [];
-  // Tabs that the page opens are listened to like the page.
+  // Tabs that the page opens are observed as well.
   context.on('page', (one) => listen(one, server.address, complaints));
   const page = await context.newPage();
   await page.goto(server.address + address);
@@ -58,38 +58,41 @@ function listen(page: Page, address: string, complaints: string[]): void {
   });
 }
 
-/** A page beside that of the app, for which `prepare` runs before its own scripts; its complaints go to the same list. */
+/**
+ * Opens another page of the app, in which `prepare` runs before its own scripts; its complaints are added to the same
+ * list.
+ */
 export async function anotherPage({ page }: App, prepare = () => {}): Promise<Page> {
   const another = await page.context().newPage();
   await another.addInitScript(prepare);
   return another;
 }
 
-/** The page anew, at an address such as `track`. */
+/** Reloads the page at an address such as `track`. */
 export async function open({ page, address }: Pick<App, 'page' | 'address'>, hash: string): Promise<void> {
   await page.goto('about:blank');
   await page.goto(`${address}#${hash}`);
 }
 
-/** Unfolds all that can be. */
+/** Expands all collapsible parts. */
 export function unfold(page: Page): Promise<void> {
   return page.locator('details').evaluateAll((all) => {
     for (const one of all) (one as HTMLDetailsElement).open = true;
   });
 }
 
-/** Waits until the lab is in one of the states; an error that is not among them fails with its message. */
+/** Waits until the lab is in one of the states; an unexpected error fails with its message. */
 export async function reach(page: Page, ...states: string[]): Promise<string> {
   const selector = [...new Set([...states, 'error'])].map((state) => `[data-state=${state}]`).join(', ');
   const lab = await page.waitForSelector(selector, { timeout: 2 * PATIENCE });
   const state = (await lab.getAttribute('data-state')) ?? '';
-  // It may have gone on since.
+  // The state may have changed since.
   if (state === 'error' && !states.includes(state))
     throw new Error(`the lab is in error: ${await page.textContent('.banner')}`);
   return state;
 }
 
-/** Writes down every state the lab goes through from now on; returns how to read the list. */
+/** Records every state of the lab from now on; returns a function that reads the list. */
 export async function recordStates(page: Page): Promise<() => Promise<string[]>> {
   const list = await page.evaluateHandle(() => {
     const states: string[] = [];
@@ -101,7 +104,7 @@ export async function recordStates(page: Page): Promise<() => Promise<string[]>>
   return () => list.jsonValue();
 }
 
-/** Writes down everything the status line says from now on: the next news may come before anybody has read it. */
+/** Records every text of the status line from now on, since the next may replace it before a test reads it. */
 export async function recordNews(page: Page): Promise<() => Promise<string[]>> {
   const list = await page.evaluateHandle(() => {
     const news: string[] = [];
@@ -149,13 +152,13 @@ export async function drop(page: Page, files: { name: string; bytes: Uint8Array 
   }, encoded);
 }
 
-/** How much wider than a window of this size the page is. */
+/** Returns by how many pixels the page is wider than a window of this size. */
 export async function overflow(page: Page, width: number, height: number): Promise<number> {
   await page.setViewportSize({ width, height });
   return page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
 }
 
-/** The controls that a screen reader has no name for. */
+/** Returns the controls without an accessible name. */
 export function unnamedControls(page: Page): Promise<string[]> {
   return page.evaluate(() => {
     const controls = document.querySelectorAll<HTMLInputElement>('input, select, button, canvas, progress');
@@ -166,7 +169,7 @@ export function unnamedControls(page: Page): Promise<string[]> {
   });
 }
 
-/** Presses Cancel, in the page, the moment it can be: a fast machine is done before a click from outside arrives. */
+/** Presses Cancel as soon as it is enabled, from inside the page: a click from outside may arrive after the end. */
 export async function cancelAtOnce(page: Page): Promise<void> {
   await page.evaluate(() => {
     const cancel = document.querySelector<HTMLButtonElement>('[data-action=cancel]');

@@ -1,4 +1,4 @@
-// The package as it would be published, taken up by bundlers and by plain pages.
+// The package as it would be published, used with bundlers and in plain pages.
 import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -10,7 +10,7 @@ import { at, must } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
 
 let browser: Browser;
-/** A project with the packed package installed in it, and nothing else. */
+/** A project with the packed package installed, and nothing else. */
 let project = '';
 
 const main = (from: string, options = '') => `
@@ -49,7 +49,7 @@ afterAll(async () => {
   await rm(project, { recursive: true, force: true });
 });
 
-/** What the page in `folder` of the project, at `address`, comes to; complaints in the console fail. */
+/** Opens a page in `folder` of the project, at `address`, and asserts its title; console errors fail. */
 async function titleOf(folder: string, address = ''): Promise<void> {
   const server = await serve(join(project, folder), 0);
   const opened = await browser.newPage();
@@ -98,7 +98,7 @@ test('webpack', async () => {
   await titleOf('dist/webpack');
 });
 
-test('esbuild, which is given the address of the module', async () => {
+test('esbuild, with the address of the module', async () => {
   await write('main.js', main('vesicle', `{ module_or_path: new URL('./vesicle_bg.wasm', import.meta.url) }`));
   const { build } = await import('esbuild');
   const outdir = join(project, 'dist/esbuild');
@@ -114,7 +114,7 @@ test('esbuild, which is given the address of the module', async () => {
   await titleOf('dist/esbuild');
 });
 
-test('esbuild with the module inside, which is given nothing', async () => {
+test('esbuild with the module inside, without an address', async () => {
   await write('main.js', main('vesicle/inline'));
   const { build } = await import('esbuild');
   const outdir = join(project, 'dist/esbuild-inline');
@@ -129,14 +129,14 @@ test('a plain page without a bundler', async () => {
   await titleOf('.', 'plain.html');
 });
 
-test('one file, under a policy that forbids to fetch anything', async () => {
+test('one file, under a policy that forbids all requests', async () => {
   const policy = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'none'; img-src data:";
   await write('strict.js', main('./node_modules/vesicle/inline.js'));
   await write('strict.html', page('<script type="module" src="./strict.js"></script>', policy));
   await titleOf('.', 'strict.html');
 });
 
-test('one file, from the address of a blob, as notebooks do', async () => {
+test('one file, from a blob address, as in notebooks', async () => {
   const script = `
     const text = await (await fetch('./node_modules/vesicle/inline.js')).text();
     const address = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
@@ -148,7 +148,7 @@ test('one file, from the address of a blob, as notebooks do', async () => {
 });
 
 test.each(['bundler', 'node16', 'nodenext'])(
-  'types, as TypeScript with moduleResolution %s finds them',
+  'types resolve in TypeScript with moduleResolution %s',
   async (resolution) => {
     const entries = ['vesicle', 'vesicle/inline'];
     const lines = entries.map((entry, k) => `import init${k}, { Mesh as Mesh${k} } from '${entry}';`);

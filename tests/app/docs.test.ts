@@ -1,4 +1,4 @@
-// The documentation beside the app: where its links lead.
+// The documentation beside the app: its links.
 import { existsSync } from 'node:fs';
 import { readdir, readFile } from 'node:fs/promises';
 import { dirname, join, relative } from 'node:path';
@@ -8,19 +8,19 @@ import { at } from '../../scripts/shell.mjs';
 import { exampleById } from '../../www/src/presets';
 import { cloudById } from '../../www/src/reconstruct/presets';
 import { sceneById } from '../../www/src/sculpt/presets';
-import { filmById } from '../../www/src/track/presets';
+import { imageById } from '../../www/src/track/presets';
 
 const DOCS = at('dist/docs');
 const LABS: Record<string, (id: string) => { id: string } | undefined> = {
   extract: exampleById,
   reconstruct: cloudById,
   sculpt: sceneById,
-  track: filmById,
+  track: imageById,
 };
 
 interface Link {
   page: string;
-  /** What it leads to, as a file and the part after `#`. */
+  /** Path of the file that the link leads to; the part after `#` is separate. */
   file: string;
   hash: string;
 }
@@ -47,7 +47,7 @@ function linkAt(page: string, address: string): Link {
   return { page, file: path ? join(DOCS, dirname(page), decodeURI(path)) : join(DOCS, page), hash };
 }
 
-test('every link leads to a file, and within a page to a place in it', async () => {
+test('every link leads to a file, and anchors exist in their page', async () => {
   expect(links.length).toBeGreaterThan(500);
   const broken = links
     .filter(({ file }) => !existsSync(file))
@@ -61,7 +61,7 @@ test('every link leads to a file, and within a page to a place in it', async () 
 
 const readPage = async (file: string): Promise<[string, string]> => [file, await readFile(file, 'utf8')];
 
-test('every method has a page, and the examples that it names are in the lab', () => {
+test('every method has a page, and its examples exist in the lab', () => {
   const named = links.filter(({ file }) => file === at('dist/index.html') && !file.startsWith(DOCS));
   const [labs, examples] = [new Set<string>(), [] as string[]];
   for (const { hash } of named.filter(({ hash }) => hash)) {

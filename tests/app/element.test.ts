@@ -1,4 +1,4 @@
-// `<vesicle-lab>` on pages of others: the package's own files, and nothing of the app.
+// `<vesicle-lab>` on other pages: with the package's own files, and nothing of the app.
 import { cp, mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -41,7 +41,7 @@ afterEach(async () => {
   expect(complaints.splice(0)).toEqual([]);
 });
 
-/** A page with the element in it, and what happens to the element written down. */
+/** Opens a page with the element in it and records the element's events. */
 async function open(body: string, before = ''): Promise<void> {
   page = await browser.newPage();
   page.setDefaultTimeout(120_000);
@@ -57,20 +57,20 @@ async function open(body: string, before = ''): Promise<void> {
   await page.goto(server.address);
 }
 
-// From a box around everything the way is long enough to be watched; from the contour it is a few steps.
+// From an enclosing box a run takes long enough to be observed; from the contour it takes a few steps.
 const FROM_AFAR = `start="enclosing" params='{ "integrator": "euler" }'`;
 
 const state = (wanted: string) => page.waitForSelector(`vesicle-lab[data-state=${wanted}]`);
 const words = () => page.locator('vesicle-lab output').textContent();
 const press = (name: string) => page.getByRole('button', { name, exact: true }).click();
 
-/** Of the pixels of the view, those that are not the ground: more than a few, or nothing is seen. */
+/** Returns the number of pixels of the view that are not background; asserts that there are more than a few. */
 async function drawnPixels(): Promise<number> {
   const picture = await page.locator('vesicle-lab canvas').screenshot();
   return countPixels(page, picture, (r, _g, _b, ground) => Math.abs(r - ground) > 12);
 }
 
-test('it grows the surface of its volume by itself, under a strict policy', async () => {
+test('it runs on its volume by itself, under a strict policy', async () => {
   await open('<vesicle-lab src="ring.mha" params=\'{ "iso": 128 }\'></vesicle-lab>');
   await state('done');
   expect(await words()).toMatch(/^Done: [\d,]+ vertices in one component\.$/);
@@ -82,7 +82,7 @@ test('it grows the surface of its volume by itself, under a strict policy', asyn
   expect({ genus, closed }).toEqual({ genus: 1, closed: true });
 });
 
-test('paused it waits; step, play and reset do what they say, and it tells of every step', async () => {
+test('pause, step, play and reset work, and every step emits an event', async () => {
   await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR} paused></vesicle-lab>`);
   await state('paused');
   await page.evaluate(() => {
@@ -99,7 +99,7 @@ test('paused it waits; step, play and reset do what they say, and it tells of ev
   await state('done');
   const told = (await page.evaluate('told')) as unknown[];
   expect(told.filter((one) => one === 'vesicle-done')).toEqual([told.at(-1)]);
-  // One after the other, some steps at a time.
+  // In order, several steps at a time.
   const steps = told.slice(0, -1).map(Number);
   expect(steps).toEqual(steps.toSorted((a, b) => a - b));
   expect(steps.length).toBeGreaterThan(5);
@@ -108,7 +108,7 @@ test('paused it waits; step, play and reset do what they say, and it tells of ev
   expect(await words()).toBe('Ready.');
 });
 
-test('other attributes begin anew', async () => {
+test('changed attributes restart it', async () => {
   await open('<vesicle-lab src="ring.mha" paused></vesicle-lab>');
   await state('paused');
   const rigidity = () =>
@@ -118,10 +118,10 @@ test('other attributes begin anew', async () => {
   await expect.poll(rigidity).toBe(0.05);
 });
 
-test('the view turns by keys, and has words for those who do not see it', async () => {
+test('the view rotates by keys and is described in words', async () => {
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
   await state('done');
-  const view = page.getByRole('img', { name: /^The surface\. Arrow keys turn it/ });
+  const view = page.getByRole('img', { name: /^The surface\. Arrow keys rotate it/ });
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
   const before = await view.screenshot();
   await view.press('ArrowUp');
@@ -129,27 +129,27 @@ test('the view turns by keys, and has words for those who do not see it', async 
 });
 
 test.each([
-  ['<vesicle-lab></vesicle-lab>', 'src: the address of a file is needed'],
+  ['<vesicle-lab></vesicle-lab>', 'src: must be the address of a file'],
   [
     '<vesicle-lab src="ring.mha" method="magic"></vesicle-lab>',
-    /^method: 'magic'; there are deformable, implicit, tracking, multires$/,
+    /^method: must be one of deformable, implicit, tracking, multires, got 'magic'$/,
   ],
   ['<vesicle-lab src="ring.mha" params="iso 3"></vesicle-lab>', /^params: 'iso 3' is not JSON/],
   ['<vesicle-lab src="ring.mha" start="above"></vesicle-lab>', /^start: 'above'; accepted: contour, enclosing/],
   ['<vesicle-lab src="ring.mha" params=\'{ "isoo": 3 }\'></vesicle-lab>', /isoo/],
   ['<vesicle-lab src="bust.ply"></vesicle-lab>', /NIfTI/],
   ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],
-])('%s says what is wrong', async (body, message) => {
+])('%s gives an error message', async (body, message) => {
   await open(body);
   await state('error');
   expect(await words()).toMatch(message);
 });
 
-test('a file that is not there', async () => {
+test('a missing file', async () => {
   await open('<vesicle-lab src="gone.nii"></vesicle-lab>');
   await state('error');
   expect(await words()).toMatch(/gone\.nii: 404/);
-  // The browser tells it, too.
+  // The browser reports it as well.
   expect(complaints.splice(0)).toHaveLength(1);
 });
 
@@ -165,7 +165,7 @@ test('points', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('a mesh under ellipsoids, which goes on without an end', async () => {
+test('a mesh with ellipsoids, which runs without end', async () => {
   await init();
   await writeFile(join(folder, 'ball.ply'), Mesh.icosphere([0, 0, 0], 1, 0.3).toBytes('ply'));
   const axes = [0, 1, 2].map((axis) => [0, 1, 2].map((other) => (axis === other ? 0.9 : 0)));
@@ -185,7 +185,7 @@ test('a volume with frames', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('taken out of the page it ends, and put in again it begins anew', async () => {
+test('removed from the page it stops, and inserted again it restarts', async () => {
   await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR}></vesicle-lab>`);
   await state('done');
   await page.evaluate(() => {
@@ -198,11 +198,11 @@ test('taken out of the page it ends, and put in again it begins anew', async () 
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('without WebGL there are numbers, and words in place of the picture', async () => {
+test('without WebGL there are numbers, and a message in place of the view', async () => {
   await writeFile(join(folder, 'blind.js'), 'HTMLCanvasElement.prototype.getContext = () => null;');
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>', '<script src="./blind.js"></script>');
   await state('done');
-  expect(await page.locator('vesicle-lab p').textContent()).toMatch(/no WebGL/);
-  // three.js says so itself.
+  expect(await page.locator('vesicle-lab p').textContent()).toMatch(/WebGL is not available/);
+  // three.js reports it as well.
   expect(complaints.splice(0).every((complaint) => /WebGL/.test(complaint))).toBe(true);
 });

@@ -20,7 +20,7 @@ function niftiOf(data: Uint8Array): Uint8Array {
   return new Volume({ data, dims: [32, 32, 32], spacing: [1, 1, 1] }).toNifti();
 }
 
-/** Clicks an export button and gives the file that comes of it. */
+/** Clicks an export button and returns the downloaded file. */
 async function exported(format: string): Promise<Uint8Array> {
   const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click(`[data-export=${format}]`)]);
   return readFile(await download.path());
@@ -36,19 +36,19 @@ describe('the built-in example', () => {
     expect(found.chi).toBe(2 * found.components - 2 * found.genus);
   });
 
-  test('is drawn: the view shows far more than one colour', async () => {
+  test('is rendered: the view has many colours', async () => {
     const png = await app.page.locator('.view > canvas').screenshot();
     expect(await countColors(app.page, png)).toBeGreaterThan(1000);
   });
 
-  test('says in words what the plots show', async () => {
+  test('describes the plots in words', async () => {
     const captions = await app.page.locator('figcaption').allTextContents();
     expect(captions).toHaveLength(3);
     expect(captions[0]).toMatch(/After [\d,]+ iterations the energy is .* below the tolerance/);
     expect(captions[1]).toMatch(/^Vertices: now [\d,]+; between/);
   });
 
-  test.each(['ply', 'stl', 'glb', 'obj'])('exports %s that reads back closed', async (format) => {
+  test.each(['ply', 'stl', 'glb', 'obj'])('exports a closed mesh as %s', async (format) => {
     const mesh = Mesh.parse(await exported(format));
     const { triangles, volume } = await measures(app.page);
     expect(mesh.check()).toMatchObject({ closed: true, oriented: true });
@@ -57,7 +57,7 @@ describe('the built-in example', () => {
     mesh.free();
   });
 
-  test('keeps the result when a wrong file comes, and says what was wrong', async () => {
+  test('keeps the result and reports the problem when a file cannot be read', async () => {
     const before = await measures(app.page);
     await drop(app.page, [{ name: 'notes.txt', bytes: new TextEncoder().encode('not a volume at all') }]);
     await reach(app.page, 'error');
@@ -68,7 +68,7 @@ describe('the built-in example', () => {
     await reach(app.page, 'done');
   });
 
-  test('refuses a parameter out of range in words, and keeps the former value', async () => {
+  test('refuses a parameter out of range with a message and restores the previous value', async () => {
     const field = app.page.locator('[data-param=damping] input[type=number]');
     const before = await field.inputValue();
     await field.fill('-1');
@@ -96,7 +96,7 @@ describe('running', () => {
     expect(await measures(app.page)).toMatchObject({ closed: true, oriented: true });
   });
 
-  test('a parameter changed while paused is used from then on, and survives a reset', async () => {
+  test('a parameter changed while paused is used from then on, and kept by a reset', async () => {
     const field = app.page.locator('[data-param=rigidity] input[type=number]');
     await field.fill('0.3');
     await field.press('Enter');
@@ -105,7 +105,7 @@ describe('running', () => {
     expect(await field.inputValue()).toBe('0.3');
   });
 
-  test('the arrow keys turn the view', async () => {
+  test('the arrow keys rotate the view', async () => {
     const view = app.page.locator('.view > canvas');
     const before = await view.screenshot();
     await view.press('ArrowLeft');
@@ -122,10 +122,10 @@ describe('files', () => {
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true, oriented: true });
   });
 
-  test('the surface goes where the iso value says, also after it had come to rest', async () => {
+  test('the surface follows the iso value, even after it has converged', async () => {
     const field = app.page.locator('[data-param=iso] input[type=number]');
     const truth = (4 / 3) * Math.PI * 10 ** 3;
-    // At 128 the ball has a radius of 10; forty grey values are one voxel.
+    // At 128 the ball has a radius of 10; forty grey levels are one voxel.
     for (const [iso, radius] of [
       [128, 10],
       [188, 8.5],
@@ -148,7 +148,7 @@ describe('files', () => {
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 1, chi: 0, closed: true });
   });
 
-  test('bubbles grow to the same ring', async () => {
+  test('bubbles give the same ring', async () => {
     const states = await recordStates(app.page);
     await app.page.selectOption('.start select', 'bubbles');
     await expect.poll(states).toEqual(['loading', 'paused', 'running', 'done']);
@@ -157,10 +157,10 @@ describe('files', () => {
 });
 
 describe('the mean edge', () => {
-  const edge = () => app.page.getByLabel('Mean edge');
+  const edge = () => app.page.getByLabel('Mean edge length');
   const complaint = () => app.page.locator('.start .field-error:not(:empty)');
 
-  test('shorter edges make more vertices, also after a reset', async () => {
+  test('shorter edges give more vertices, also after a reset', async () => {
     const before = await measures(app.page);
     const states = await recordStates(app.page);
     await edge().fill('1');
@@ -172,22 +172,22 @@ describe('the mean edge', () => {
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
     expect(await edge().inputValue()).toBe('1');
-    await app.page.click('text=Play');
+    await app.page.click('text="Play"');
     await reach(app.page, 'done');
     expect((await measures(app.page)).vertices).toBe(shorter.vertices);
   });
 
-  test.each(['0.001', '-2', '1e9'])('%s is refused beside the field, and the former one comes back', async (value) => {
+  test.each(['0.001', '-2', '1e9'])('%s is refused, and the previous value is restored', async (value) => {
     const before = await measures(app.page);
     await edge().fill(value);
     await edge().press('Enter');
     await expect.poll(() => edge().inputValue()).toBe('1');
-    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/must be|accepted|needed/)]);
+    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/must be|accepted|Must be/)]);
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);
   });
 
-  test('an example brings its own, and a file starts without one and without a place in another volume', async () => {
+  test('an example brings its own edge length, and a file starts without one and without the previous start', async () => {
     await app.page.selectOption('.data select', 'linked-rings');
     await expect.poll(() => edge().inputValue()).toBe('');
     expect(await complaint().count()).toBe(0);
@@ -205,7 +205,7 @@ describe('the mean edge', () => {
 });
 
 describe('Cancel', () => {
-  test('while another volume is opened brings the one before back, where it was', async () => {
+  test('while another volume is opened, the previous one is restored with its state', async () => {
     const states = await recordStates(app.page);
     await app.page.selectOption('.data select', 'linked-rings');
     await expect.poll(states).toEqual(['loading', 'running', 'done']);
@@ -220,7 +220,7 @@ describe('Cancel', () => {
     await expect.poll(() => measures(app.page)).toEqual(before);
   });
 
-  test('while the model starts over, too', async () => {
+  test('while the model is created again', async () => {
     await cancelAtOnce(app.page);
     await app.page.selectOption('.start select', 'bubbles');
     await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
@@ -229,10 +229,10 @@ describe('Cancel', () => {
   });
 });
 
-describe('what cannot be opened', () => {
+describe('files that cannot be opened', () => {
   const state = () => app.page.getAttribute('.lab', 'data-state');
 
-  /** Opens a file the moment that the worker has begun with another volume. */
+  /** Opens a text file as soon as the worker has begun to load another volume. */
   const openNotesDuringLoad = () =>
     app.page.evaluate(() => {
       const { postMessage } = Worker.prototype;
@@ -248,7 +248,7 @@ describe('what cannot be opened', () => {
       };
     });
 
-  test('leaves what was there, also where it came while another volume was opened', async () => {
+  test('keep the previous volume, even during the loading of another', async () => {
     await app.page.selectOption('.data select', 'tooth');
     await app.page.selectOption('.data select', 'linked-rings');
     await reach(app.page, 'done');
@@ -262,12 +262,12 @@ describe('what cannot be opened', () => {
     await app.page.click('button:has-text("Reset")');
     await expect.poll(state).toMatch(/paused|done/);
     await app.page.keyboard.press('Escape');
-    if ((await state()) === 'paused') await app.page.click('text=Play');
+    if ((await state()) === 'paused') await app.page.click('text="Play"');
     await reach(app.page, 'done');
     await expect.poll(() => measures(app.page)).toEqual(before);
   });
 
-  test('leaves a model that runs running', async () => {
+  test('do not stop a running model', async () => {
     await app.page.evaluate(() => {
       const { fetch } = window;
       window.fetch = (input, init) => (`${input}`.includes('ovule') ? Promise.reject(new Error()) : fetch(input, init));

@@ -21,7 +21,7 @@ let app: App;
 let page: Page;
 
 beforeAll(async () => {
-  // Small: what draws in software is sooner done.
+  // Small, so that software rendering is fast.
   app = await openApp({ width: 900, height: 640 }, 'bench.html');
   page = app.page;
 });
@@ -30,11 +30,11 @@ afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
 
-/** A lab in a page for which `prepare` ran before its own scripts. */
+/** Opens a lab in a page in which `prepare` runs before its own scripts. */
 async function openLab(address: string, prepare: () => void = () => undefined): Promise<void> {
   if (page !== app.page) await page.close();
   page = await anotherPage(app, prepare);
-  // The frames of Track stand still.
+  // Pauses the playback of Track's frames.
   await page.emulateMedia({ reducedMotion: 'reduce' });
   await open({ page, address: app.address }, address);
 }
@@ -46,7 +46,7 @@ function view(): Promise<Buffer> {
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('draws its view again when the graphics card gives it back', async () => {
+  test('renders its view again after a lost WebGL context is restored', async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     await page.locator('canvas[tabindex]').first().press('Home');
@@ -58,14 +58,14 @@ describe.each(LABS)('the %s lab', (lab) => {
     await extension.evaluate((one) => one?.loseContext());
     await expect
       .poll(() => page.locator('.view-note').allTextContents())
-      .toEqual([expect.stringContaining('comes back')]);
+      .toEqual([expect.stringContaining('restored automatically')]);
     await extension.evaluate((one) => one?.restoreContext());
     await expect.poll(() => page.locator('.view-note').count()).toBe(0);
     await expect.poll(async () => before.equals(await view())).toBe(true);
     expect(await countColors(page, await view())).toBeGreaterThan(500);
   });
 
-  test('refuses files that promise what they do not hold, and keeps what was there', async () => {
+  test('refuses files with false headers, and keeps the previous data', async () => {
     const before = await measures(page);
     const states = await recordStates(page);
     for (const file of hostile(lab)) {
@@ -80,7 +80,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await states()).not.toContain('running');
   });
 
-  test('bears whatever is pressed in whatever order', async () => {
+  test('survives random key presses and changes of the example', async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     const keys = [' ', 's', 'd', 'r', 'Control+z', 'Control+y', 'Escape', ' ', 'ArrowLeft'];
@@ -126,27 +126,27 @@ describe.each(LABS)('the %s lab', (lab) => {
       };
       for (const name of ['localStorage', 'sessionStorage', 'caches', 'indexedDB'])
         Object.defineProperty(window, name, refuse);
-      // Not on the empty page before.
+      // Not on the blank page before.
       if ('serviceWorker' in navigator)
         Object.assign(ServiceWorkerContainer.prototype, {
           register: () => Promise.reject(new DOMException('The operation is insecure.', 'SecurityError')),
         });
     });
     await reach(page, 'done');
-    expect(await page.textContent('.view-note')).toContain('no WebGL 2');
+    expect(await page.textContent('.view-note')).toContain('needs WebGL 2');
     expect(await measures(page)).toMatchObject({ closed: true });
     await page.locator('canvas[tabindex]').first().press('ArrowLeft');
   });
 
-  test('keeps the last surface when its worker breaks in the middle of a run, and starts again', async () => {
-    // Two balls are done with the first surface that is shown.
+  test('keeps the last surface when its worker crashes during a run, and restarts', async () => {
+    // The two balls are done with the first surface that is shown.
     await openLab(lab === 'reconstruct' ? lab : QUICK[lab], () => {
       const { Worker } = window;
       let broken = false;
       const isUnderWay = () =>
         document.querySelector('[data-state=running]') !== null &&
         /[1-9]/.test(document.querySelector('[data-measure=vertices]')?.textContent ?? '');
-      // In the page: the run is over soon.
+      // Inside the page, because the run is short.
       class Breaking extends Worker {
         constructor(...given: ConstructorParameters<typeof Worker>) {
           super(...given);
@@ -162,20 +162,20 @@ describe.each(LABS)('the %s lab', (lab) => {
       Object.assign(window, { Worker: Breaking });
     });
     await page.waitForSelector('[data-state=error]');
-    expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
+    expect(await banner().textContent()).toMatch(/Reset restarts the engine.*out of memory/);
     await expect.poll(async () => countColors(page, await view())).toBeGreaterThan(100);
     await page.getByRole('button', { name: 'Reset', exact: true }).click();
     await expect.poll(() => banner().isVisible()).toBe(false);
     await reach(page, 'paused', 'running', 'done');
-    // The others play what they open again.
+    // The other labs run by themselves after opening.
     if (lab === 'extract') await page.click('.play');
     await reach(page, 'done');
     expect(await measures(page)).toMatchObject({ closed: true });
   });
 
-  test('goes on, or waits, in a tab that nobody sees, and shows all when it is looked at', async () => {
+  test('continues or pauses in a hidden tab, and shows everything when it becomes visible', async () => {
     await openLab(QUICK[lab], () => {
-      // As in the background: no animation frame comes.
+      // As in a background tab, animation frames stop.
       const request = window.requestAnimationFrame.bind(window);
       const held: FrameRequestCallback[] = [];
       const state = { seen: true, shown: false, messages: 0 };
@@ -184,7 +184,7 @@ describe.each(LABS)('the %s lab', (lab) => {
       class Counted extends Worker {
         constructor(...given: ConstructorParameters<typeof Worker>) {
           super(...given);
-          // In the page: the run is over soon.
+          // Inside the page, because the run is short.
           this.addEventListener('message', () => {
             if (!state.shown && document.querySelector('[data-state=running]')) state.seen = false;
             if (!state.seen) state.messages += 1;
@@ -197,7 +197,7 @@ describe.each(LABS)('the %s lab', (lab) => {
       };
       Object.assign(window, { Worker: Counted, tab: state, show });
     });
-    // Until nothing more comes: a whole run, or what it goes on with before it waits for the page.
+    // Until no more messages arrive: after a whole run, or when the worker waits for the page.
     const messages = () => page.evaluate(() => (window as unknown as { tab: { messages: number } }).tab.messages);
     await expect.poll(messages).toBeGreaterThan(0);
     let count = -1;
@@ -219,7 +219,7 @@ describe.each(LABS)('the %s lab', (lab) => {
   });
 });
 
-/** Files that promise what they do not hold. */
+/** Returns files whose headers promise more than they contain. */
 function hostile(lab: string): { name: string; bytes: Uint8Array }[] {
   const text = (words: string) => new TextEncoder().encode(words);
   if (lab === 'reconstruct' || lab === 'sculpt')
@@ -240,7 +240,7 @@ function hostile(lab: string): { name: string; bytes: Uint8Array }[] {
   ];
 }
 
-/** The 352 bytes before the voxels of a NIfTI-1 file of bytes, and these. */
+/** Returns a NIfTI-1 file of bytes: a header of 352 bytes, and the voxels. */
 function nifti(dims: number[], data: Uint8Array): Uint8Array {
   const bytes = new Uint8Array(352 + data.length);
   const header = new DataView(bytes.buffer);

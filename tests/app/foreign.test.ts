@@ -1,16 +1,16 @@
-/** Files in the formats of scanners and microscopes, opened in the app. */
+/** Opening files of scanners and microscopes in the app. */
 import { readFile } from 'node:fs/promises';
 import init, { Mesh } from 'vesicle';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { describedIn } from '../../www/src/foreign/tiff-description';
+import { describedIn } from '../../www/src/importers/tiff-description';
 import { type App, measures, openApp, reach } from './browser';
 import { dicomSeries, type Given, tiffStack } from './pictures';
 
 const [WIDE, HIGH, DEEP] = [24, 20, 16];
-/** Of the half axes of an ellipsoid in voxels. */
+/** Semi-axes of an ellipsoid in voxels. */
 const AXES = [9, 7, 5];
 
-/** Bright inside the ellipsoid in the middle, 128 at its surface. */
+/** Returns voxels that are bright inside the ellipsoid in the middle, and 128 at its surface. */
 function ellipsoid(): number[] {
   return Array.from({ length: WIDE * HIGH * DEEP }, (_, i) => {
     const place = [i % WIDE, Math.floor(i / WIDE) % HIGH, Math.floor(i / (WIDE * HIGH))];
@@ -20,7 +20,7 @@ function ellipsoid(): number[] {
   });
 }
 
-/** In voxels. */
+/** Volume of the ellipsoid in voxels. */
 const VOLUME = (4 / 3) * Math.PI * AXES.reduce((product, axis) => product * axis, 1);
 
 const pages = () => {
@@ -62,7 +62,7 @@ async function hasVolume(voxel: number): Promise<void> {
 }
 
 describe('DICOM', () => {
-  test('a series in any order, oblique, with its intensities rescaled', async () => {
+  test('a series in any order, oblique, with rescaled intensities', async () => {
     const data = Uint16Array.from(ellipsoid(), (value) => value + 1000);
     const along: [number, number, number, number, number, number] = [0.8, 0.6, 0, -0.6, 0.8, 0];
     const grid = { data, dims: [WIDE, HIGH, DEEP] as [number, number, number], along };
@@ -75,23 +75,23 @@ describe('DICOM', () => {
     const [download] = await Promise.all([app.page.waitForEvent('download'), click]);
     await init();
     const { centroid } = Mesh.parse(await readFile(await download.path())).info();
-    // The middle of the voxels by their directions, steps and place.
+    // Centre of the voxel grid, from its directions, spacing and origin.
     for (const [axis, expected] of [10.325, -10.85, 45].entries()) expect(centroid[axis]).toBeCloseTo(expected, 1);
   });
 
-  test('what only looks like it is refused with what was wrong', async () => {
+  test('invalid DICOM files are refused with a reason', async () => {
     const broken = Buffer.concat([Buffer.alloc(128), Buffer.from('DICM'), Buffer.from('nothing of that kind')]);
     await app.page.setInputFiles('input[type=file]', [
       { name: 'x.dcm', mimeType: 'application/dicom', buffer: broken },
     ]);
     await expect.poll(() => app.page.textContent('.banner')).toMatch(/DICOM: this file could not be read/);
-    // ITK tells the console, too.
+    // ITK logs to the console as well.
     expect(app.complaints.splice(0).filter((complaint) => !/stderr|Debug mode/.test(complaint))).toEqual([]);
   });
 });
 
 describe('TIFF', () => {
-  test('OME, of two channels the first', async () => {
+  test('OME: of two channels the first is read', async () => {
     const second = new Uint8Array(WIDE * HIGH).fill(255);
     const file = tiffStack(
       pages().flatMap((page) => [page, second]),
@@ -104,7 +104,7 @@ describe('TIFF', () => {
     await hasVolume(0.5 * 0.5 * 1.25);
   });
 
-  test('one file a slice, in the order of the numbers in their names', async () => {
+  test('one file per slice, in the order of the numbers in their names', async () => {
     const files = pages().map((page, z) => ({
       ...{ name: `slice${z}.tif`, mimeType: 'image/tiff' },
       buffer: tiffStack([page], [WIDE, HIGH], ''),
@@ -122,23 +122,23 @@ describe('TIFF', () => {
     await app.page.setInputFiles('input[type=file]', files);
     await expect
       .poll(() => app.page.textContent('.banner'))
-      .toMatch(/TIFF: page 2 is of another size than the first, 24 by 20/);
+      .toMatch(/TIFF: page 2 differs in size from the first page, 24 × 20/);
   });
 
-  test('a single slice', async () => {
+  test('a single slice is refused', async () => {
     const file = { name: 'slice.tif', mimeType: 'image/tiff', buffer: tiffStack([new Uint8Array(4)], [2, 2], '') };
     await app.page.setInputFiles('input[type=file]', [file]);
-    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: a single slice; choose or drop all files/);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: this is a single slice; open all files/);
   });
 
-  test('more files than a header and its data', async () => {
+  test('more files than a header and its data are refused', async () => {
     const files = ['a', 'b', 'c'].map((name) => ({ name, mimeType: '', buffer: Buffer.from(name) }));
     await app.page.setInputFiles('input[type=file]', files);
     await expect.poll(() => app.page.textContent('.banner')).toMatch(/3 files are neither a series/);
   });
 });
 
-describe('what a TIFF file says of its stack', () => {
+describe('the stack described by a TIFF file', () => {
   test('ImageJ: slices before frames, channels before both', () => {
     const { pages, frames, spacing } = describedIn(
       'ImageJ=1.53\nimages=12\nchannels=2\nslices=3\nframes=2\nspacing=0.7\n',
@@ -152,7 +152,7 @@ describe('what a TIFF file says of its stack', () => {
     expect(describedIn(text, 6)).toMatchObject({ pages: [0, 3, 1, 4, 2, 5], frames: 3 });
   });
 
-  test('words that do not fit the pages, or none: all are slices', () => {
+  test('descriptions that do not fit the pages, or none: all pages are slices', () => {
     const text = '<OME><Pixels DimensionOrder="XYZCT" SizeZ="9" SizeT="3"/></OME>';
     expect(describedIn(text, 4)).toMatchObject({ pages: [0, 1, 2, 3], frames: 1 });
     expect(describedIn('', 2)).toMatchObject({ pages: [0, 1], frames: 1 });

@@ -1,36 +1,36 @@
-/** What surfaces on their way to the screen are made of, without a browser. */
+/** Buffers and simplified surfaces for rendering, without a browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { coarseCorners, type Fine } from '../../www/src/view/coarse';
-import { noArrays, roomFor, surfaceIn } from '../../www/src/worker/room';
+import { type FineMesh, simplifiedIndices } from '../../www/src/view/simplify';
+import { capacityFor, copySurface, emptyArrays } from '../../www/src/worker/surface-buffers';
 
 beforeAll(() => init());
 
 const ball = (edge: number) => Mesh.icosphere([5, 6, 7], 2, edge);
 
-function fineOf(mesh: Mesh): Fine {
-  const { positions, normals, indices, vertices, triangles } = surfaceIn(noArrays(), mesh);
+function fineOf(mesh: Mesh): FineMesh {
+  const { positions, normals, indices, vertices, triangles } = copySurface(emptyArrays(), mesh);
   return { positions, normals, indices, vertices, corners: 3 * triangles };
 }
 
-describe('room', () => {
-  test('is enough, not much more, and seldom another', () => {
-    const rooms = Array.from({ length: 20_000 }, (_, count) => roomFor(count));
+describe('buffer capacity', () => {
+  test('is sufficient, not much larger, and seldom changes', () => {
+    const rooms = Array.from({ length: 20_000 }, (_, count) => capacityFor(count));
     expect(rooms.filter((room, count) => room < count)).toEqual([]);
     expect(rooms.filter((room, count) => room > Math.max(1, 1.25 * count) + 1)).toEqual([]);
     expect(new Set(rooms).size).toBeLessThan(50);
   });
 
-  test('a mesh goes into the arrays it is given where they fit, else into new ones', () => {
+  test('a mesh is copied into given arrays if they are large enough, and into new ones otherwise', () => {
     const mesh = ball(0.5);
-    const first = surfaceIn(noArrays(), mesh);
+    const first = copySurface(emptyArrays(), mesh);
     expect(first.vertices).toBe(mesh.vertexCount);
     expect(first.positions.subarray(0, 3 * first.vertices)).toEqual(mesh.arrays().positions);
-    const second = surfaceIn(first, mesh);
+    const second = copySurface(first, mesh);
     expect(second.positions).toBe(first.positions);
     expect(second.indices).toBe(first.indices);
     mesh.refine();
-    const third = surfaceIn(second, mesh);
+    const third = copySurface(second, mesh);
     expect(third.positions).not.toBe(second.positions);
     expect(third.indices.subarray(0, 3 * third.triangles)).toEqual(mesh.arrays().indices);
     mesh.free();
@@ -38,11 +38,11 @@ describe('room', () => {
 });
 
 describe('a coarse surface', () => {
-  test('has about as many triangles as are asked for, on vertices of the fine one', () => {
+  test('has about the requested number of triangles, on vertices of the fine one', () => {
     const mesh = ball(0.08);
     const fine = fineOf(mesh);
     for (const wanted of [500, 2000]) {
-      const corners = coarseCorners(fine, wanted);
+      const corners = simplifiedIndices(fine, wanted);
       expect(corners.length / 3).toBeGreaterThan(wanted / 2.5);
       expect(corners.length / 3).toBeLessThan(wanted * 2.5);
       expect(Math.max(...corners)).toBeLessThan(fine.vertices);
@@ -50,12 +50,12 @@ describe('a coarse surface', () => {
     mesh.free();
   });
 
-  test('faces outwards and encloses nearly the same', () => {
+  test('faces outwards and encloses nearly the same volume', () => {
     const mesh = ball(0.08);
     const fine = fineOf(mesh);
     const whole = enclosed(fine.positions, fine.indices.subarray(0, fine.corners));
-    expect(enclosed(fine.positions, coarseCorners(fine, 1000)) / whole).toBeGreaterThan(0.93);
-    expect(enclosed(fine.positions, coarseCorners(fine, 1000)) / whole).toBeLessThan(1.01);
+    expect(enclosed(fine.positions, simplifiedIndices(fine, 1000)) / whole).toBeGreaterThan(0.93);
+    expect(enclosed(fine.positions, simplifiedIndices(fine, 1000)) / whole).toBeLessThan(1.01);
     mesh.free();
   });
 
@@ -66,7 +66,7 @@ describe('a coarse surface', () => {
     const vertices = positions.length / 3;
     const [below, above] = [gridCorners(30, 0), gridCorners(30, vertices / 2)];
     const indices = Uint32Array.from([...below, ...above]);
-    const corners = coarseCorners({ positions, normals, indices, vertices, corners: indices.length }, 200);
+    const corners = simplifiedIndices({ positions, normals, indices, vertices, corners: indices.length }, 200);
     expect(corners.length).toBeGreaterThan(100);
     for (let i = 0; i < corners.length; i += 3) {
       const sides = [0, 1, 2].map((k) => (corners[i + k] ?? 0) < vertices / 2);
@@ -84,7 +84,7 @@ function gridCorners(side: number, first: number): number[] {
   return cells.flatMap((a) => [a, a + 1, a + side, a + 1, a + side + 1, a + side]).map((corner) => corner + first);
 }
 
-/** Six times the volume that triangles enclose. */
+/** Returns six times the volume that triangles enclose. */
 function enclosed(positions: Float32Array, indices: Uint32Array): number {
   let sum = 0;
   for (let i = 0; i < indices.length; i += 3) {

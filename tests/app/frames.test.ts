@@ -1,4 +1,4 @@
-/** How the page gets its code and its surfaces: nothing too early, nothing twice. */
+/** How the page loads code and receives surfaces: nothing too early, nothing twice. */
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import { watchPage, watchWorker } from '../../bench/watch.mjs';
 import { type App, iteration, openApp, reach } from './browser';
@@ -49,7 +49,7 @@ test('the code of a lab is fetched when the lab is opened', async () => {
   expect(scripts.filter((name) => /^(reconstruct|track)-/.test(name))).toEqual([]);
 });
 
-test('of labs asked for one after the other, the last one opens, alone', async () => {
+test('when several labs are requested in quick succession, only the last one opens', async () => {
   await openAt('#extract?example=linked-rings');
   await app.page.evaluate(() => {
     for (const lab of ['track', 'sculpt', 'reconstruct', 'extract', 'sculpt'])
@@ -61,8 +61,8 @@ test('of labs asked for one after the other, the last one opens, alone', async (
   expect(await app.page.textContent('#lab-name')).toBe('Sculpt');
 });
 
-test('surfaces are handed over by the worker, and go to the GPU as they came, into the same buffers', async () => {
-  // From around everything the run is long enough to be paused.
+test('surfaces are transferred by the worker and uploaded unchanged, into the same buffers', async () => {
+  // From the enclosing start the run is long enough to be paused.
   await openAt('#extract?start=enclosing&v=2');
   await reach(app.page, 'running');
   await expect.poll(() => iteration(app.page)).toBeGreaterThan(10);
@@ -78,11 +78,11 @@ test('surfaces are handed over by the worker, and go to the GPU as they came, in
   const { largestCopy, uploads } = await watched();
   // Outlines in the slices have some 50 kB, positions more than 1 MB.
   expect(largestCopy).toBeLessThan(200_000);
-  // Places, normals and corners of nearly every step.
+  // Positions, normals and indices of nearly every step.
   expect(uploads.refilled).toBeGreaterThanOrEqual(9);
 });
 
-test('frames of the Sculpt lab are handed over, too', async () => {
+test('frames of the Sculpt lab are transferred, too', async () => {
   await openAt('#sculpt?example=lava');
   await reach(app.page, 'running', 'done');
   await expect.poll(async () => (await watched()).frames).toBeGreaterThan(5);
@@ -91,17 +91,17 @@ test('frames of the Sculpt lab are handed over, too', async () => {
   expect((await watched()).copied).toBe(0);
 });
 
-test('the page keeps the surface that it draws, and gives the one before back', async () => {
+test('the page keeps the displayed surface and returns the previous one', async () => {
   await openAt('#extract?example=linked-rings');
   await reach(app.page, 'done');
-  // Colours are made from the arrays that are shown.
+  // Colours are computed from the displayed arrays.
   await app.page.selectOption('.view-options select', 'component');
   await app.page.getByLabel('Wireframe').check();
   await app.page.locator('.view > canvas').press('ArrowLeft');
   await expect.poll(async () => (await watched()).drawn).toBeGreaterThan(1000);
 });
 
-test('drawn in software, a large surface is turned with fewer triangles, and rests with all of them', async () => {
+test('with software rendering a large surface is rotated with fewer triangles, and shown at rest with all of them', async () => {
   await openAt('#extract');
   await reach(app.page, 'done');
   const all = Number((await app.page.textContent('[data-measure=triangles]'))?.replace(/\D/g, ''));
@@ -117,11 +117,11 @@ test('drawn in software, a large surface is turned with fewer triangles, and res
   expect((await watched()).drawn).toBeGreaterThan(4000);
   await app.page.mouse.up();
   await expect.poll(async () => (await watched()).drawn).toBe(all);
-  // What was made for the while is gone.
+  // The temporary buffers have been freed.
   expect((await watched()).gpu).toBe(gpu);
 });
 
-test('slices are drawn by the processor, and the view keeps its size when a run begins', async () => {
+test('slices are rendered by the processor, and the view keeps its size when a run begins', async () => {
   await openAt('#extract?example=linked-rings');
   await reach(app.page, 'done');
   const byProcessor = await app.page
@@ -137,7 +137,7 @@ test('slices are drawn by the processor, and the view keeps its size when a run 
   expect(await view.boundingBox()).toEqual(running);
 });
 
-test('what has a hash in its name is kept for ever, all else is asked for again and not sent twice', async () => {
+test('files with a hash in their name are cached forever, all others are revalidated', async () => {
   const page = await fetch(app.address);
   expect(page.headers.get('cache-control')).toBe('no-cache');
   const again = await fetch(app.address, { headers: { 'If-None-Match': page.headers.get('etag') ?? '' } });

@@ -1,4 +1,4 @@
-// Each live page with the real host in it: from the host's volume to a surface at rest in the host's view.
+// The live pages with their real hosts: from the host's volume to a converged surface in the host's view.
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { type App, openApp, overflow, reach } from './browser';
@@ -16,7 +16,7 @@ afterAll(() => app.close());
 
 const HOSTS = ['three', 'niivue', 'niivue-next', 'vtk', 'itk'];
 
-test('the list of hosts is found from the help of the app', async () => {
+test("the list of hosts can be reached from the app's help", async () => {
   await page.click('#help');
   // In a tab of its own.
   const [list] = await Promise.all([page.waitForEvent('popup'), page.click('dialog a[href*=embed]')]);
@@ -43,16 +43,16 @@ describe.each(HOSTS)('%s', (name) => {
     await reach(page, 'done');
   });
 
-  test('frames with another topology went in, and none was missed', async () => {
+  test('frames with changed connectivity arrive, and none is missed', async () => {
     const { times, topologies, missed } = await watched(page);
-    // From a contour, a run is at rest after some ten to twenty iterations.
+    // From a contour, a run converges within some ten to twenty iterations.
     expect(topologies).toBeGreaterThan(5);
     expect(missed).toBe(0);
     const middle = times.toSorted((a, b) => a - b)[Math.floor(times.length / 2)] ?? 0;
     console.info(`${name}: ${times.length} frames, ${middle.toFixed(2)} ms for update in the middle`);
   });
 
-  test('the surface lies where the host has the iso value, its outside outside', async () => {
+  test("the surface lies where the host's image has the iso value, and faces outwards", async () => {
     const { vertices, volume, bracketed } = await found(page, name);
     expect(vertices).toBeGreaterThan(2000);
     expect(volume).toBeGreaterThan(0);
@@ -60,7 +60,7 @@ describe.each(HOSTS)('%s', (name) => {
     expect(bracketed).toBeGreaterThan(0.85);
   });
 
-  test('is drawn: the picture is another without it', async () => {
+  test('is rendered: the picture differs without it', async () => {
     const view = page.locator('#view');
     const shown = await view.screenshot();
     await hide(page, name);
@@ -72,7 +72,7 @@ describe.each(HOSTS)('%s', (name) => {
     await page.setViewportSize({ width: 800, height: 640 });
   });
 
-  test('nothing was complained of, under a policy without eval and inline styles', async () => {
+  test('no errors are logged, under a policy without eval and inline styles', async () => {
     const policy = await page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
     expect(policy).toMatch(/script-src 'self' 'wasm-unsafe-eval';/);
     expect(policy).not.toMatch(/unsafe-inline|'unsafe-eval'/);

@@ -1,29 +1,29 @@
-/** The live pages of www/embed, and how each host is asked where its surface is and what its volume has there. */
+/** The live pages of www/embed: access to the surface and the volume of each host. */
 import type { Page } from 'playwright-core';
 
-/** What a page leaves on `window`, of any host's. */
+/** The objects that a page leaves on `window`, for any host. */
 // biome-ignore lint/suspicious/noExplicitAny: five hosts, each with objects of its own
 export type Hosted = Window & Record<string, any>;
 
-/** A surface in its host's world, and the host's image around it. */
+/** A surface in its host's world space, and the host's image around it. */
 export interface Asked {
   positions: ArrayLike<number>;
   indices: ArrayLike<number>;
-  /** Voxels along the host's axes. */
+  /** Number of voxels along the host's axes. */
   size: ArrayLike<number>;
-  /** World to the host's index, by its own functions. */
+  /** Returns the host's voxel index of a world point, by the host's own functions. */
   toIndex: (point: number[]) => ArrayLike<number>;
-  /** What the host has at a whole index. */
+  /** Returns the host's intensity at an integer index. */
   at: (i: number, j: number, k: number) => number;
   iso: number;
 }
 
-/** Run in the page, as everything below. */
+/** Reads surface and image of each host. Runs in the page, like all functions below. */
 const ask: Record<string, (page: Hosted) => Asked> = {
   three: ({ tooth, object, model }) => {
     const { matrix } = tooth;
     const [x, y, z] = [tooth.xLength, tooth.yLength, tooth.zLength];
-    // Slices are drawn around the middle of the volume.
+    // Slices are drawn around the centre of the volume.
     const inverse = matrix.clone().invert().elements;
     const turn = (p: number[], row: number) =>
       [0, 1, 2].reduce((sum, k) => sum + inverse[4 * k + row] * (p[k] ?? 0), 0);
@@ -47,7 +47,7 @@ const ask: Record<string, (page: Hosted) => Asked> = {
   }),
   'niivue-next': ({ nv, model }) => {
     const [{ matRAS: m, img, hdr, dimsRAS, img2RASstart: start, img2RASstep: step }] = nv.volumes;
-    // Rows; this head has its axes along the world's.
+    // Rows of the matrix; the axes of this head are parallel to those of the world.
     const along = [0, 1, 2].map((row) => ({ scale: m[4 * row + row], shift: m[4 * row + 3] }));
     return {
       positions: nv.meshes[0].positions,
@@ -76,7 +76,7 @@ const ask: Record<string, (page: Hosted) => Asked> = {
   }),
   itk: ({ image, surface, model }) => {
     const { size, spacing, origin, direction, data } = image;
-    // Directions are unit vectors at right angles: their transpose is their inverse.
+    // Directions are orthogonal unit vectors, so their transpose is their inverse.
     const along = (p: number[], column: number) =>
       [0, 1, 2].reduce((sum, row) => sum + direction[3 * row + column] * ((p[row] ?? 0) - origin[row]), 0);
     return {
@@ -93,12 +93,15 @@ const ask: Record<string, (page: Hosted) => Asked> = {
   },
 };
 
-/** What the host's surface is in its world. */
+/** Measures of the host's surface in its world space. */
 export interface Found {
   vertices: number;
-  /** Within the triangles; above 0 where their outside is outside. */
+  /** Volume enclosed by the triangles; positive if they face outwards. */
   volume: number;
-  /** Share of triangles, but for those at the image's border, where the host's image passes the iso value on the way from inside to outside. */
+  /**
+   * Fraction of triangles across which the host's image passes the iso value from inside to outside; triangles at the
+   * image's border are not counted.
+   */
   bracketed: number;
 }
 
@@ -129,10 +132,10 @@ const find = ({ positions, indices, size, toIndex, at, iso }: Asked): Found => {
     const normal = cross(minus(b, a), minus(c, a));
     volume += a.reduce((sum, value, k) => sum + value * (normal[k] ?? 0), 0) / 6;
     const middle = a.map((value, k) => (value + (b[k] ?? 0) + (c[k] ?? 0)) / 3);
-    // There it lies where the image ends.
+    // At the border the surface follows the end of the image.
     if (Array.from(toIndex(middle)).some((value, k) => value < 2 || value > (size[k] ?? 0) - 3)) continue;
     asked++;
-    // Half an edge to both sides of the triangle's middle.
+    // Half an edge length to both sides of the triangle's centre.
     const step = Math.sqrt(Math.hypot(...normal)) / 2 / Math.hypot(...normal);
     const side = (way: number) => sample(middle.map((value, k) => value + way * step * (normal[k] ?? 0)));
     if (side(-1) >= iso && side(1) <= iso) passed++;
@@ -140,12 +143,12 @@ const find = ({ positions, indices, size, toIndex, at, iso }: Asked): Found => {
   return { vertices: new Set(Array.from(indices)).size, volume, bracketed: passed / asked };
 };
 
-/** Asks the host of a page. */
+/** Measures the surface of a page in its host. */
 export function found(page: Page, name: string): Promise<Found> {
   return page.evaluate(`(${find})((${ask[name]})(window))`);
 }
 
-/** How many corners of triangles the host is to draw. */
+/** Expressions for the number of vertex indices that each host draws. */
 const DRAWN: Record<string, string> = {
   three: 'window.object.geometry.drawRange.count',
   niivue: 'window.nv.meshes[0].indexCount',
@@ -154,16 +157,16 @@ const DRAWN: Record<string, string> = {
   itk: '3 * window.surface.polyData.getNumberOfCells()',
 };
 
-/** What a page's surface was given, from its start on. */
+/** Updates of a page's surface, since its start. */
 export interface Watched {
   /** Milliseconds of each update. */
   times: number[];
   topologies: number;
-  /** Updates after which the host had another number of triangles than the mesh. */
+  /** Number of updates after which the host did not have the same number of triangles as the mesh. */
   missed: number;
 }
 
-/** Times and counts what a page's surface is given. To be called before the page is opened. */
+/** Times and counts the updates of a page's surface. Must be called before the page is opened. */
 export async function watch(page: Page): Promise<void> {
   const drawn = Object.entries(DRAWN).map(([name, code]) => `'${name}': () => ${code}`);
   await page.addInitScript(`(${watchUpdates})({ ${drawn.join(', ')} })`);
@@ -193,10 +196,10 @@ function watchUpdates(drawn: Record<string, () => number>): void {
   Object.assign(window, { watched });
 }
 
-/** What was seen. */
+/** Returns the recorded updates. */
 export const watched = (page: Page): Promise<Watched> => page.evaluate('window.watched');
 
-/** Takes the surface out of the host's view, by the host's own means. */
+/** Removes the surface from the host's view, by the host's own means. */
 export function hide(page: Page, name: string): Promise<void> {
   const ways: Record<string, string> = {
     three: 'window.object.visible = false; window.render();',

@@ -1,4 +1,4 @@
-/** What a person does in the Extract lab beyond playing: looks, places, compares, goes back, passes on. */
+/** The Extract lab beyond running: views, attractors, comparisons, undo, links. */
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { PRESETS } from '../../www/src/presets';
@@ -14,32 +14,32 @@ afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
 
-/** Opens the page anew at an address of the lab and waits for the surface to come to rest. */
+/** Reloads the page at an address of the lab and waits until the surface has converged. */
 async function openAt(hash: string): Promise<void> {
   await app.page.goto('about:blank');
   await app.page.goto(app.address + hash);
   await reach(app.page, 'done');
 }
 
-/** Iterations of the chain of figure 7 from the start to rest. */
-const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].outcome.iterations;
+/** Number of iterations of the chain of figure 7 until it converges. */
+const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].expected.iterations;
 
 const text = (selector: string) => app.page.locator(selector).textContent();
-/** Of a canvas as it is shown. */
+/** Takes a screenshot of a canvas. */
 const picture = (selector: string) => app.page.locator(selector).first().screenshot();
 
 describe('a figure of the paper', () => {
-  test('opens from the list, runs to rest and says what the paper saw and what comes out', async () => {
+  test("opens from the list, runs until it converges, and shows the paper's result and its own", async () => {
     await reach(app.page, 'running', 'done');
     await app.page.selectOption('.data select', 'figure-15-16');
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 5, closed: true });
-    expect(await text('.figure')).toMatch(/Paper: On the CT of a head.*Here both end/);
+    expect(await text('.figure')).toMatch(/Paper: On a head CT.*Here both runs end/);
     expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16&v=2');
   });
 
-  test('shows the levels of the pyramid, and marks where the model is', async () => {
+  test('shows the levels of the pyramid, and marks the current one', async () => {
     const levels = await app.page.locator('.pyramid button').evaluateAll((buttons) =>
       buttons.map((button) => ({
         label: button.getAttribute('aria-label'),
@@ -50,10 +50,10 @@ describe('a figure of the paper', () => {
     expect(levels.map(({ width }) => width)).toEqual([20, 36, 64, 112]);
     expect(levels.map(({ inUse }) => inUse)).toEqual([false, false, false, true]);
     expect(levels[0]?.label).toBe('I₃: level 3, 20 × 20 × 20 voxels');
-    expect(levels[3]?.label).toContain('the model is here');
+    expect(levels[3]?.label).toContain('present level of the model');
   });
 
-  test('a level that is chosen is shown in the slices, and the pictures follow the slice', async () => {
+  test('a selected level is shown in the slices, and the pictures follow the slice', async () => {
     const slice = '.slice canvas';
     const fine = await picture(slice);
     await app.page.click('.pyramid [data-level="3"]');
@@ -69,7 +69,7 @@ describe('a figure of the paper', () => {
     await app.page.uncheck('[data-pyramid=follow]');
   });
 
-  test('tells in words where the levels began and what became of the topology', async () => {
+  test('describes level changes and topology changes in words', async () => {
     await expect
       .poll(() => text('[data-plot-events]'))
       .toMatch(
@@ -79,8 +79,8 @@ describe('a figure of the paper', () => {
     expect(vertices).toMatch(/\d at the end of level 3, [\d,]+ at the end of level 2, [\d,]+ at the end of level 1\.$/);
   });
 
-  test('shows the time of each part on each level, as the paper does', async () => {
-    const table = app.page.getByRole('region', { name: 'Time per part and level' });
+  test('shows the time of each part on each level, as in the paper', async () => {
+    const table = app.page.getByRole('region', { name: 'Time by part and level' });
     const head = await table.locator('thead th').allTextContents();
     expect(head).toEqual(['Part', 'level 3', 'level 2', 'level 1', 'level 0', 'total']);
     const rows = await table.locator('tbody tr, tfoot tr').allTextContents();
@@ -92,7 +92,7 @@ describe('a figure of the paper', () => {
       'embedding',
       'forces',
       'motion',
-      'together',
+      'total',
     ]);
     const numbers = async (row: string) =>
       (await table.locator('tr', { hasText: row }).locator('td').allTextContents()).map(Number);
@@ -102,7 +102,7 @@ describe('a figure of the paper', () => {
       expect(Math.abs((forces[i] ?? 0) + (motion[i] ?? 0) - sum)).toBeLessThan(0.02);
   });
 
-  test('compares direct with coarse to fine in a table, and the surface stays', async () => {
+  test('compares direct with coarse to fine in a table, and keeps the surface', async () => {
     const before = await measures(app.page);
     await app.page.click('[data-compare=start]');
     await app.page.waitForFunction(() =>
@@ -117,8 +117,8 @@ describe('a figure of the paper', () => {
     expect(direct).toMatchObject({ levels: 0, done: true, components: 1, genus: 5 });
     expect(coarseToFine).toMatchObject({ levels: 3, done: true, components: 1, genus: 5, vertices: before.vertices });
     expect(direct.milliseconds).toBeGreaterThan(2.75 * coarseToFine.milliseconds);
-    expect(await text('.compare [role=status]')).toMatch(/times less time than direct\. Area differs by 0\.\d\d %/);
-    const table = app.page.getByRole('region', { name: 'Time of both ways' });
+    expect(await text('.compare [role=status]')).toMatch(/times as fast as direct\. Area differs by 0\.\d\d %/);
+    const table = app.page.getByRole('region', { name: 'Times of both runs' });
     expect(await table.locator('thead th').allTextContents()).toEqual(['Part', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
     const heads = await table.locator('tbody th').allTextContents();
     expect(heads).toEqual(['coarse to fine', 'T', 'N', 'F', '=', 'steps', 'direct', 'T', 'N', 'F', '=', 'steps']);
@@ -133,7 +133,7 @@ describe('a figure of the paper', () => {
     expect(await app.page.getAttribute('[data-comparison]', 'data-comparison')).toBe('{}');
   });
 
-  test('with several pictures goes on from one to the next', async () => {
+  test('with several pictures leads from one to the next', async () => {
     await openAt('#extract?example=figure-24');
     const first = await iteration(app.page);
     expect(await measures(app.page)).toMatchObject({ components: 1 });
@@ -156,7 +156,7 @@ describe('attractors', () => {
 
   test('are placed at the crosshair by key, and pull the surface', async () => {
     await openAt('#extract?example=figure-7');
-    // A place beside a ring: right end of the volume, half way up.
+    // A position beside a ring: the right end of the volume, half way up.
     for (const slider of await app.page.locator('.slice input[type=range]').all()) await slider.fill('22');
     await app.page.getByLabel('Sagittal', { exact: true }).fill('58');
     const before = await measures(app.page);
@@ -186,7 +186,7 @@ describe('attractors', () => {
     const box = await slice.boundingBox();
     await slice.click({ position: { x: 0.5 * (box?.width ?? 0), y: 0.3 * (box?.height ?? 0) } });
     await expect.poll(() => items().count()).toBe(2);
-    // Somewhere on a row of clicks through the middle there is surface.
+    // Some click in a row across the middle hits the surface.
     const view = app.page.locator('.view > canvas');
     const area = await view.boundingBox();
     for (let part = 0.35; part < 0.7 && (await items().count()) < 3; part += 0.04) {
@@ -210,9 +210,9 @@ describe('attractors', () => {
     await pause();
   });
 
-  test('come back with undo', async () => {
+  test('are restored by undo', async () => {
     await app.page.locator('.view > canvas').focus();
-    // The label comes with the saved state.
+    // The label appears with the saved state.
     await expect
       .poll(() => app.page.getAttribute('[data-transport=undo]', 'title'))
       .toBe('Undo: removal of attractor 2');
@@ -225,11 +225,11 @@ describe('attractors', () => {
 describe('colour', () => {
   test('by speed has a legend with numbers, and colours the surface', async () => {
     await openAt('#extract?example=figure-7');
-    // The focus is on the list from here on, and its ring in every picture.
+    // From here on the list is focused, and its ring is in every picture.
     await app.page.selectOption('[data-view=color]', 'plain');
     const plain = await picture('.view > canvas');
     await app.page.selectOption('[data-view=color]', 'speed');
-    const legend = app.page.getByRole('group', { name: 'Meaning of the colours' });
+    const legend = app.page.getByRole('group', { name: 'Colour scale' });
     await legend.waitFor();
     expect(await legend.textContent()).toMatch(/^Speed along the normal, δ per iteration−([\d.]+)0\1inwardsoutwards$/);
     await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(false);
@@ -238,15 +238,17 @@ describe('colour', () => {
     await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(true);
   });
 
-  test('by curvature has a legend in the unit of the volume, and tells bulging from hollow', async () => {
+  test("by curvature has a legend in the volume's unit, and distinguishes convex from concave", async () => {
     await app.page.selectOption('[data-view=color]', 'mean curvature');
     const legend = app.page.locator('.color-legend');
-    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1hollowbulging$/);
+    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1concaveconvex$/);
     await app.page.selectOption('[data-view=color]', 'gaussian curvature');
-    await expect.poll(() => legend.textContent()).toMatch(/^Gaussian curvature, 1\/unit²−.*saddledome or cup$/);
+    await expect
+      .poll(() => legend.textContent())
+      .toMatch(/^Gaussian curvature, 1\/unit²−.*hyperbolic \(saddle\)elliptic \(dome or cup\)$/);
   });
 
-  test('shows at the start that nothing moves, and then that all moves inwards', async () => {
+  test('shows no motion at the start, then inward motion everywhere', async () => {
     await app.page.selectOption('[data-view=color]', 'speed');
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
@@ -263,11 +265,11 @@ describe('undo', () => {
   const redo = () => app.page.click('[data-transport=redo]');
   const rigidity = () => app.page.locator('[data-param=rigidity] input[type=number]');
 
-  test('goes back over a reset to the surface, the plots and the state that were there, and forth again', async () => {
+  test('reverts a reset with its surface, plots and state, and redo repeats it', async () => {
     await openAt('#extract?example=figure-7');
     const before = await measures(app.page);
     const captions = () => app.page.locator('figcaption').allTextContents();
-    // They follow at the next frames, one after the other, which a busy machine draws late.
+    // They follow in the next frames, one after the other, with a delay on a busy machine.
     const ends = [`After ${CHAIN} iterations`, `now ${before.vertices};`, `now ${before.chi};`];
     await expect.poll(captions).toEqual(ends.map((end) => expect.stringContaining(end)));
     const told = await captions();
@@ -286,7 +288,7 @@ describe('undo', () => {
     await reach(app.page, 'done');
   });
 
-  test('by Ctrl+Z takes a parameter back, and what it did', async () => {
+  test('by Ctrl+Z reverts a parameter and its effect', async () => {
     const before = await measures(app.page);
     await rigidity().fill('0.3');
     await rigidity().press('Enter');
@@ -303,7 +305,7 @@ describe('undo', () => {
     await expect.poll(() => rigidity().inputValue()).toBe('0.1');
   });
 
-  test('leaves a number alone that is being typed', async () => {
+  test('does not affect a number that is being typed', async () => {
     const title = await app.page.getAttribute('[data-transport=undo]', 'title');
     await rigidity().click();
     await app.page.keyboard.type('9');
@@ -313,7 +315,7 @@ describe('undo', () => {
     await rigidity().blur();
   });
 
-  test('takes back steps, then another start with other levels', async () => {
+  test('reverts steps, then a change of start and levels', async () => {
     await reach(app.page, 'done');
     const before = await measures(app.page);
     await app.page.getByLabel('Pyramid levels').fill('1');
@@ -326,7 +328,7 @@ describe('undo', () => {
     await expect.poll(() => iteration(app.page)).toBe(10);
     await undo();
     await expect.poll(() => iteration(app.page)).toBe(0);
-    // The reset and the other start, one right after the other.
+    // The reset and the new start, in immediate succession.
     await app.page.evaluate(() => {
       for (let i = 0; i < 2; i++) document.querySelector<HTMLElement>('[data-transport=undo]')?.click();
     });
@@ -336,7 +338,7 @@ describe('undo', () => {
     await expect.poll(() => app.page.locator('.pyramid button').count()).toBe(1);
   });
 
-  test('has nothing to do on a volume that was just opened, except to stop it from having run', async () => {
+  test('on a volume that was just opened only reverts its run', async () => {
     await app.page.selectOption('.data select', 'figure-8');
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('chain'));
     await expect.poll(() => app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Play');
@@ -357,8 +359,8 @@ describe('a link', () => {
     await reach(app.page, 'running', 'done');
     expect(await app.page.inputValue('.data select')).toBe('linked-rings');
     expect(await app.page.inputValue('.start select')).toBe('bubbles');
-    expect(await app.page.getByLabel('Bubbles along each side').inputValue()).toBe('9');
-    expect(await app.page.getByLabel('Mean edge').inputValue()).toBe('2');
+    expect(await app.page.getByLabel('Bubbles per axis').inputValue()).toBe('9');
+    expect(await app.page.getByLabel('Mean edge length').inputValue()).toBe('2');
     expect(await app.page.inputValue('[data-param=iso] input[type=number]')).toBe('130');
     expect(await app.page.inputValue('[data-param=rigidity] input[type=number]')).toBe('0.15');
     expect(await app.page.locator('.attractors li').count()).toBe(1);
@@ -367,7 +369,7 @@ describe('a link', () => {
     expect(parts(await app.page.evaluate(() => location.hash))).toEqual(parts(hash));
   });
 
-  test('followed while the page is open opens what it says', async () => {
+  test('opens its settings when it is followed in the open page', async () => {
     await app.page.evaluate(() => {
       location.hash = '#extract?example=figure-8';
     });
@@ -377,7 +379,7 @@ describe('a link', () => {
     expect(await app.page.locator('.attractors li').count()).toBe(0);
   });
 
-  test('that cannot be followed says so, and the built-in example runs', async () => {
+  test('that is invalid shows a message, and the built-in example runs', async () => {
     await app.page.goto('about:blank');
     await app.page.goto(`${app.address}#extract?example=nowhere`);
     await app.page.waitForSelector('.banner:not([hidden])');
@@ -387,13 +389,13 @@ describe('a link', () => {
 });
 
 describe('exercises', () => {
-  test('there are two, closed at first, that say what to do, to look for and to hand in', async () => {
+  test('there are two, collapsed at first, that say what to do, observe and hand in', async () => {
     await openAt('#extract?example=figure-7');
     const exercises = app.page.locator('[data-exercise]');
     expect(await exercises.count()).toBe(2);
     await app.page.locator('summary', { hasText: 'Exercises' }).click();
     await app.page.locator('[data-exercise] summary').last().click();
-    for (const words of ['Look for:', 'Hand in:', 'Compare'])
+    for (const words of ['Questions:', 'Hand in:', 'Compare'])
       expect(await exercises.last().textContent()).toContain(words);
     await exercises.last().locator('button').click();
     await expect.poll(() => app.page.inputValue('.data select')).toBe('figure-15-16');

@@ -1,4 +1,4 @@
-// The notices that go with the app and the package, and what is refused.
+// The notices that accompany app and package, and the licences that are refused.
 import { existsSync } from 'node:fs';
 import { readFile, rm } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
@@ -19,31 +19,31 @@ beforeAll(async () => {
   notices = await readFile(at('dist/licences.txt'), 'utf8');
 });
 
-/** The lines that name a crate or a package, with its version and licence. */
+/** Returns the names of the crates and packages that a text lists with version and licence. */
 const named = (text: string) => [...text.matchAll(/^(\S+) (\d+\.\d\S*) \((.+)\)/gm)].map(([, name = '']) => name);
 
-test('every crate that the module is made of is named', () => {
+test('every crate in the module is listed', () => {
   expect(crates.length).toBeGreaterThan(10);
   expect(named(notices)).toEqual(expect.arrayContaining(crates));
 });
 
-test('packages of the page, of its workers and beside it are named, and no tools', () => {
-  // geotiff is in a worker alone.
+test('packages of the page, of its workers and beside it are listed, and no tools', () => {
+  // geotiff is in a worker only.
   const parts = ['three', 'uplot', 'geotiff', 'itk-wasm', '@itk-wasm/dicom', '@niivue/niivue', '@kitware/vtk.js'];
   expect(named(notices)).toEqual(expect.arrayContaining(parts));
   const tools = ['vite', 'typescript', 'playwright-core', 'wasm-bindgen-cli', 'thiserror-impl', 'gltf', 'vesicle'];
   expect(named(notices).filter((name) => tools.includes(name))).toEqual([]);
 });
 
-test('all but one come with the text of their licence', () => {
+test('all but one include the text of their licence', () => {
   const blocks = notices.split(/^─+$/m).slice(1);
   expect(blocks.length).toBeGreaterThan(20);
   expect(blocks.filter((block) => block.includes('without the text')).flatMap(named)).toEqual(['lerc']);
-  // Where all of several licences hold, none may be left out.
+  // Where several licences apply together, none may be left out.
   expect(notices).toMatch(/^unicode-ident .*AND Unicode-3\.0[^─]*UNICODE LICENSE V3/m);
 });
 
-test('the package has notices of its own, of the module and of three.js in the element', async () => {
+test('the package has its own notices, of the module and of three.js in the element', async () => {
   const file = 'target/licences/package.txt';
   await writeNotices(file, 'element');
   const parts = named(await readFile(at(file), 'utf8'));
@@ -67,7 +67,7 @@ test.each([
   else await expect(asked).resolves.toBeUndefined();
 });
 
-test('the app leads to them', async () => {
+test('the app links to them', async () => {
   const app = await openApp();
   try {
     await app.page.click('#help');

@@ -1,4 +1,4 @@
-// The browser's half of the notebook's widget, with a stand-in for the notebook: traits, and events when they change.
+// The browser side of the notebook widget, with a fake notebook: traits, and events when they change.
 import { cp, mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -11,11 +11,11 @@ import { makeNotebook, WIDGET } from '../../scripts/notebook.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { countPixels } from './pixels';
 
-/** What a notebook lets a widget do: no files beside it, no network. */
+/** A notebook's restrictions on widgets: no files beside it, no network. */
 const POLICY =
   "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:; connect-src 'self'; img-src data: blob:";
 
-/** Run in the page: the widget from the address of a blob, as anywidget does it, and what stands for its model. */
+/** Runs in the page: loads the widget from a blob address, as anywidget does, with a fake model. */
 const SCRIPT = `
   const text = await (await fetch('./surface.js')).text();
   const address = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
@@ -35,7 +35,7 @@ const SCRIPT = `
     off() { this.listeners = []; }
   }
 
-  // Bytes of a message begin anywhere in its buffer.
+  // Bytes of a message may begin anywhere in its buffer.
   const packed = (kind, shape, bytes) => {
     const buffer = new Uint8Array(bytes.length + 3);
     buffer.set(bytes, 3);
@@ -105,19 +105,19 @@ afterEach(async () => {
   expect(complaints.splice(0)).toEqual([]);
 });
 
-/** A widget with these traits, in two places of the page. */
+/** Opens a widget with these traits in two cells of the page. */
 const open = (given: string) => page.evaluate(`open(${given})`);
 
-/** What the widget has told Python. */
+/** Returns the value of a trait as sent to Python. */
 const told = <Name extends keyof Traits>(name: Name) => page.evaluate(`model.sent.${name}`) as Promise<Traits[Name]>;
 
-/** What Python tells the widget. */
+/** Sets a trait as Python would. */
 const tell = (name: keyof Traits, value: string) => page.evaluate(`model.set('${name}', ${value})`);
 
 const reach = (state: Traits['state']) =>
   expect.poll(async () => complaints[0] ?? [await told('state'), await told('message')].join(' ').trim()).toBe(state);
 
-/** The mesh as Python has it. */
+/** Returns the mesh as Python receives it. */
 async function mesh(): Promise<Mesh> {
   const [positions, indices] = await Promise.all(
     ['vertices', 'triangles'].map((name) =>
@@ -129,7 +129,7 @@ async function mesh(): Promise<Mesh> {
   return Mesh.fromArrays(Float32Array.from(positions as number[]), Uint32Array.from(indices as number[]));
 }
 
-test('a volume goes in, the surface of its two rings comes back, and both places show it', async () => {
+test('a volume gives the surface of its two rings, displayed in both cells', async () => {
   await open('{}');
   await reach('done');
   const rings = await mesh();
@@ -150,7 +150,7 @@ test('a volume goes in, the surface of its two rings comes back, and both places
   );
 });
 
-test('it pauses, goes on, and with other parameters once more', async () => {
+test('it pauses, continues, and continues with changed parameters', async () => {
   await open('{ running: false }');
   await reach('paused');
   expect(await told('iteration')).toBe(0);
@@ -164,7 +164,7 @@ test('it pauses, goes on, and with other parameters once more', async () => {
   expect((await mesh()).info().volume).toBeLessThan(before);
 });
 
-test('wrong parameters are told of and change nothing; a wrong volume is an error, and the next one is not', async () => {
+test('invalid parameters are reported and change nothing; an invalid volume is an error, and the next one works', async () => {
   await open('{}');
   await reach('done');
   const steps = await told('iteration');
@@ -182,7 +182,7 @@ test('wrong parameters are told of and change nothing; a wrong volume is an erro
   expect((await mesh()).info().components).toBe(2);
 });
 
-test('a place that is left is shown no more', async () => {
+test('a removed view is no longer updated', async () => {
   await open('{ running: false }');
   await reach('paused');
   await page.evaluate('views[0]()');

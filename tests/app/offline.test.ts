@@ -16,7 +16,7 @@ let server: Awaited<ReturnType<typeof serve>>;
 const uncaught: string[] = [];
 
 beforeAll(async () => {
-  // Builds the app where that has not been done.
+  // Builds the app if that has not been done.
   await (await openApp(undefined, 'bench.html')).close();
   folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   await cp(at('dist'), folder, { recursive: true });
@@ -32,7 +32,7 @@ afterAll(async () => {
   await rm(folder, { recursive: true });
 });
 
-/** The addresses of all that is kept, without the server's. */
+/** Returns the addresses of all cached files, without the server's. */
 async function kept(): Promise<string[]> {
   const urls = await page.evaluate(async () => {
     const lists = (await caches.keys()).map(async (name) => (await caches.open(name)).keys());
@@ -44,7 +44,7 @@ async function kept(): Promise<string[]> {
 
 const listed = async (): Promise<string[]> => JSON.parse(await readFile(join(folder, 'files.json'), 'utf8'));
 
-test('a first visit keeps the page, all its code, and the data it had opened', async () => {
+test('a first visit caches the page, all its code, and the data it opened', async () => {
   await page.goto(`${server.address}#extract?example=tooth`);
   await reach(page, 'done');
   const wanted = [...(await listed()), '', 'icon.svg', 'data/tooth.nrrd'];
@@ -52,13 +52,13 @@ test('a first visit keeps the page, all its code, and the data it had opened', a
   expect(await kept()).not.toContain('data/angel.ply');
 });
 
-test('what is opened later is kept, too', async () => {
+test('data opened later are cached, too', async () => {
   await page.goto(`${server.address}#reconstruct?example=angel`);
   await reach(page, 'running', 'done');
   await expect.poll(kept).toContain('data/angel.ply');
 });
 
-test('without a server the examples run as before, with all of their addresses', async () => {
+test('without a server the examples run as before, at all of their addresses', async () => {
   await page.goto(`${server.address}#extract?example=tooth`);
   await reach(page, 'done');
   const before = await measures(page);
@@ -72,7 +72,7 @@ test('without a server the examples run as before, with all of their addresses',
   expect(uncaught).toEqual([]);
 });
 
-test('what was never opened says that it needs the network, and the lab stays usable', async () => {
+test('data never opened before need the network, which a message says, and the lab stays usable', async () => {
   await page.selectOption('.data select', 'ovule');
   await reach(page, 'error');
   expect(await page.textContent('.banner')).toMatch(/ovule.* could not be opened.*network/s);
@@ -81,7 +81,7 @@ test('what was never opened says that it needs the network, and the lab stays us
   expect(uncaught).toEqual([]);
 });
 
-test('a new deployment is there at the next visit, and the files of the old one go', async () => {
+test('a new deployment is used at the next visit, and files of the old one are deleted', async () => {
   const old = await listed();
   const mark = "\ndocument.documentElement.dataset.deployment = 'second';";
   await build({
@@ -100,7 +100,7 @@ test('a new deployment is there at the next visit, and the files of the old one 
   await expect.poll(async () => (await kept()).filter((name) => name.startsWith('assets/'))).toEqual(fresh);
 });
 
-test('while developing nothing is kept', async () => {
+test('during development nothing is cached', async () => {
   const vite = await createServer({ configFile: at('www/vite.config.ts'), server: { port: 0 }, logLevel: 'error' });
   await vite.listen();
   const developing = await browser.newPage();

@@ -5,7 +5,7 @@ import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
 
-test('two hundred steps end in the bits that the core gives natively', async () => {
+test('two hundred steps give the same bits as the native core', async () => {
   const server = await serve(at('pkg'), 0);
   const browser = await launchChromium();
   try {

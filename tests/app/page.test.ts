@@ -14,7 +14,7 @@ test.each([
   [1024, 768],
   [1440, 900],
   [390, 844],
-])('nothing is wider than a page of %i by %i', async (width, height) => {
+])('the page fits %i by %i', async (width, height) => {
   expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
 });
 
@@ -22,16 +22,16 @@ test('every control has a name', async () => {
   expect(await unnamedControls(app.page)).toEqual([]);
 });
 
-test('the help lists the keys and closes again', async () => {
+test('the help lists the keyboard shortcuts and closes again', async () => {
   await app.page.click('#help');
   expect(await app.page.textContent('dialog')).toContain('play or pause');
   await app.page.keyboard.press('Escape');
   expect(await app.page.locator('dialog').isVisible()).toBe(false);
 });
 
-test.each(LABS)('%s leads to the page on its method, and from its list of keys to all other help', async (lab) => {
+test.each(LABS)('%s links to its documentation, and from its keyboard shortcuts to all other help', async (lab) => {
   await app.page.click(`[data-lab=${lab}]`);
-  // The list of keys of the lab before is gone by then.
+  // By then the shortcuts of the previous lab are gone.
   await expect.poll(async () => (await app.page.title()).toLowerCase()).toBe(`vesicle: ${lab}`);
   await app.page.waitForSelector('dialog', { state: 'attached' });
   const hrefs = await app.page
@@ -44,12 +44,12 @@ test.each(LABS)('%s leads to the page on its method, and from its list of keys t
   expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
     expect.stringMatching(/^A surface .* Vesicle documentation$/),
     'Vesicle documentation',
-    'Vesicle: Measurements',
+    'Vesicle: Benchmarks',
     'Vesicle in other software',
   ]);
 });
 
-test('a lab that was asked for opens, also where the one before says its address just then', async () => {
+test('a requested lab opens, even if the previous one changes its address at the same time', async () => {
   await app.page.click('[data-lab=extract]');
   await app.page.getByText('Copy link to these settings').waitFor();
   await reach(app.page, 'running', 'done', 'paused');
@@ -61,7 +61,7 @@ test('a lab that was asked for opens, also where the one before says its address
   await expect.poll(() => app.page.title()).toBe('Vesicle: Track');
 });
 
-test('the page forbids itself to load anything from elsewhere', async () => {
+test("the page's policy forbids loading anything from other origins", async () => {
   const policy = await app.page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
   expect(policy).toContain("default-src 'self'");
   expect(policy).not.toContain('unsafe-inline');

@@ -1,6 +1,6 @@
-/** Small DICOM and TIFF files made for the tests. */
+/** Small DICOM and TIFF files for the tests. */
 
-/** A file as Playwright hands it to an input. */
+/** A file in the form that Playwright passes to an input. */
 export interface Given {
   name: string;
   mimeType: string;
@@ -9,7 +9,7 @@ export interface Given {
 
 const even = (text: string, filler: string) => (text.length % 2 ? text + filler : text);
 
-/** One element of explicit little-endian DICOM, its value as text or as whole numbers of 16 bits. */
+/** Returns an element of explicit little-endian DICOM, with a value of text or of 16-bit integers. */
 function element(group: number, number: number, kind: string, value: string | number[] | Buffer): Buffer {
   const bytes = valueBytes(kind, value);
   const long = ['OB', 'OW'].includes(kind);
@@ -36,13 +36,13 @@ export interface Grid {
   data: Uint16Array;
   dims: [number, number, number];
   spacing: [number, number, number];
-  /** Of the first voxel, in LPS. */
+  /** Position of the first voxel, in LPS. */
   origin: [number, number, number];
-  /** Directions of x and y of the picture, in LPS. */
+  /** Directions of x and y of the image, in LPS. */
   along: [number, number, number, number, number, number];
 }
 
-/** The z-th slice of a grid as a CT slice. */
+/** Returns slice z of a grid as a CT slice. */
 function slice(grid: Grid, z: number): Buffer {
   const { data, dims, spacing, origin, along } = grid;
   const [x1 = 0, x2 = 0, x3 = 0, y1 = 0, y2 = 0, y3 = 0] = along;
@@ -84,13 +84,15 @@ function slice(grid: Grid, z: number): Buffer {
   ]);
 }
 
-/** A series of files in an order that is not that of the slices, each 1000 less than what is stored. */
+/**
+ * Returns a series of files in an order other than that of the slices, with stored values 1000 above the intensities.
+ */
 export function dicomSeries(grid: Grid): Given[] {
   const order = Array.from({ length: grid.dims[2] }, (_, z) => (z * 7) % grid.dims[2]);
   return order.map((z, k) => ({ name: `IM${k}`, mimeType: 'application/dicom', buffer: slice(grid, z) }));
 }
 
-/** Pages of 8 bits as one little-endian TIFF file, its description on the first page. */
+/** Returns 8-bit pages as a little-endian TIFF file, with a description on the first page. */
 export function tiffStack(pages: Uint8Array[], [wide, high]: [number, number], description: string): Buffer {
   const text = Buffer.from(`${description}\0`, 'utf8');
   const parts: Uint8Array[] = [Buffer.from([0x49, 0x49, 42, 0, 0, 0, 0, 0]), text];
@@ -111,7 +113,7 @@ export function tiffStack(pages: Uint8Array[], [wide, high]: [number, number], d
     end += page.length;
     return entries;
   });
-  // The address of each list of fields stands at the end of the one before, that of the first at the head of the file.
+  // The offset of each directory is at the end of the previous one, that of the first in the file header.
   const written = directories.map((entries) => {
     const at = end;
     end += 2 + 12 * entries.length + 4;

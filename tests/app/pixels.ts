@@ -1,7 +1,7 @@
-// What is to be seen in a picture. The browser that took it takes it apart, too.
+// Measures pictures. They are decoded by the browser that took them.
 import type { Page } from 'playwright-core';
 
-/** In the page: red, green, blue and alpha of each pixel. */
+/** Runs in the page: returns red, green, blue and alpha of each pixel. */
 const PIXELS = `async (base64) => {
   const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
   const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
@@ -17,8 +17,8 @@ function told(page: Page, pictures: Buffer[], teller: string): Promise<number> {
 }
 
 /**
- * How many pixels of a PNG are as asked; `ground` is the red of the one in the upper left corner.
- * `isOne` runs in the page: it cannot use anything from outside of itself.
+ * Returns the number of pixels of a PNG for which `isOne` is true; `ground` is the red value of the upper left pixel.
+ * `isOne` runs in the page and must be self-contained.
  */
 export function countPixels(
   page: Page,
@@ -37,12 +37,12 @@ export function countPixels(
   );
 }
 
-/** How many colours a PNG has. */
+/** Returns the number of colours of a PNG. */
 export function countColors(page: Page, picture: Buffer): Promise<number> {
   return told(page, [picture], '(data) => new Set(new Uint32Array(data.buffer)).size');
 }
 
-/** Share of the pixels that differ clearly between two PNGs. */
+/** Returns the fraction of pixels that clearly differ between two PNGs. */
 export function difference(page: Page, before: Buffer, after: Buffer): Promise<number> {
   return told(
     page,

@@ -1,4 +1,4 @@
-/** The figures of the paper: what the page says comes of them does come of them. Run by the package from Node, which gives the same bits. */
+/** The figures of the paper: results are as the page says. Run with the package in Node, which gives the same bits. */
 import { readFile } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
 import init, { DeformableModel, Mesh, Volume } from '../../pkg/index.js';
@@ -41,7 +41,7 @@ async function outcomeOf(preset: Preset, variant: Variant, levels = preset.level
   }
 }
 
-/** Topology as said; counts within a tenth, as the model may become a little better or worse. */
+/** Asserts the stated topology, and counts within a tenth, since the model may improve or degrade slightly. */
 function expectOutcome(found: Outcome, said: Outcome) {
   const { iterations, vertices, components, genus } = found;
   expect({ components, genus }).toEqual({ components: said.components, genus: said.genus });
@@ -51,19 +51,19 @@ function expectOutcome(found: Outcome, said: Outcome) {
   expect(iterations / said.iterations).toBeLessThan(1.25);
 }
 
-test.each(CASES)('figure %s ends as the page says', async (_, preset, variant) => {
-  expectOutcome(await outcomeOf(preset, variant), variant.outcome);
+test.each(CASES)('figure %s gives the result that the page states', async (_, preset, variant) => {
+  expectOutcome(await outcomeOf(preset, variant), variant.expected);
 });
 
-test('every figure has an id of its own, says what the paper saw and what comes out', () => {
+test("every figure has an id of its own, and states the paper's result and its own", () => {
   expect(new Set(PRESETS.map(({ id }) => id)).size).toBe(PRESETS.length);
-  for (const [, { saw }, { came }] of CASES) {
-    for (const text of [saw, came]) expect(text).toMatch(/^[A-Z].{40,}\.$/);
-    expect(came).toMatch(/^Here/);
+  for (const [, { paperResult }, { ourResult }] of CASES) {
+    for (const text of [paperResult, ourResult]) expect(text).toMatch(/^[A-Z].{40,}\.$/);
+    expect(ourResult).toMatch(/^Here/);
   }
 });
 
-test('table 1: both ways end alike, within the bounds of the paper', async () => {
+test('table 1: both runs give the same result, within the bounds of the paper', async () => {
   const [preset, variant] = figure('figure-15-16');
   const coarseToFine = await outcomeOf(preset, variant);
   const direct = await outcomeOf(preset, variant, 0);
@@ -72,7 +72,7 @@ test('table 1: both ways end alike, within the bounds of the paper', async () =>
   expect(Math.abs(coarseToFine.volume / direct.volume - 1)).toBeLessThan(0.002);
 });
 
-test('table 2: a direct run finds the loose vessels that coarse to fine loses', async () => {
+test('table 2: a direct run finds the separate vessels that coarse to fine loses', async () => {
   const [preset, variant] = figure('figure-20');
   const coarseToFine = await outcomeOf(preset, variant);
   const direct = await outcomeOf(preset, variant, 0);
@@ -81,7 +81,7 @@ test('table 2: a direct run finds the loose vessels that coarse to fine loses', 
   expect(direct.volume / coarseToFine.volume).toBeLessThan(1.025);
 });
 
-test('figure 23: so many parts and holes had marching cubes', async () => {
+test('figure 23: marching cubes have as many components and holes as stated', async () => {
   const [preset] = figure('figure-23');
   const volume = await volumeOf(preset);
   const mesh = Mesh.marchingCubes(volume, preset.params.iso);

@@ -1,4 +1,7 @@
-/** The figures of the points paper: what the page says comes of them does come of them. Run by the package from Node, which gives the same bits. */
+/**
+ * The figures of the points paper: results are as the page says. Run with the package in Node, which gives the same
+ * bits.
+ */
 import { readFile } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
 import init, { type Camera, ImplicitSurface, paramSpecs, parsePoints } from '../../pkg/index.js';
@@ -33,7 +36,7 @@ async function camerasOf({ photographs }: CloudExample): Promise<Camera[]> {
   return list.cameras.map(({ P }: { P: number[][] }) => ({ projection: P.flat(), width, height }));
 }
 
-/** What is measured of a run. */
+/** Measures of a run. */
 type Found = Record<keyof CloudOutcome, number>;
 
 async function outcomeOf(
@@ -76,20 +79,20 @@ function expectOutcome(found: Found, said: CloudOutcome) {
   }
 }
 
-test.each(CASES)('figure %s ends as the page says', async (_, preset, variant) => {
+test.each(CASES)('figure %s gives the result that the page states', async (_, preset, variant) => {
   const params = { ...preset.params, ...variant.params };
-  expectOutcome(await outcomeOf(preset, params, variant.maxPoints ?? preset.maxPoints), variant.outcome);
+  expectOutcome(await outcomeOf(preset, params, variant.maxPoints ?? preset.maxPoints), variant.expected);
 });
 
-test('every figure has an id of its own, says what the paper saw and what comes out', () => {
+test("every figure has an id of its own, and states the paper's result and its own", () => {
   expect(new Set(CLOUD_PRESETS.map(({ id }) => id)).size).toBe(CLOUD_PRESETS.length);
-  for (const [, { saw }, { came }] of CASES) {
-    for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
-    expect(came).toMatch(/^Here/);
+  for (const [, { paperResult }, { ourResult }] of CASES) {
+    for (const text of [paperResult, ourResult]) expect(text).toMatch(/^\S.{40,}\.$/);
+    expect(ourResult).toMatch(/^Here/);
   }
 });
 
-test.each(CASES)('the settings of figure %s are known as its own', (_, preset, variant) => {
+test.each(CASES)('the settings of figure %s are recognised as its own', (_, preset, variant) => {
   const defaults = Object.fromEntries(paramSpecs('implicit').map(({ name, default: value }) => [name, value]));
   const params = { ...defaults, ...preset.params, ...variant.params };
   const maxPoints = variant.maxPoints ?? preset.maxPoints;
@@ -103,7 +106,7 @@ test.each(CLOUDS.map((example) => [example.id, example] as const))('%s is one cl
   if (id !== 'angel') expect(genus).toBe(id === 'torus' ? 1 : 0);
 });
 
-test('the kernel that is drawn has the height, the slope and the tail that theory gives', () => {
+test('the plotted kernel has the theoretical height, slope and tail', () => {
   for (const [delta, tau] of [
     [5, 0.025],
     [10, 0.01],
@@ -120,7 +123,7 @@ test('the kernel that is drawn has the height, the slope and the tail that theor
   }
 });
 
-test('the nearest of many points is found wherever one looks', () => {
+test('the nearest of many points is found from any query', () => {
   const { points } = computedCloud('torus');
   const places = Float32Array.of(0, 0, 0, 1, 0, 0.4, -3, 2, 7, ...points.subarray(30, 33));
   const found = distances(places, points);

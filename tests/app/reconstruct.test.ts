@@ -1,4 +1,4 @@
-/** The Reconstruct lab: points in, a closed surface out. */
+/** The Reconstruct lab: a closed surface from points. */
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
@@ -24,7 +24,7 @@ async function openAt(hash: string, ...states: string[]): Promise<void> {
   await reach(app.page, ...states);
 }
 
-/** Measures of the surface, and of the fit. */
+/** Returns measures of the surface and of the fit. */
 async function measured(): Promise<Record<string, number | boolean>> {
   return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
 }
@@ -37,7 +37,7 @@ async function setParam(name: string, value: string): Promise<void> {
   await field.press('Enter');
 }
 
-/** Points of a shape as text, one a line. */
+/** Returns points of a shape as text, one per line. */
 function asText(shape: Parameters<typeof computedCloud>[0]): Uint8Array {
   const { points } = computedCloud(shape);
   const lines: string[] = [];
@@ -45,7 +45,7 @@ function asText(shape: Parameters<typeof computedCloud>[0]): Uint8Array {
   return new TextEncoder().encode(`${lines.join('\n')}\n`);
 }
 
-/** Presses the space bar, in the page, the moment that a run begins: from outside it might come after its end. */
+/** Presses the space bar as soon as a run begins, from inside the page: from outside it might come after its end. */
 async function pauseAtOnce(): Promise<void> {
   await app.page.evaluate(() => {
     const lab = document.querySelector<HTMLElement>('[data-state]');
@@ -59,7 +59,7 @@ async function pauseAtOnce(): Promise<void> {
   });
 }
 
-/** Waits for a run that a change has begun, to its end. */
+/** Waits until the run that a change starts has ended. */
 async function afterRun(change: () => Promise<unknown>): Promise<void> {
   const states = await recordStates(app.page);
   await change();
@@ -67,7 +67,7 @@ async function afterRun(change: () => Promise<unknown>): Promise<void> {
 }
 
 describe('the built-in example', () => {
-  test('runs to the end by itself: one closed surface without crossings, in the colours of the photographs', async () => {
+  test('runs to the end by itself: one closed surface without self-intersections, in the colours of the photographs', async () => {
     await openAt('#reconstruct', 'done');
     expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true, oriented: true, crossings: 0 });
     const { fitMean, surfaceConstraints, exteriorConstraints, residual } = await measured();
@@ -79,7 +79,7 @@ describe('the built-in example', () => {
     expect(await app.page.getAttribute('[data-lab=reconstruct]', 'aria-current')).toBe('page');
   });
 
-  test('is drawn with white and black and brown', async () => {
+  test('is rendered with white, black and brown', async () => {
     await app.page.uncheck('[data-view=points]');
     const png = await app.page.locator('.scene > canvas').screenshot();
     const dark = await countPixels(app.page, png, (r, g, b) => r < 70 && g < 70 && b < 70);
@@ -89,16 +89,16 @@ describe('the built-in example', () => {
     await app.page.check('[data-view=points]');
   });
 
-  test('tells how long each phase took, and in words what the plots show', async () => {
+  test('reports the time of each phase, and describes the plots in words', async () => {
     const times = await app.page.locator('.phases .time').allTextContents();
     expect(times).toHaveLength(5);
     for (const time of times) expect(time).toMatch(/^[\d.,]+ m?s$/);
     const captions = await app.page.locator('.plots figcaption, [data-plot=kernel]').allTextContents();
-    expect(captions[0]).toMatch(/^After \d+ steps of the solve the residual is .* below the tolerance of/);
-    expect(captions[1]).toMatch(/^Falls to half at r = 0\.\d+; at 0\.5, [\d.]+ % are left/);
+    expect(captions[0]).toMatch(/^After \d+ iterations of the solver the residual is .* below the tolerance of/);
+    expect(captions[1]).toMatch(/^Decays to half at r = 0\.\d+; at 0\.5, [\d.]+ % remain/);
   });
 
-  test.each(['ply', 'stl', 'glb', 'obj'])('exports %s that reads back closed', async (format) => {
+  test.each(['ply', 'stl', 'glb', 'obj'])('exports a closed mesh as %s', async (format) => {
     const [download] = await Promise.all([
       app.page.waitForEvent('download'),
       app.page.click(`[data-export=${format}]`),
@@ -121,7 +121,7 @@ describe('the built-in example', () => {
     expect((await readFile(await download.path())).toString('latin1', 0, start.length)).toBe(start);
   });
 
-  test('a photograph stands beside the view of its camera, until the view is turned', async () => {
+  test('a photograph is shown beside the view from its camera, until the view is rotated', async () => {
     const view = app.page.locator('.scene > canvas');
     await app.page.click('[data-photo="3"]');
     expect(await app.page.locator('.photograph').isVisible()).toBe(true);
@@ -135,7 +135,7 @@ describe('the built-in example', () => {
 describe('running', () => {
   beforeAll(() => openAt('#reconstruct?example=torus', 'done'));
 
-  test('another smoothness solves again, and the surface stays until the new one is there', async () => {
+  test('changed smoothness solves again, and the surface is kept until the new one is ready', async () => {
     const before = await measured();
     const seen = await app.page.evaluateHandle(() => {
       const list: string[] = [];
@@ -152,7 +152,7 @@ describe('running', () => {
     expect(await app.page.evaluate(() => location.hash)).toContain('p.lambdaSurface=0.01');
   });
 
-  test('undo brings the former value and surface back, redo the later', async () => {
+  test('undo restores the previous value and surface, redo the later', async () => {
     const field = app.page.locator('[data-param=lambdaSurface] input[type=number]');
     const later = await measured();
     await afterRun(() => app.page.click('[data-transport=undo]'));
@@ -182,7 +182,7 @@ describe('running', () => {
     await reach(app.page, 'done');
   });
 
-  test('the width of the Gaussian is there only for the Gaussian', async () => {
+  test('the width of the Gaussian is shown only for the Gaussian', async () => {
     const shown = (name: string) => app.page.locator(`[data-param=${name}]`).isVisible();
     expect([await shown('sigma'), await shown('delta')]).toEqual([false, true]);
     await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'gaussian'));
@@ -190,13 +190,13 @@ describe('running', () => {
     await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'multi-order'));
   });
 
-  test('a parameter out of range is refused beside it, and the former stays', async () => {
+  test('a parameter out of range is refused beside it, and the previous value is kept', async () => {
     await setParam('tau', '-1');
     await expect.poll(() => text('[data-param=tau] .field-error')).toMatch(/\w/);
     expect(await app.page.inputValue('[data-param=tau] input[type=number]')).toBe('0.025');
   });
 
-  test('fewer points at most take part', async () => {
+  test('a smaller limit uses fewer points', async () => {
     await afterRun(() => setParam('maxPoints', '500'));
     const { surfaceConstraints, components, genus } = await measured();
     expect(surfaceConstraints).toBeLessThanOrEqual(500);
@@ -204,10 +204,10 @@ describe('running', () => {
   });
 });
 
-describe('points by hand', () => {
+describe('edits of points', () => {
   beforeAll(() => openAt('#reconstruct?example=two-balls', 'done'));
 
-  test('a point added in the middle of the view is one more constraint; taken back, it is not', async () => {
+  test('a point added in the centre of the view is one more constraint until it is undone', async () => {
     const before = await measured();
     await app.page.check('[data-tool=add]');
     await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
@@ -216,15 +216,15 @@ describe('points by hand', () => {
     await afterRun(() => app.page.click('[data-edit=clear]'));
     const { surfaceConstraints, vertices } = await measured();
     expect(surfaceConstraints).toBe(before.surfaceConstraints);
-    // Solved from another start: the same within the tolerance.
+    // Solved from another start, so equal within the tolerance only.
     expect(Math.abs(Number(vertices) / Number(before.vertices) - 1)).toBeLessThan(0.002);
   });
 
-  test('a click removes the points around it, and one puts a point outside', async () => {
+  test('a click removes the points around it, and a click adds an exterior point', async () => {
     const before = await measured();
     const view = app.page.locator('.scene > canvas');
     const { width = 0, height = 0 } = (await view.boundingBox()) ?? {};
-    // Right of the middle lies a ball.
+    // There is a ball right of the centre.
     const position = { x: 0.68 * width, y: 0.5 * height };
     await app.page.check('[data-tool=remove]');
     await afterRun(() => view.click({ position }));
@@ -238,7 +238,7 @@ describe('points by hand', () => {
     await app.page.check('[data-tool=none]');
   });
 
-  test('two clicks at once are two points; each can be undone, and redone', async () => {
+  test('two clicks at once are two points; each can be undone and redone', async () => {
     await openAt('#reconstruct?example=two-balls', 'done');
     await app.page.check('[data-tool=add]');
     const told = () => text('.edit-tools [role=status]');
@@ -250,15 +250,15 @@ describe('points by hand', () => {
     await app.page.keyboard.press('Control+z');
     await expect.poll(told).toBe('1 point added.');
     await app.page.keyboard.press('Control+z');
-    await expect.poll(told).toBe('Nothing was changed by hand.');
+    await expect.poll(told).toBe('No edits.');
     await app.page.keyboard.press('Control+Shift+Z');
     await expect.poll(told).toBe('1 point added.');
-    // Each of these began a run: what is measured tells that the last one has ended.
+    // Each of these started a run; the measures tell that the last one has ended.
     await expect.poll(async () => (await measured()).surfaceConstraints).toBe(1601);
     await reach(app.page, 'done');
   });
 
-  test('an edit changes what is solved: points are not chosen anew, and the surface stays until the next', async () => {
+  test('an edit only changes the solution: points are not sampled again, and the surface is kept until the next', async () => {
     const times = () => app.page.locator('.phases .time').allTextContents();
     await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
     const [subsample, constraints, solve, extract] = await times();
@@ -270,16 +270,16 @@ describe('points by hand', () => {
     expect((await measured()).surfaceConstraints).toBe(1601);
   });
 
-  test('many clicks at once are all taken; one that cannot be is refused, and the others stay', async () => {
+  test('many clicks at once are all applied; an invalid one is refused, and the others are kept', async () => {
     const before = await measured();
     const address = () => app.page.evaluate(() => location.hash);
     const view = app.page.locator('.scene > canvas');
     const { x = 0, y = 0, width = 0, height = 0 } = (await view.boundingBox()) ?? {};
     for (const right of [0.66, 0.68, 0.7]) await app.page.mouse.click(x + right * width, y + 0.5 * height);
     await app.page.check('[data-tool=outside]');
-    // In the middle a point was added before.
+    // A point was added in the centre before.
     await view.press('Enter');
-    // Between two of the clicks a run may have come to its end.
+    // A run may have ended between two of the clicks.
     await expect.poll(() => text('[data-error]')).toMatch(/exterior.*also a surface point/);
     await expect.poll(() => text('.edit-tools [role=status]')).toBe('4 points added.');
     await expect.poll(measured).toMatchObject({ surfaceConstraints: 1604, closed: true });
@@ -294,11 +294,11 @@ describe('points by hand', () => {
   test('where no point is near, none is removed, and the lab says so', async () => {
     await app.page.check('[data-tool=remove]');
     await app.page.locator('.scene > canvas').click({ position: { x: 12, y: 12 } });
-    await expect.poll(() => text('.status')).toBe('No point is so near to that place.');
+    await expect.poll(() => text('.status')).toBe('There are no points within this distance.');
     expect(await text('.edit-tools [role=status]')).toBe('1 point added.');
   });
 
-  test('a distance that cannot be is refused beside it', async () => {
+  test('an invalid distance is refused beside it', async () => {
     const field = app.page.locator('.edit-tools input[type=number]');
     await field.fill('900');
     await field.press('Enter');
@@ -309,12 +309,12 @@ describe('points by hand', () => {
     expect(await text('.edit-tools .field-error')).toBe('');
   });
 
-  test('all points cannot go: what was there stays', async () => {
+  test('not all points can be removed: the previous ones are kept', async () => {
     const before = await measured();
     const view = app.page.locator('.scene > canvas');
     const { width = 0, height = 0 } = (await view.boundingBox()) ?? {};
     await app.page.fill('.edit-tools input[type=number]', '50');
-    // One ball after the other: taken together they are refused together.
+    // One ball after the other; together they would be refused together.
     await afterRun(() => view.click({ position: { x: 0.3 * width, y: 0.5 * height } }));
     await view.click({ position: { x: 0.7 * width, y: 0.5 * height } });
     await expect.poll(() => text('[data-error]')).toContain('at least 4');
@@ -322,7 +322,7 @@ describe('points by hand', () => {
     expect((await measured()).closed).toBe(true);
   });
 
-  test('Escape takes the message away, then the tool', async () => {
+  test('Escape closes the message, then the tool', async () => {
     await app.page.keyboard.press('Escape');
     await reach(app.page, 'done');
     expect(await app.page.isChecked('[data-tool=remove]')).toBe(true);
@@ -359,7 +359,7 @@ describe('files', () => {
     expect(await text('.facts')).toContain('balls.xyz');
   });
 
-  test('a file does not inherit what suits an example: both balls stay after the cow, of which one cluster is kept', async () => {
+  test("a file does not inherit an example's settings: both balls are kept after the cow, of which one cluster is kept", async () => {
     await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
     await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
     expect(await measured()).toMatchObject({ components: 2 });
@@ -369,7 +369,7 @@ describe('files', () => {
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
   });
 
-  test('a link to a file waits for it, and then has its settings', async () => {
+  test('a link to a file waits for it and then applies its settings', async () => {
     await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
     expect(await text('.banner')).toContain('Open balls.xyz from your disk');
     await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
@@ -377,14 +377,14 @@ describe('files', () => {
     expect(await measured()).toMatchObject({ components: 2 });
   });
 
-  test('each point given twice counts once', async () => {
+  test('points given twice count once', async () => {
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
     await afterRun(() => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
     expect(await measured()).toMatchObject({ components: 2, duplicates: 1600, surfaceConstraints: 1600 });
   });
 
-  test('four points make no surface, and the lab says what may help', async () => {
+  test('four points give no surface, and the lab says what may help', async () => {
     const bytes = new TextEncoder().encode('0 0 0\n1 0 0\n0 1 0\n0 0 1\n');
     await drop(app.page, [{ name: 'four.xyz', bytes }]);
     await expect.poll(() => text('.banner')).toContain('There is no surface. f is nowhere above the level.');
@@ -393,7 +393,7 @@ describe('files', () => {
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
   });
 
-  test('photographs with a cameras.json colour points of one’s own', async () => {
+  test('photographs with a cameras.json colour the user’s own points', async () => {
     const folder = at('www/public/data/spot');
     const list = JSON.parse(await readFile(`${folder}/cameras.json`, 'utf8'));
     const two = { ...list, cameras: [list.cameras[3], list.cameras[8]] };
@@ -411,7 +411,7 @@ describe('files', () => {
   });
 });
 
-describe('on to Extract', () => {
+describe('passing on to Extract', () => {
   test('the volume saved as NIfTI is above the level inside', async () => {
     await openAt('#reconstruct?example=torus', 'done');
     const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click('[data-action=volume]')]);
@@ -439,10 +439,10 @@ describe('on to Extract', () => {
 });
 
 describe('the timing curve', () => {
-  test('is measured point by point, can be cancelled, and the surface stays', async () => {
+  test('is measured point by point, can be cancelled, and keeps the surface', async () => {
     await openAt('#reconstruct?example=two-balls', 'done');
     const before = await measured();
-    await app.page.click('summary:has-text("Time against number of constraints")');
+    await app.page.click('summary:has-text("Solve time versus number of constraints")');
     await app.page.click('[data-timing=start]');
     const timings = async () => JSON.parse((await app.page.getAttribute('[data-timings]', 'data-timings')) ?? '[]');
     await expect.poll(async () => (await timings()).length).toBeGreaterThanOrEqual(2);
@@ -457,7 +457,7 @@ describe('the timing curve', () => {
 });
 
 describe('a link', () => {
-  test('restores example, parameters, points by hand and colour', async () => {
+  test('restores example, parameters, edits and colour', async () => {
     const hash = '#reconstruct?example=two-balls&maxPoints=800&color=distance&p.delta=8&add=1.6,0,0';
     await openAt(hash, 'done');
     expect(await app.page.evaluate(() => location.hash)).toBe(hash);
@@ -468,29 +468,31 @@ describe('a link', () => {
     expect((await measured()).surfaceConstraints).toBeLessThanOrEqual(800);
   });
 
-  test('to a figure says what the paper saw; another of its pictures solves again', async () => {
+  test("to a figure shows the paper's result; selecting another of its pictures solves again", async () => {
     await openAt('#reconstruct?example=figure-7', 'done');
-    expect(await text('.figure')).toMatch(/Paper: 477 of 3,173 points.*Here all 6,930 points/);
+    expect(await text('.figure')).toMatch(
+      /Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/,
+    );
     await afterRun(() => app.page.click('.figure button:has-text("a subset")'));
     expect(await text('[data-figure=came]')).toContain('812');
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
   });
 
-  test('to a figure with another of its pictures says what comes of that one', async () => {
+  test("to a figure with another of its pictures states that one's result", async () => {
     await openAt('#reconstruct?example=figure-8&p.lambdaSurface=0.001', 'done');
     const pressed = () => text('.figure button[aria-pressed=true]');
     expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
-    expect(await text('[data-figure=came]')).toContain('a handle too many');
+    expect(await text('[data-figure=came]')).toContain('a spurious handle');
     await afterRun(() => app.page.click('.figure button:has-text("2,168 points")'));
     expect([await pressed(), (await measured()).genus]).toEqual(['2,168 points', 0]);
     expect(await text('[data-figure=came]')).toContain('genus 0');
     expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
     await afterRun(() => setParam('tau', '0.02'));
     expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
-    expect(await text('[data-figure=came]')).toBe('Here the settings are others than those of the figure.');
+    expect(await text('[data-figure=came]')).toBe('The settings differ from those of the figure.');
   });
 
-  test('that cannot be followed says so, and the first example opens', async () => {
+  test('that is invalid shows a message, and the first example opens', async () => {
     await openAt('#reconstruct?example=nowhere', 'done');
     expect(await text('.banner')).toContain('no example “nowhere”');
     expect(await measured()).toMatchObject({ components: 1, genus: 0 });
@@ -504,19 +506,19 @@ describe('a link', () => {
     ['keepComponents=1.5', 'keepComponents'],
     ['add=1e30,0,0', 'added'],
     ['outside=0,0,1e30', 'exterior'],
-  ])('with %s opens its example without the settings, and says why', async (settings, why) => {
+  ])('with %s opens its example without the settings, and gives the reason', async (settings, why) => {
     await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
     expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
   });
 
-  test('warns where δ is too large for gaps, beside the view', async () => {
+  test('warns beside the view if δ is too large for gaps', async () => {
     await openAt('#reconstruct?example=torus&p.delta=30', 'done');
     expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('≥ 25');
   });
 
-  test('followed in the open page to no example leaves what is open, and its address', async () => {
+  test('without an example, followed in the open page, keeps the open data and its address', async () => {
     await app.page.evaluate(() => {
       location.hash = '#reconstruct?example=nope';
     });
@@ -524,13 +526,13 @@ describe('a link', () => {
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');
   });
 
-  test('that removes points there are not, or one twice, removes those there are', async () => {
+  test('that removes missing points, or one twice, removes the existing ones', async () => {
     await openAt('#reconstruct?example=two-balls&remove=1,1,999999,-4,x', 'done');
     expect(await text('.edit-tools [role=status]')).toBe('1 point removed.');
     expect((await measured()).surfaceConstraints).toBe(1599);
   });
 
-  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('passes over %s', async (nonsense) => {
+  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('ignores %s', async (nonsense) => {
     await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
@@ -538,7 +540,7 @@ describe('a link', () => {
 });
 
 describe('the page', () => {
-  test('photographs are one stop of the tab key; arrow keys go along them', async () => {
+  test('photographs are one tab stop; arrow keys move between them', async () => {
     await openAt('#reconstruct?example=figure-9', 'done');
     const strip = app.page.locator('.strip');
     expect(await strip.locator('button[tabindex="0"]').getAttribute('data-photo')).toBe('3');
@@ -553,7 +555,7 @@ describe('the page', () => {
     expect(await app.page.locator('.photograph').isVisible()).toBe(false);
   });
 
-  test('nothing lies over the pictures but the legend', async () => {
+  test('nothing covers the pictures but the legend', async () => {
     await openAt('#reconstruct?example=figure-2', 'done');
     const box = async (selector: string) => app.page.locator(selector).boundingBox();
     const [bar, scene, legend] = [await box('.view-options'), await box('.scene'), await box('.color-legend')];
@@ -566,7 +568,7 @@ describe('the page', () => {
     [390, 844],
     [1024, 768],
     [1440, 900],
-  ])('nothing is wider than a page of %i by %i', async (width, height) => {
+  ])('fits a page of %i by %i', async (width, height) => {
     expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
   });
 

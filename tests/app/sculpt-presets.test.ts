@@ -1,4 +1,7 @@
-/** The scenes and figures of the Sculpt lab: what the page says comes of them does. Run by the package from Node, which gives the same bits. */
+/**
+ * The scenes and figures of the Sculpt lab: results are as the page says. Run with the package in Node, which gives the
+ * same bits.
+ */
 import { readFile } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
 import init, { Mesh, MultiresolutionModel, paramSpecs } from '../../pkg/index.js';
@@ -15,7 +18,7 @@ beforeAll(() => init());
 const CASES = SCULPT_PRESETS.flatMap((preset) =>
   preset.variants.map((variant) => [variant.id, preset, variant] as [string, SculptPreset, SculptVariant]),
 );
-/** Frames until the ellipsoids have arrived and the skin is at rest, at most. */
+/** Largest number of frames until the ellipsoids have arrived and the surface has converged. */
 const PATIENCE = 80;
 
 async function meshOf(mesh: ExampleMesh | undefined): Promise<Mesh | undefined> {
@@ -43,9 +46,9 @@ function expectWithin(found: number, [least, most]: [number, number] = [-1e9, 1e
   expect(found, what).toBeLessThanOrEqual(most);
 }
 
-const POSED = CASES.filter(([, , { outcome }]) => outcome);
+const POSED = CASES.filter(([, , { expected }]) => expected);
 
-test.each(POSED)('figure %s ends as the page says', async (_, preset, { pose, outcome }) => {
+test.each(POSED)('figure %s gives the result that the page states', async (_, preset, { pose, expected }) => {
   const model = await modelOf(preset);
   for (const way of pose ? glide(model.targets, pose) : []) {
     model.setEllipsoids(way);
@@ -56,14 +59,14 @@ test.each(POSED)('figure %s ends as the page says', async (_, preset, { pose, ou
   expect(frames).toBeLessThan(PATIENCE);
   expectSound(model.mesh);
   const { folded, areaLow, areaHigh } = factsOf(model);
-  expectWithin(model.mesh.info().components, outcome?.components, 'components');
-  expectWithin(folded, outcome?.folded, 'folded');
-  expectWithin(areaLow, outcome?.areaLow, 'areaLow');
-  expectWithin(areaHigh, outcome?.areaHigh, 'areaHigh');
+  expectWithin(model.mesh.info().components, expected?.components, 'components');
+  expectWithin(folded, expected?.folded, 'folded');
+  expectWithin(areaLow, expected?.areaLow, 'areaLow');
+  expectWithin(areaHigh, expected?.areaHigh, 'areaHigh');
   model.free();
 });
 
-test('the lava lamp parts and joins, and nothing crosses', async () => {
+test('the lava lamp splits and joins, without self-intersections', async () => {
   const lava = SCENES.find(({ id }) => id === 'lava');
   const film = lava?.film;
   if (!lava || !film) throw new Error('there is no lava lamp');
@@ -78,15 +81,15 @@ test('the lava lamp parts and joins, and nothing crosses', async () => {
   model.free();
 });
 
-test('every figure has an id of its own, says what the paper saw and what comes out', () => {
+test("every figure has an id of its own, and states the paper's result and its own", () => {
   expect(new Set(SCULPT_PRESETS.map(({ id }) => id)).size).toBe(SCULPT_PRESETS.length);
-  for (const [, { saw }, { came }] of CASES) {
-    for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
-    expect(came).toMatch(/^Here/);
+  for (const [, { paperResult }, { ourResult }] of CASES) {
+    for (const text of [paperResult, ourResult]) expect(text).toMatch(/^\S.{40,}\.$/);
+    expect(ourResult).toMatch(/^Here/);
   }
 });
 
-test.each(CASES)('the settings of figure %s are known as its own', (_, preset, variant) => {
+test.each(CASES)('the settings of figure %s are recognised as its own', (_, preset, variant) => {
   const usual = Object.fromEntries(paramSpecs('multires').map(({ name, default: value }) => [name, value]));
   const params = { ...usual, ...preset.params, ...variant.params };
   const pose = variant.pose ?? preset.start ?? [];
@@ -94,10 +97,10 @@ test.each(CASES)('the settings of figure %s are known as its own', (_, preset, v
   expect(variantInForce(preset, pose, { ...params, smoothing: 7 }, { ...usual, ...preset.params })).toBeUndefined();
 });
 
-/** The share of the worst triangles, from what stands under a stage. */
-const worstOf = (caption: string) => Number(/below ([\d.]+)$/.exec(caption)?.[1]);
+/** Parses the fraction of the worst triangles from the caption of a stage. */
+const worstOf = (caption: string) => Number(/below quality ([\d.]+)$/.exec(caption)?.[1]);
 
-test('restructuring makes triangles better, and refining does not', () => {
+test('restructuring improves triangles, and refining does not', () => {
   const [moved = 0, refined = 0, good = 0] = stagesOf('restructuring').map(({ caption }) => worstOf(caption));
   expect(Math.abs(refined - moved)).toBeLessThan(0.15);
   expect(good).toBeGreaterThan(moved + 0.2);

@@ -1,10 +1,10 @@
 /** Parts of the Sculpt lab that need no browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { type ControlEllipsoid, Mesh, MultiresolutionModel } from '../../pkg/index.js';
-import { Answers } from '../../www/src/labs/answers';
-import { Ahead } from '../../www/src/labs/sculpt-ahead';
+import { DragLatency } from '../../www/src/labs/drag-latency';
+import { SurfaceCarrier } from '../../www/src/labs/sculpt-carrier';
 import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt-link';
-import { carried } from '../../www/src/sculpt/carry';
+import { deformPoints } from '../../www/src/sculpt/deform';
 import {
   ball,
   between,
@@ -33,14 +33,14 @@ function expectClose(one: ControlEllipsoid, other: ControlEllipsoid): void {
 }
 
 describe('ellipsoids', () => {
-  test('turned all the way round are as they were, and axes keep their lengths', () => {
+  test('a full turn changes nothing, and axes keep their lengths', () => {
     const about: [number, number, number] = [0.6, 0, 0.8];
     expect(lengthsOf(turned(LONG, about, 1)).map((x) => Number(x.toFixed(9)))).toEqual([3, 2, 1]);
     expectClose(turned(LONG, about, 2 * Math.PI), LONG);
     expectClose(turnedAbout(turnedAbout(LONG, [5, 0, 1], about, 0.7), [5, 0, 1], about, -0.7), LONG);
   });
 
-  test('between two is half the way, half the turn and the geometric mean of lengths', () => {
+  test('interpolation halves the translation and the rotation, and takes the geometric mean of lengths', () => {
     const end = scaled(turned(moved(LONG, [2, 0, 0]), [0, 0, 1], 1.2), [4, 1, 1]);
     expectClose(between(LONG, end, 0.5), scaled(turned(moved(LONG, [1, 0, 0]), [0, 0, 1], 0.6), [2, 1, 1]));
     for (const half of [Math.PI, -Math.PI])
@@ -48,21 +48,21 @@ describe('ellipsoids', () => {
     expect(lengthsOf(between(LONG, turned(LONG, [0, 1, 0], Math.PI), 0.5))[0]).toBeCloseTo(3, 9);
   });
 
-  test('their box touches them', () => {
+  test('their bounding box is tight', () => {
     expect(boxOf([LONG, ball(-5, 0, 0, 1)])).toEqual({ min: [-6, -1, -1], max: [4, 4, 4] });
   });
 
-  test('rounded as a link rounds them are still the same to the eye, moved by a hundredth are not', () => {
+  test('rounding in a link keeps poses equal, moving by a hundredth does not', () => {
     expect(samePose([LONG], [moved(LONG, [1e-6, 0, 0])])).toBe(true);
     expect(samePose([LONG], [moved(LONG, [0.01, 0, 0])])).toBe(false);
     expect(samePose([LONG], [LONG, LONG])).toBe(false);
   });
 });
 
-describe('films', () => {
+describe('animations', () => {
   const film: Film = { keys: [[LONG], [moved(LONG, [1, 0, 0])], [ball(0, 0, 0, 1)]], between: 10, loop: false };
 
-  test('pass through their keyframes, and a loop comes back to the first', () => {
+  test('pass through their keyframes, and a loop returns to the first', () => {
     expect(lastFrame(film)).toBe(20);
     for (const [k, key] of film.keys.entries()) expect(poseAt(film, 10 * k)).toEqual(key);
     const loop = { ...film, loop: true };
@@ -70,7 +70,7 @@ describe('films', () => {
     expect(poseAt(loop, 30)).toEqual(film.keys[0]);
   });
 
-  test('of lava end where they began, and never jump', () => {
+  test('of lava end where they began, and have no jumps', () => {
     const lava: Film = { motion: 'lava', loop: false };
     const last = lastFrame(lava);
     expect(samePose(poseAt(lava, 0), poseAt(lava, last))).toBe(true);
@@ -82,8 +82,8 @@ describe('films', () => {
   });
 });
 
-describe('ellipsoids that fit', () => {
-  test('a rod lie in a row along it, inside, and a model of it can be made', () => {
+describe('fitted ellipsoids', () => {
+  test('of a rod lie in a row inside it, and a model can be made of them', () => {
     const round = Mesh.icosphere([0, 0, 0], 1, 0.2);
     const { positions, indices } = round.arrays();
     const rod = Mesh.fromArrays(
@@ -103,7 +103,7 @@ describe('ellipsoids that fit', () => {
     for (const one of [model, rod, round]) one.free();
   });
 
-  test('principal axes are at right angles, the longest first', () => {
+  test('principal axes are orthogonal, the longest first', () => {
     const [a, b, c] = principalAxes([2, 1, 0, 1, 3, 0.5, 0, 0.5, 9]);
     expect(Math.abs(a?.[2] ?? 0)).toBeGreaterThan(0.9);
     const dot = (x = [0], y = [0]) => x.reduce((sum, value, k) => sum + value * (y[k] ?? 0), 0);
@@ -121,11 +121,11 @@ describe('links', () => {
   const settings = { file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' };
   const [bust] = SCENES;
 
-  test('of the first scene as it opens say nothing', () => {
+  test('of the first scene in its initial state have no parameters', () => {
     expect(toHash(linkOf({ ...settings, example: bust, pose: undefined, film: bust.film }))).toBe('#sculpt');
   });
 
-  test('bring pose, film and parameters back', () => {
+  test('restore pose, animation and parameters', () => {
     const film: Film = { keys: [[LONG], [ball(0, 1, 0, 2)]], between: 12, loop: true };
     const pose = [turned(LONG, [0, 1, 0], 0.3), ball(0, 0, 0, 1)];
     const hash = toHash(linkOf({ ...settings, params: { smoothing: 4 }, example: bust, pose, film }));
@@ -136,44 +136,44 @@ describe('links', () => {
     expect(linked && filmOf(linked, bust.film)).toEqual(film);
   });
 
-  test('that make no sense are read as far as they do', () => {
+  test('with invalid parts are read as far as possible', () => {
     expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({ params: {}, layout: 'row' });
     expect(fromHash('#extract?example=bust')).toBeUndefined();
   });
 });
 
-describe('answers to the hand', () => {
-  test('count from the oldest pose that a frame follows', () => {
-    const answers = new Answers();
-    answers.sent(1, 100);
-    answers.sent(2, 110);
-    expect(answers.drawn(0, 120)).toBe(false);
-    expect(answers.drawn(2, 150)).toBe(true);
+describe('drag latency', () => {
+  test('is measured from the oldest pose that a frame follows', () => {
+    const answers = new DragLatency();
+    answers.poseSent(1, 100);
+    answers.poseSent(2, 110);
+    expect(answers.frameDrawn(0, 120)).toBe(false);
+    expect(answers.frameDrawn(2, 150)).toBe(true);
     expect(answers.last).toEqual({ milliseconds: 50, frames: 2 });
-    expect(answers.drawn(2, 160)).toBe(false);
+    expect(answers.frameDrawn(2, 160)).toBe(false);
   });
 });
 
-describe('a surface ahead of its model', () => {
+describe('extrapolated display of a surface', () => {
   const points = Float32Array.of(2.5, 0, 0, 0, 1.5, 0.5, -1, -1, 4, 40, 3, 2);
   const pair = [LONG, ball(-6, 0, 0, 1)];
 
-  test('goes rigidly with ellipsoids that move alike', () => {
+  test('moves rigidly with ellipsoids that move alike', () => {
     const after = pair.map((one) => moved(turnedAbout(one, [0, 0, 0], [0, 0, 1], Math.PI / 2), [1, 2, 3]));
     const expected = [1, 4.5, 3, -0.5, 2, 3.5, 2, 1, 7, -2, 42, 5];
-    for (const [i, x] of carried(points, pair, after).entries()) expect(x).toBeCloseTo(expected[i] ?? 0, 4);
+    for (const [i, x] of deformPoints(points, pair, after).entries()) expect(x).toBeCloseTo(expected[i] ?? 0, 4);
   });
 
-  test('goes with the near one, and stays by the one that stays', () => {
+  test('moves with the nearest ellipsoid, and stays with one that does not move', () => {
     const on = Float32Array.of(4, 2, 3, -6, 1, 0);
-    const out = carried(on, pair, [moved(LONG, [0, 0, 1]), ball(-6, 0, 0, 1)]);
+    const out = deformPoints(on, pair, [moved(LONG, [0, 0, 1]), ball(-6, 0, 0, 1)]);
     expect(out[2]).toBeGreaterThan(3.95);
     expect(out[2]).toBeLessThanOrEqual(4);
     expect(Math.abs(out[5] ?? 1)).toBeLessThan(0.05);
-    expect(carried(on, [LONG], [scaled(LONG, [2, 2, 2])]).slice(0, 3)).toEqual(Float32Array.of(7, 2, 3));
+    expect(deformPoints(on, [LONG], [scaled(LONG, [2, 2, 2])]).slice(0, 3)).toEqual(Float32Array.of(7, 2, 3));
   });
 
-  test('is as a first step of the model has it', () => {
+  test('equals a first step of the model', () => {
     const [start, end] = [ball(0, 0, 0, 1), moved(ball(0, 0, 0, 1), [0.2, 0, 0])];
     const model = new MultiresolutionModel({ ellipsoids: [start], params: { edgeMin: 0.1, edgeMax: 0.25 } });
     while (!model.step(1).done);
@@ -181,68 +181,68 @@ describe('a surface ahead of its model', () => {
     model.setEllipsoids([end]);
     const [now] = model.ellipsoids;
     model.step(1);
-    const after = carried(before, [now ?? start], model.ellipsoids);
+    const after = deformPoints(before, [now ?? start], model.ellipsoids);
     const size = (list: Float32Array) => Math.max(...list.filter((_, i) => i % 3 === 0));
     expect(size(after)).toBeCloseTo(size(model.mesh.arrays().positions), 1);
     model.free();
   });
 
-  /** Keeps what it is told to draw. */
+  /** Records the positions that are drawn. */
   function ahead() {
     const drawn: (number | undefined)[] = [];
     const view = { move: (_: string, positions: Float32Array) => drawn.push(positions[0]) };
-    return { drawn, ahead: new Ahead(view as unknown as ConstructorParameters<typeof Ahead>[0]) };
+    return { drawn, ahead: new SurfaceCarrier(view as unknown as ConstructorParameters<typeof SurfaceCarrier>[0]) };
   }
 
-  /** One point on a ball, at x, which goes to `goal`. */
+  /** Returns a frame with one point on a ball at x that moves to `goal`. */
   function frame(x: number, goal: number, turn: number) {
     const one = { positions: Float32Array.of(x + 1, 0, 0) };
     const event = { result: one, ellipsoids: [ball(x, 0, 0, 1)], pose: [ball(goal, 0, 0, 1)], turn };
-    return event as unknown as Parameters<Ahead['shown']>[0];
+    return event as unknown as Parameters<SurfaceCarrier['frameShown']>[0];
   }
 
-  test('stays with the hand while the model comes after it, and is the model again once it has come', () => {
+  test('follows the pointer while the model lags behind, and equals the model once it has caught up', () => {
     const { drawn, ahead: one } = ahead();
-    expect(one.follow([ball(1, 0, 0, 1)], 1)).toBe(false);
-    one.shown(frame(0, 0, 0));
-    expect(one.follow([ball(2, 0, 0, 1)], 2)).toBe(true);
-    one.shown(frame(0.5, 1, 1));
-    one.shown(frame(1, 2, 2));
+    expect(one.dragTo([ball(1, 0, 0, 1)], 1)).toBe(false);
+    one.frameShown(frame(0, 0, 0));
+    expect(one.dragTo([ball(2, 0, 0, 1)], 2)).toBe(true);
+    one.frameShown(frame(0.5, 1, 1));
+    one.frameShown(frame(1, 2, 2));
     expect(drawn.map((x) => Math.fround(x ?? Number.NaN))).toEqual([2, 3, 3, 3]);
-    one.shown(frame(2, 2, 2));
-    one.shown(frame(2.5, 3, 2));
+    one.frameShown(frame(2, 2, 2));
+    one.frameShown(frame(2.5, 3, 2));
     expect(drawn).toHaveLength(4);
   });
 
-  test('is left where others lead, where ellipsoids come or go, and at rest', () => {
+  test('ends when other input moves the ellipsoids, when ellipsoids are added or removed, and at rest', () => {
     const { drawn, ahead: one } = ahead();
-    one.shown(frame(0, 0, 0));
-    one.follow([ball(2, 0, 0, 1)], 1);
-    one.shown(frame(0.5, -7, 1));
-    one.shown(frame(1, -7, 1));
+    one.frameShown(frame(0, 0, 0));
+    one.dragTo([ball(2, 0, 0, 1)], 1);
+    one.frameShown(frame(0.5, -7, 1));
+    one.frameShown(frame(1, -7, 1));
     expect(drawn).toEqual([3]);
-    expect(one.follow([ball(2, 0, 0, 1), ball(5, 0, 0, 1)], 2)).toBe(false);
-    one.follow([ball(4, 0, 0, 1)], 3);
-    one.rest();
-    one.rest();
+    expect(one.dragTo([ball(2, 0, 0, 1), ball(5, 0, 0, 1)], 2)).toBe(false);
+    one.dragTo([ball(4, 0, 0, 1)], 3);
+    one.stop();
+    one.stop();
     expect(drawn).toEqual([3, 5, 2]);
   });
 });
 
 describe('the preview', () => {
-  test('is coarse only while a hand drags and frames are slow, and puts everything back', () => {
+  test('is coarse only during a drag with slow frames, and restores all parameters', () => {
     const set = { edgeMin: 0.1, edgeMax: 0.25, supersample: 2 };
     const model = new MultiresolutionModel({ ellipsoids: [ball(0, 0, 0, 1)], params: set });
     const preview = new Preview();
-    preview.prepare(model, 'course', 200);
+    preview.prepare(model, 'path', 200);
     expect(model.params).toMatchObject({ ...set, supersample: 0 });
     preview.prepare(model, 'none', 10);
     expect(preview.on).toBe(false);
     expect(model.params).toMatchObject(set);
-    preview.prepare(model, 'hand', 10);
+    preview.prepare(model, 'drag', 10);
     expect(model.params).toMatchObject({ ...set, supersample: 0 });
-    preview.prepare(model, 'hand', 200);
-    preview.prepare(model, 'hand', 200);
+    preview.prepare(model, 'drag', 200);
+    preview.prepare(model, 'drag', 200);
     expect(model.params).toMatchObject({ edgeMin: 0.2, edgeMax: 0.5, supersample: 0 });
     preview.prepare(model, 'none', 10);
     expect(model.params).toMatchObject(set);

@@ -1,4 +1,4 @@
-/** The Sculpt lab: ellipsoids move, a detailed surface follows. */
+/** The Sculpt lab: ellipsoids move, and a detailed surface follows. */
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
@@ -31,16 +31,19 @@ const text = (selector: string) => app.page.locator(selector).first().textConten
 const hash = () => app.page.evaluate(() => location.hash);
 const view = () => app.page.locator('.scene > canvas');
 
-/** A skin on few triangles, so that a software-rendered page is quick. */
+/** A surface with few triangles, so that a page with software rendering is fast. */
 const SMALL = '#sculpt?example=globe&p.edgeMin=0.09&p.edgeMax=0.2';
 
-/** Waits for what a change has begun, to its end. */
+/** Waits until a change and what follows from it have settled. */
 async function atRest(): Promise<void> {
   await app.page.waitForTimeout(100);
   await reach(app.page, 'done');
 }
 
-/** Runs in the page, before anything else: a picture can be read at any time, not only in the frame in which it is drawn. */
+/**
+ * Runs in the page, before anything else: keeps WebGL pictures readable at any time, not only in the frame in which
+ * they are drawn.
+ */
 function keepPictures(): void {
   const getContext = HTMLCanvasElement.prototype.getContext as (kind: string, options?: object) => unknown;
   HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: object) {
@@ -48,14 +51,17 @@ function keepPictures(): void {
   } as typeof HTMLCanvasElement.prototype.getContext;
 }
 
-/** Runs in the page: moves of the chosen ellipsoid by keys, and with which animation frame each was in the picture. */
+/**
+ * Runs in the page: moves the selected ellipsoid by keys, and returns after how many animation frames each move was
+ * visible.
+ */
 async function framesUntilSeen(): Promise<number[]> {
   const canvas = document.querySelector<HTMLCanvasElement>('.scene > canvas');
   const copy = new OffscreenCanvas(320, 240).getContext('2d', { willReadFrequently: true });
   if (!canvas || !copy) throw new Error('there is no view');
-  /** All that was asked to run in an animation frame has run. */
+  /** Resolves when all callbacks of an animation frame have run. */
   const animationFrame = () => new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
-  /** From the left to the middle of what is drawn, pixels. */
+  /** Horizontal centre of the drawn pixels, from the left. */
   const middle = () => {
     copy.clearRect(0, 0, 320, 240);
     copy.drawImage(canvas, 0, 0, 320, 240);
@@ -82,7 +88,7 @@ async function framesUntilSeen(): Promise<number[]> {
   return answers;
 }
 
-/** A place in the view where a handle is. */
+/** Returns a position in the view where there is a handle. */
 async function findHandle(): Promise<{ x: number; y: number }> {
   const box = await view().boundingBox();
   if (!box) throw new Error('there is no view');
@@ -99,7 +105,7 @@ async function findHandle(): Promise<{ x: number; y: number }> {
 }
 
 describe('the built-in example', () => {
-  test('plays to its end by itself: a bust of one piece, closed, without crossings', async () => {
+  test('plays to its end by itself: a bust of one component, closed, without self-intersections', async () => {
     await openAt('#sculpt', 'done');
     expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true, oriented: true, crossings: 0 });
     expect(await measured()).toMatchObject({ bands: 2, folded: 0 });
@@ -107,26 +113,26 @@ describe('the built-in example', () => {
     expect(await hash()).toBe('#sculpt');
   });
 
-  test('tells in words what the plots show', async () => {
+  test('describes the plots in words', async () => {
     const captions = await app.page.locator('.plots figcaption').allTextContents();
-    expect(captions[0]).toMatch(/^After \d+ frames one more iteration would move the skin by /);
+    expect(captions[0]).toMatch(/^After \d+ frames, one more iteration would move the membrane by /);
     expect(captions[2]).toMatch(/^Half of the frames took less than /);
   });
 
-  test('all controls have names, and a phone is wide enough', async () => {
+  test('all controls have names, and it fits a phone', async () => {
     expect(await unnamedControls(app.page)).toEqual([]);
     expect(await overflow(app.page, 360, 720)).toBeLessThanOrEqual(0);
     await app.page.setViewportSize({ width: 1280, height: 800 });
   });
 });
 
-describe('the hand', () => {
+describe('dragging', () => {
   beforeAll(async () => {
     await app.page.addInitScript(keepPictures);
     await openAt(SMALL, 'done');
   });
 
-  test('drags a handle; the model follows each move with its next frame but one at the latest', async () => {
+  test('moves a handle; the model follows each move within two frames', async () => {
     await app.page.click('[data-ellipsoid="1"]');
     const { x, y } = await findHandle();
     await app.page.mouse.move(x, y);
@@ -143,7 +149,7 @@ describe('the hand', () => {
     await expect.poll(() => app.page.locator('[data-transport=undo]').isEnabled()).toBe(true);
   });
 
-  test('the picture of the surface alone follows a move with the next animation frame', async () => {
+  test('the displayed surface follows a move in the next animation frame', async () => {
     await view().press('1');
     await app.page.uncheck('[data-view=ellipsoids]');
     const frames = await app.page.evaluate(framesUntilSeen);
@@ -152,7 +158,7 @@ describe('the hand', () => {
     await app.page.check('[data-view=ellipsoids]');
   });
 
-  test('undo brings back the surface as it was, and redo what was done', async () => {
+  test('undo restores the previous surface, and redo the later', async () => {
     const { volume: dragged } = await measured();
     await app.page.click('[data-transport=undo]');
     await atRest();
@@ -166,35 +172,35 @@ describe('the hand', () => {
     await expect.poll(async () => (await measured()).volume).toBe(before);
   });
 
-  test('keys choose, move and turn, and say so', async () => {
+  test('ellipsoids can be selected, moved and rotated by keys, with announcements', async () => {
     await view().press('2');
     expect(await text('.status')).toBe('Ellipsoid 2, small is chosen.');
     const before = await app.page.inputValue('[aria-label="Centre, x"]');
     const news = await recordNews(app.page);
     await view().press('ArrowRight');
-    const moved = /^Ellipsoid 2, small: moved; its centre is /;
+    const moved = /^Ellipsoid 2, small: moved, centre /;
     await expect.poll(news).toContainEqual(expect.stringMatching(moved));
     expect(await app.page.inputValue('[aria-label="Centre, x"]')).not.toBe(before);
     await view().press('t');
     await view().press('ArrowLeft');
-    await expect.poll(news).toContainEqual(expect.stringMatching(/small: turned/));
+    await expect.poll(news).toContainEqual(expect.stringMatching(/small: rotated/));
     await view().press('Escape');
     expect(await app.page.locator('.numbers').isVisible()).toBe(false);
     await atRest();
   });
 
-  test('numbers are taken, or refused beside their field', async () => {
+  test('numbers are accepted, or refused beside their field', async () => {
     await app.page.click('[data-ellipsoid="1"]');
     await app.page.fill('[aria-label="Semi-axis 1"]', '-1');
     await app.page.keyboard.press('Enter');
-    expect(await text('.ellipsoids .field-error')).toBe('A length above 0 is needed.');
+    expect(await text('.ellipsoids .field-error')).toBe('The length must be > 0.');
     await app.page.fill('[aria-label="Semi-axis 1"]', '0.95');
     await app.page.keyboard.press('Enter');
     await atRest();
     expect(await hash()).toMatch(/pose=[^;]*,0\.95,/);
   });
 
-  test('an ellipsoid more grows, and goes when it is removed', async () => {
+  test('an added ellipsoid grows, and disappears when it is removed', async () => {
     await app.page.click('[data-ellipsoid=add]');
     await atRest();
     expect(await app.page.locator('.chips [data-ellipsoid]').count()).toBe(3);
@@ -204,10 +210,10 @@ describe('the hand', () => {
   });
 });
 
-describe('a film', () => {
+describe('an animation', () => {
   beforeAll(() => openAt(SMALL, 'done'));
 
-  test('of two keyframes plays from one to the other, and a link brings it back', async () => {
+  test('of two keyframes plays from one to the other, and a link restores it', async () => {
     await app.page.click('[data-film=add]');
     await app.page.click('[data-ellipsoid="2"]');
     await app.page.fill('[aria-label="Centre, y"]', '0.5');
@@ -245,7 +251,7 @@ describe('the view', () => {
     expect(await hash()).toContain('layout=row');
   });
 
-  test('shows the stages of a figure, and what came', async () => {
+  test('shows the stages of a figure, and the result', async () => {
     await openAt('#sculpt?example=figure-6&p.edgeMin=0.1&p.edgeMax=0.25', 'done');
     await expect.poll(() => app.page.locator('.captions span').count()).toBe(5);
     expect(await text('.figure')).toContain('Paper:');
@@ -261,7 +267,7 @@ describe('the view', () => {
 });
 
 describe('a file', () => {
-  test('opens with ellipsoids that fit it', async () => {
+  test('opens with fitted ellipsoids', async () => {
     const mesh = Mesh.icosphere([3, 0, 0], 2, 0.5);
     await drop(app.page, [{ name: 'ball.ply', bytes: mesh.toBytes('ply') }]);
     await expect.poll(() => text('.facts dd')).toBe('ball.ply');
@@ -271,18 +277,18 @@ describe('a file', () => {
     mesh.free();
   });
 
-  test('that takes its time can be cancelled, and what was there comes back', async () => {
+  test('that takes long can be cancelled, and the previous data are restored', async () => {
     const bytes = new Uint8Array(await readFile(at('www/public/data/nefertiti.ply')));
     await openAt(SMALL, 'done');
     await drop(app.page, [{ name: 'bust.ply', bytes }]);
-    await expect.poll(() => text('.status')).toMatch(/^Making the base of bust\.ply/);
+    await expect.poll(() => text('.status')).toMatch(/^Computing the base of bust\.ply/);
     await app.page.click('[data-action=cancel]');
     await reach(app.page, 'done');
     expect(await text('.facts dd')).toMatch(/^Globe/);
     expect(await measured()).toMatchObject({ components: 1, closed: true });
   });
 
-  test('that is open is refused in words, and what was there stays', async () => {
+  test('that is open is refused with a message, and the previous data are kept', async () => {
     const open = Mesh.fromArrays(Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), Uint32Array.of(0, 1, 2));
     await drop(app.page, [{ name: 'open.ply', bytes: open.toBytes('ply') }]);
     await app.page.waitForSelector('[data-state=error]');

@@ -13,7 +13,7 @@ import { at, must } from '../../scripts/shell.mjs';
 import { countPixels } from './pixels';
 
 let home = '';
-/** Where the commands of the page lead to. */
+/** Folder in which the commands of the page run. */
 let folder = '';
 let browser: Browser;
 let page: Page;
@@ -24,7 +24,7 @@ beforeAll(async () => {
   folder = join(home, 'vesicle');
   await clone();
   const text = await readFile(at('docs/start.md'), 'utf8');
-  // A block of a file comes after its name.
+  // A block with the content of a file follows its name.
   for (const [, name = '', kind, body = ''] of text.matchAll(/(?:`([\w./]+)`:\n\n)?```(\w+)\n([\s\S]*?)```/g)) {
     if (kind === 'sh') await type(body);
     else if (name) await writeFile(join(folder, name), body);
@@ -50,13 +50,13 @@ afterEach(async () => {
   expect(complaints.splice(0)).toEqual([]);
 });
 
-/** What is needed of the clone, under the name that the page gives it. */
+/** Copies the needed parts of the clone to a folder with the page's name for it. */
 async function clone(): Promise<void> {
   await mkdir(join(home, 'vesicle'));
   for (const name of ['pkg', 'www']) await symlink(at(name), join(home, 'vesicle', name));
 }
 
-/** Does what is typed, but for servers, which are the tests, and for what would come from the registry. */
+/** Runs typed commands, except servers, which the tests start, and downloads, which are replaced by links. */
 async function type(block: string): Promise<void> {
   const lines = block.split('\n').filter((line) => !/^npx vite|^npm install @|^npm ci|^npm run build/.test(line));
   const env = { npm_config_offline: 'true', npm_config_audit: 'false', npm_config_fund: 'false' };
@@ -66,7 +66,7 @@ async function type(block: string): Promise<void> {
   for (const named of wanted) await link(named);
 }
 
-/** The page with what it says of a worker. */
+/** Writes the page's variant with a worker. */
 async function writeInWorker(rest: string): Promise<void> {
   const [main, page] = await Promise.all(['main.js', 'index.html'].map((name) => readFile(join(folder, name), 'utf8')));
   const [first] = (main ?? '').replace("from 'vesicle'", "from 'vesicle/worker'").split(/(?<=await init\(\);\n)/);
@@ -74,7 +74,7 @@ async function writeInWorker(rest: string): Promise<void> {
   await writeFile(join(folder, 'in-worker.html'), (page ?? '').replace('main.js', 'in-worker.js'));
 }
 
-/** A package of the version that the page names, from those that are here. */
+/** Links an installed package of the version that the page names. */
 async function link(named: string): Promise<void> {
   const [, name = '', version] = named.match(/^(.+)@([\d.]+)$/) ?? [];
   const here = at('node_modules', name);
@@ -86,7 +86,7 @@ async function link(named: string): Promise<void> {
 const RADIUS = 8;
 const ENCLOSED = 2 * (4 / 3) * Math.PI * RADIUS ** 3;
 
-/** Two balls in a volume of one's own: the surface around both has to part. */
+/** Returns a file with a volume of two balls; the surface around both must split. */
 async function balls(): Promise<Uint8Array> {
   await init();
   const [nx, ny, nz] = [48, 24, 24];
@@ -98,10 +98,10 @@ async function balls(): Promise<Uint8Array> {
   return gzipSync(new Volume({ data, dims: [nx, ny, nz] }).toNifti());
 }
 
-/** Of the pixels of the page, those in the warm colours that the surfaces have. */
+/** Returns the number of pixels in the warm colours of the surfaces. */
 async function warmPixels(): Promise<number> {
   const picture = await page.screenshot();
-  // Lines that NiiVue draws are pure red.
+  // Lines drawn by NiiVue are pure red.
   return countPixels(page, picture, (r, g, b) => r > b + 30 && g > 30);
 }
 
@@ -114,7 +114,7 @@ async function found(): Promise<void> {
   await expect.poll(warmPixels).toBeGreaterThan(1000);
 }
 
-test('`npx vite`: in NiiVue, and what is clicked on', async () => {
+test('`npx vite`: in NiiVue, and clicking', async () => {
   const server = await createServer({ root: folder, configFile: false, logLevel: 'error', server: { port: 0 } });
   try {
     await server.listen();

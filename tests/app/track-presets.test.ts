@@ -1,22 +1,24 @@
-/** The figures of the Track lab: what the page says comes of them does. Run by the package from Node, which gives the same bits. */
+/**
+ * The figures of the Track lab: results are as the page says. Run with the package in Node, which gives the same bits.
+ */
 import { readFile } from 'node:fs/promises';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { paramSpecs, type SurfaceTracker, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { setupOf } from '../../www/src/labs/track-link';
-import { betweenSlices } from '../../www/src/track/between';
 import { voxelsOf } from '../../www/src/track/box';
 import { canny } from '../../www/src/track/canny';
 import { beatOf } from '../../www/src/track/curve';
-import { filmById, isTrackPreset, TRACK_PRESETS, variantInForce } from '../../www/src/track/presets';
-import { buildTracker, filmFrom, prepared } from '../../www/src/track/source';
-import { invert, sliceFrames } from '../../www/src/view/anatomy';
+import { interpolateSlice } from '../../www/src/track/interpolate-slice';
+import { imageById, isTrackPreset, TRACK_PRESETS, variantInForce } from '../../www/src/track/presets';
+import { buildTracker, openImage, prepare } from '../../www/src/track/source';
+import { invert, sliceOrientations } from '../../www/src/view/anatomy';
 import { votesIn } from '../../www/src/view/votes';
 
 let film: Volume;
 let volume: Volume;
 let tracker: SurfaceTracker;
-/** Before any surface is found. */
+/** State with the boundaries of all frames, before any surface is found. */
 let bounded: Uint8Array;
 
 const [FIGURE] = TRACK_PRESETS;
@@ -25,7 +27,7 @@ const setup = setupOf(FIGURE);
 beforeAll(async () => {
   await init();
   film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
-  volume = prepared(film, setup.preparation, () => undefined);
+  volume = prepare(film, setup.preparation, () => undefined);
   tracker = buildTracker(volume, setup).tracker;
   tracker.step(tracker.frames);
   bounded = tracker.save();
@@ -35,17 +37,17 @@ afterAll(() => {
 });
 
 const figure = (id: string) => {
-  const preset = filmById(id);
+  const preset = imageById(id);
   if (!isTrackPreset(preset)) throw new Error(`there is no ${id}`);
   return preset;
 };
 
-test.each(TRACK_PRESETS.map((preset) => [preset.id, preset] as const))('%s is of this heart', (_, preset) => {
+test.each(TRACK_PRESETS.map((preset) => [preset.id, preset] as const))('%s has the same setup', (_, preset) => {
   expect(setupOf(preset)).toEqual(setup);
 });
 
 test.each(TRACK_PRESETS.flatMap((preset) => preset.variants.map((one) => [one.id, preset, one] as const)))(
-  'the settings of figure %s are known as its own',
+  'the settings of figure %s are recognised as its own',
   (_, preset, variant) => {
     const usual = Object.fromEntries(paramSpecs('tracking').map(({ name, default: value }) => [name, value]));
     const params = { ...usual, ...preset.params, ...variant.params };
@@ -73,7 +75,7 @@ test('figure 2: the surface of the first frame runs through the shell of its poi
   expect(enclosed).toBeGreaterThan(30_000);
 });
 
-test('figure 3: in this heart it makes little difference, in thick slices projections take more steps without', async () => {
+test('figure 3: in this heart prediction makes little difference; in thick slices projections take more steps without it', async () => {
   const [, without] = figure('figure-3').variants;
   tracker.step(3);
   const [predicted, present] = [tracker.volumes(), tracker.save()];
@@ -86,13 +88,13 @@ test('figure 3: in this heart it makes little difference, in thick slices projec
   expect(await stepsIn(true)).toBeLessThan(0.95 * (await stepsIn(false)));
 });
 
-/** Of the projections in the computed ventricle in thick slices, in the mean of its first frames. */
+/** Returns the mean number of projection steps in the first frames of the computed ventricle in thick slices. */
 async function stepsIn(prediction: boolean): Promise<number> {
-  const example = filmById('thick-slices');
+  const example = imageById('thick-slices');
   if (!example || !('cine' in example.source)) throw new Error('there is no computed ventricle');
   const setup = setupOf(example);
-  const film = await filmFrom(example.source);
-  const image = prepared(film, setup.preparation, () => undefined);
+  const film = await openImage(example.source);
+  const image = prepare(film, setup.preparation, () => undefined);
   const { tracker } = buildTracker(image, { ...setup, params: { ...setup.params, prediction } });
   tracker.step(tracker.frames + 5);
   const later = tracker.statistics.slice(1);
@@ -103,7 +105,7 @@ async function stepsIn(prediction: boolean): Promise<number> {
 test('figure 4: the boundary of a slice goes around the ventricle, where Cannyâ€™s has gaps', () => {
   const inverse = invert(volume.affine);
   const view = { dims: volume.dims, spacing: volume.spacing, affine: volume.affine, space: volume.space };
-  const [, , side] = sliceFrames(view);
+  const [, , side] = sliceOrientations(view);
   if (!side) throw new Error('a volume has three axes');
   const all = tracker.boundary(0);
   const count = all.length / 5;
@@ -113,7 +115,7 @@ test('figure 4: the boundary of a slice goes around the ventricle, where Cannyâ€
     weights: Float32Array.from({ length: count }, (_, i) => all[5 * i + 4] ?? 0),
   };
   const slice = 21;
-  const on = { volume: view as Parameters<typeof votesIn>[1]['volume'], inverse, frame: side, slice };
+  const on = { volume: view as Parameters<typeof votesIn>[1]['volume'], inverse, orientation: side, slice };
   const strong = votesIn(votes, on).filter(({ weight }) => weight > 0.3);
   expect(strong.length).toBeGreaterThan(100);
   const [width, height] = volume.dims;
@@ -123,13 +125,16 @@ test('figure 4: the boundary of a slice goes around the ventricle, where Cannyâ€
   expect(high.map((to, k) => to - (low[k] ?? 0)).every((length) => length > 20)).toBe(true);
 });
 
-test('figure 5: flow makes up for a slice that is left out better than linear interpolation', () => {
-  const inner = Array.from({ length: film.dims[2] - 2 }, (_, i) => betweenSlices(film, 0, i + 1, film.range).off);
+test('figure 5: optical flow replaces a left-out slice better than linear interpolation', () => {
+  const inner = Array.from(
+    { length: film.dims[2] - 2 },
+    (_, i) => interpolateSlice(film, 0, i + 1, film.range).rmsError,
+  );
   const mean = (of: 'flow' | 'linear') => inner.reduce((sum, off) => sum + off[of], 0) / inner.length;
   expect(mean('flow')).toBeLessThan(0.83 * mean('linear'));
 });
 
-test('figure 6: the ventricle contracts and fills once in the beat, closed and without crossings', () => {
+test('figure 6: the ventricle contracts and fills once per beat, closed and without self-intersections', () => {
   let done = false;
   while (!done) done = tracker.step(1).done;
   const volumes = [...tracker.volumes()];

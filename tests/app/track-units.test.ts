@@ -6,16 +6,16 @@ import { at } from '../../scripts/shell.mjs';
 import { fromHash, linkOf, setupOf, toHash } from '../../www/src/labs/track-link';
 import { framesCsv } from '../../www/src/labs/track-measures';
 import type { Surface } from '../../www/src/protocol';
-import { betweenSlices } from '../../www/src/track/between';
 import { boxOf, voxelsOf } from '../../www/src/track/box';
 import { canny } from '../../www/src/track/canny';
 import { cineVoxels, contraction, trueVolume, wallDistances } from '../../www/src/track/cine';
-import { boundaryPicture, isSplit, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { boundaryImage, hasBoundary, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { crossSection, intersectionsWithRow } from '../../www/src/track/cross-section';
 import { beatOf, warningsOf } from '../../www/src/track/curve';
-import { crossings, cutBy } from '../../www/src/track/cut';
-import { FILMS } from '../../www/src/track/examples';
+import { IMAGES } from '../../www/src/track/examples';
+import { interpolateSlice } from '../../www/src/track/interpolate-slice';
 import { TRACK_PRESETS, viewOf } from '../../www/src/track/presets';
-import { filmFrom, framesOf, prepared } from '../../www/src/track/source';
+import { framesOf, openImage, prepare } from '../../www/src/track/source';
 import { invert } from '../../www/src/view/anatomy';
 import { votesNear } from '../../www/src/view/votes';
 
@@ -30,14 +30,14 @@ function surfaceOf(mesh: Mesh): Surface {
 }
 
 describe('the computed ventricle', () => {
-  test('contracts and fills once in a beat', () => {
+  test('contracts and fills once per beat', () => {
     const part = Array.from({ length: 8 }, (_, frame) => contraction(spec(), frame));
     expect(part[0]).toBe(0);
     expect(Math.max(...part)).toBeGreaterThan(0.95);
     expect(part.at(-1)).toBeLessThan(0.1);
   });
 
-  test('holds as much as its bright voxels say', () => {
+  test('has the volume of its bright voxels', () => {
     const voxels = cineVoxels(spec());
     const size = 36 ** 3;
     for (const frame of [0, 3]) {
@@ -47,8 +47,8 @@ describe('the computed ventricle', () => {
     }
   });
 
-  test('knows how far a point is from its wall, and is the same every time', () => {
-    // The short half axis is 25 · 24/42 mm, and the middle of the volume 35 mm from its first voxel.
+  test('knows the distance of a point from its wall, and is deterministic', () => {
+    // The short semi-axis is 25 · 24/42 mm, and the centre of the volume is 35 mm from its first voxel.
     const half = (25 * 24) / 42;
     const found = wallDistances(spec(), 0, Float32Array.of(35 + half, 35, 35, 35 + half + 1, 35, 35));
     expect(found[0]).toBeCloseTo(0, 4);
@@ -59,7 +59,7 @@ describe('the computed ventricle', () => {
 });
 
 describe('a heartbeat', () => {
-  test('has an end of diastole and of systole, and an ejection fraction', () => {
+  test('has an end-diastole, an end-systole and an ejection fraction', () => {
     expect(beatOf([90, 100, 60, 40, 70])).toEqual({
       diastole: 1,
       systole: 3,
@@ -70,12 +70,12 @@ describe('a heartbeat', () => {
     expect(beatOf([5])).toBeUndefined();
   });
 
-  test('is suspect where triangles fold over or the area jumps', () => {
+  test('is suspect if triangles fold or the area jumps', () => {
     const facts = [
       { folded: 0, triangles: 1000, area: 100, volume: 80 },
       { folded: 11, triangles: 1000, area: 110, volume: 80 },
       { folded: 10, triangles: 1000, area: 90, volume: 80 },
-      // As much smaller as the volume makes it.
+      // The area shrinks in proportion to the volume.
       { folded: 0, triangles: 1000, area: 90 / 4, volume: 10 },
     ];
     expect(warningsOf(facts).map(({ frame, kind }) => [frame, kind])).toEqual([
@@ -84,7 +84,7 @@ describe('a heartbeat', () => {
     ]);
   });
 
-  test('is a table with a line a frame', () => {
+  test('is exported as a table with a line per frame', () => {
     const facts: FrameStatistics = {
       ...{
         volume: 2,
@@ -123,8 +123,8 @@ describe('Canny', () => {
       expect(Math.abs(Math.hypot((i % 41) - 20, Math.floor(i / 41) - 20) - 9.75)).toBeLessThan(1.5);
   });
 
-  test('keeps faint edges only where they hang together with strong ones', () => {
-    // A step across the whole picture that fades from left to right, and a faint one apart from it.
+  test('keeps weak edges only if they are connected to strong ones', () => {
+    // A step across the whole image that fades from left to right, and a weak one apart from it.
     const [width, height] = [60, 30];
     const values = Float32Array.from({ length: width * height }, (_, i) => {
       const [x, y] = [i % width, Math.floor(i / width)];
@@ -138,25 +138,25 @@ describe('Canny', () => {
     expect([...rowsOf(3.2)].some((row) => row > 18)).toBe(true);
   });
 
-  test('finds nothing where all is alike', () => {
+  test('finds nothing in a uniform image', () => {
     const plain = { width: 9, height: 7, values: new Float32Array(63).fill(80) };
     expect(Math.max(...canny(plain, { deviation: 1.5, low: 0.1, high: 0.2 }))).toBe(0);
   });
 });
 
 describe('windows', () => {
-  test('are sorted by 2-means, and vote only for a step between two that are both there', () => {
+  test('are split by 2-means, and vote only for a step between two large clusters', () => {
     const found = twoMeans([10, 12, 11, 100, 104]);
     expect(found.means[0]).toBeCloseTo(11);
     expect(found.means[1]).toBeCloseTo(102);
     expect([...found.bright]).toEqual([0, 0, 0, 1, 1]);
-    expect(isSplit(found, 50)).toBe(true);
-    expect(isSplit(found, 95)).toBe(false);
-    expect(isSplit(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
+    expect(hasBoundary(found, 50)).toBe(true);
+    expect(hasBoundary(found, 95)).toBe(false);
+    expect(hasBoundary(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
     expect(twoMeans([7, 7, 7]).means).toEqual([7, 7]);
   });
 
-  test('end with the picture', () => {
+  test('are clipped by the image', () => {
     const picture = { width: 10, height: 8, values: [] };
     expect(windowAt(picture, 5, 4, 2)).toHaveLength(25);
     expect(windowAt(picture, 0, 0, 2)).toEqual([0, 1, 2, 10, 11, 12, 20, 21, 22]);
@@ -171,34 +171,34 @@ describe('windows', () => {
     expect(sliceVotes({ width: 12, height: 9, values }, 2, 90)).toEqual([]);
   });
 
-  test('are brought together on pixels by the square roots of their votes', () => {
+  test('are summed per pixel with the square roots of their votes', () => {
     const faces = [
       { x: 0.75, y: 0.25, weight: 0.25 },
       { x: 0.25, y: 0.75, weight: 1 },
       { x: 9, y: 9, weight: 1 },
     ];
-    expect([...boundaryPicture({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
+    expect([...boundaryImage({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
   });
 });
 
-describe('cuts', () => {
-  test('of a ball with a plane are a circle, and with a line two points', () => {
+describe('cross-sections', () => {
+  test('of a ball are a circle with a plane, and two points with a line', () => {
     const ball = Mesh.icosphere([0, 0, 0], 10, 1);
-    const cut = cutBy(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
+    const cut = crossSection(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
     expect(cut.length).toBeGreaterThan(6 * 20);
     for (let i = 0; i < cut.length; i += 3) {
       expect(cut[i + 2]).toBeCloseTo(3, 4);
       expect(Math.hypot(cut[i] ?? 0, cut[i + 1] ?? 0)).toBeCloseTo(Math.sqrt(91), 0);
     }
     const flat = Float32Array.from({ length: (cut.length / 3) * 2 }, (_, i) => cut[3 * (i >> 1) + (i % 2)] ?? 0);
-    const [left, right, ...more] = crossings(flat, 0.1);
+    const [left, right, ...more] = intersectionsWithRow(flat, 0.1);
     expect(more).toEqual([]);
     expect(left).toBeCloseTo(-Math.sqrt(91), 0);
     expect(right).toBeCloseTo(Math.sqrt(91), 0);
     ball.free();
   });
 
-  test('leave the points of the boundary that are near', () => {
+  test('filter the boundary votes near the surface', () => {
     const ball = Mesh.icosphere([0, 0, 0], 10, 1);
     const votes = { frame: 0, points: Float32Array.of(10, 0, 0, 0, 0, 0), weights: Float32Array.of(0.5, 1) };
     expect([...votesNear(votes, surfaceOf(ball), 2).weights]).toEqual([0.5]);
@@ -207,13 +207,13 @@ describe('cuts', () => {
 });
 
 describe('boxes', () => {
-  test('of voxels are exact where the image lies along the world', () => {
+  test('in voxels are exact if the image is aligned with the world', () => {
     const affine = [2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 5, 0, 7, 8, 9, 1];
     const region = { low: [3, 0, 4], high: [20, 11, 9] } as Parameters<typeof boxOf>[0];
     expect(voxelsOf(boxOf(region, affine), invert(affine), [30, 30, 12])).toEqual(region);
   });
 
-  test('and where it stands askew', () => {
+  test('and if it is oblique', () => {
     const c = Math.SQRT1_2;
     const affine = [c, c, 0, 0, -c, c, 0, 0, 0, 0, 3, 0, 1, 2, 3, 1];
     const region = { low: [10, 20, 5], high: [29, 39, 9] } as Parameters<typeof boxOf>[0];
@@ -223,17 +223,17 @@ describe('boxes', () => {
 });
 
 describe('links', () => {
-  const view = viewOf(FILMS[0]);
+  const view = viewOf(IMAGES[0]);
 
-  test('say nothing of what is usual', () => {
-    const setup = setupOf(FILMS[0]);
-    expect(toHash(linkOf({ example: FILMS[0], file: '', setup, view }))).toBe('#track');
+  test('omit default settings', () => {
+    const setup = setupOf(IMAGES[0]);
+    expect(toHash(linkOf({ example: IMAGES[0], file: '', setup, view }))).toBe('#track');
     expect(fromHash('#track')).toBeUndefined();
     expect(fromHash('#sculpt?example=globe')).toBeUndefined();
   });
 
-  test('bring everything back', () => {
-    const example = FILMS[1];
+  test('restore all settings', () => {
+    const example = IMAGES[1];
     const setup = {
       ...setupOf(example),
       preparation: { binning: 2 as const, enrichment: 'linear' as const, factor: 3 },
@@ -249,7 +249,7 @@ describe('links', () => {
     expect(linked?.view).toEqual({ below: 'time', edges: true, votes: 'all' });
   });
 
-  test('leave out what makes no sense', () => {
+  test('ignore invalid settings', () => {
     const linked = fromHash('#track?box=1,2&at=x&binning=7&enrichment=magic&factor=-2&p.threshold=abc');
     expect(linked).toEqual({ params: { threshold: 'abc' }, preparation: {}, view: {} });
     expect(fromHash('#track?box=whole&at=largest')).toMatchObject({ box: 'whole', at: 'largest' });
@@ -259,7 +259,7 @@ describe('links', () => {
 describe('images', () => {
   const named = (...names: string[]) => names.map((name) => ({ name, bytes: new Uint8Array() }));
 
-  test('of several files are frames in the order of their names, headers with their data', () => {
+  test('from several files are frames in the order of their names, headers with their data', () => {
     const names = (files: string[]) => framesOf(named(...files)).map((parts) => parts.map(({ name }) => name));
     expect(names(['f10.nii', 'f2.nii', 'f1.nii'])).toEqual([['f1.nii'], ['f2.nii'], ['f10.nii']]);
     expect(names(['b.raw', 'a.mhd', 'a.raw', 'b.mhd'])).toEqual([
@@ -269,7 +269,7 @@ describe('images', () => {
     expect(names(['voxels.raw', 'image.nhdr'])).toEqual([['image.nhdr', 'voxels.raw']]);
   });
 
-  test('are put together from their frames', async () => {
+  test('are assembled from their frames', async () => {
     const frame = (value: number) => {
       const volume = new Volume({ data: new Uint8Array(64).fill(value), dims: [4, 4, 4] });
       const bytes = volume.toNifti();
@@ -277,44 +277,44 @@ describe('images', () => {
       return bytes;
     };
     const files = [9, 7, 8].map((value) => ({ name: `frame-${value}.nii`, bytes: frame(value) }));
-    const film = await filmFrom({ files });
+    const film = await openImage({ files });
     expect(film.frames).toBe(3);
     expect([0, 1, 2].map((index) => film.sample([1, 1, 1], index))).toEqual([7, 8, 9]);
     film.free();
   });
 
-  test('are binned and get slices as asked for', async () => {
+  test('are binned and enriched with slices as requested', async () => {
     const film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
     expect([...film.dims, film.frames]).toEqual([64, 64, 20, 20]);
     const told: string[] = [];
-    const volume = prepared(film, { binning: 2, enrichment: 'linear', factor: 2 }, (what) => told.push(what));
+    const volume = prepare(film, { binning: 2, enrichment: 'linear', factor: 2 }, (what) => told.push(what));
     expect(volume.dims).toEqual([32, 32, 39]);
     expect(told).toHaveLength(2);
-    expect(prepared(film, { binning: 1, enrichment: 'none', factor: 0 }, () => undefined)).toBe(film);
+    expect(prepare(film, { binning: 1, enrichment: 'none', factor: 0 }, () => undefined)).toBe(film);
     volume.free();
     film.free();
   });
 
-  test('have a picture between two slices that is sharper by flow', () => {
-    // A bright disc that goes aside from one slice to the next.
+  test('have a slice between two others that is sharper with optical flow', () => {
+    // A bright disc that moves sideways from one slice to the next.
     const disc = (x: number, y: number, z: number) => (Math.hypot(x - 13 - 3 * z, y - 16) < 7 ? 200 : 40);
     const data = Float32Array.from({ length: 32 * 32 * 3 }, (_, i) => disc(i % 32, Math.floor(i / 32) % 32, i >> 10));
     const volume = new Volume({ data, dims: [32, 32, 3] });
-    const { linear, flow, before, off } = betweenSlices(volume, 0, 1, [0, 255]);
+    const { linear, flow, before, rmsError } = interpolateSlice(volume, 0, 1, [0, 255]);
     const half = (values: Uint8Array) => values.reduce((sum, v) => sum + (v > 80 && v < 160 ? 1 : 0), 0);
     expect(before[16 * 32 + 13]).toBe(200);
     expect(half(flow)).toBeLessThan(0.7 * half(linear));
-    expect(off.flow).toBeLessThan(0.9 * off.linear);
-    expect(() => betweenSlices(volume, 0, 2, [0, 255])).toThrow(/neighbours/);
+    expect(rmsError.flow).toBeLessThan(0.9 * rmsError.linear);
+    expect(() => interpolateSlice(volume, 0, 2, [0, 255])).toThrow(/neighbours/);
     volume.free();
   });
 });
 
-test('every figure has an id of its own, says what the paper saw and what comes out', () => {
-  expect(new Set([...FILMS, ...TRACK_PRESETS].map(({ id }) => id)).size).toBe(FILMS.length + TRACK_PRESETS.length);
-  for (const { saw, variants } of TRACK_PRESETS)
-    for (const { came } of variants) {
-      for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
-      expect(came).toMatch(/^Here/);
+test("every figure has an id of its own, and states the paper's result and its own", () => {
+  expect(new Set([...IMAGES, ...TRACK_PRESETS].map(({ id }) => id)).size).toBe(IMAGES.length + TRACK_PRESETS.length);
+  for (const { paperResult, variants } of TRACK_PRESETS)
+    for (const { ourResult } of variants) {
+      for (const text of [paperResult, ourResult]) expect(text).toMatch(/^\S.{40,}\.$/);
+      expect(ourResult).toMatch(/^Here/);
     }
 });

@@ -1,4 +1,4 @@
-/** The Track lab: a surface that is followed through the frames of a 4D image. */
+/** The Track lab: a surface that is tracked through the frames of a 4D image. */
 import { readFile } from 'node:fs/promises';
 import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
@@ -8,14 +8,14 @@ import { type App, cancelAtOnce, drop, openApp, overflow, reach, recordNews, unn
 
 let app: App;
 
-/** Small enough that a test can track it many times. */
+/** Small enough to be tracked many times. */
 const SMALL = { dims: [24, 24, 24], spacing: [2, 2, 2], frames: 4, noise: 4, size: 18, papillary: false } as const;
 const spec = () => structuredClone(SMALL) as unknown as Parameters<typeof cineVoxels>[0];
 
 beforeAll(async () => {
   await init();
   app = await openApp();
-  // What beats in a loop would only take time from what is tested; where it is tested it is asked for.
+  // Looped playback would only slow the tests down; the test of playback turns it on.
   await app.page.emulateMedia({ reducedMotion: 'reduce' });
 });
 afterAll(() => app.close());
@@ -33,7 +33,7 @@ async function measured(): Promise<Record<string, number | boolean>> {
   return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
 }
 
-/** All frames have their surface, and that has been shown. */
+/** Waits until all frames have their surface and are displayed. */
 async function tracked(frames: number): Promise<void> {
   await expect.poll(async () => [await state(), (await measured()).tracked]).toEqual(['done', frames]);
 }
@@ -45,7 +45,7 @@ const enabled = (selector: string) => app.page.locator(selector).isEnabled();
 const shown = async () => (await measured()).frame;
 const beat = async () => JSON.parse((await app.page.getAttribute('[data-beat]', 'data-beat')) ?? '{}');
 
-/** A 4D image as a file, and its frames as files of their own. */
+/** Returns a 4D image as a file, and its frames as separate files. */
 function small(): { film: Uint8Array; frames: Uint8Array[] } {
   const { dims, spacing, frames } = spec();
   const voxels = cineVoxels(spec());
@@ -60,14 +60,14 @@ function small(): { film: Uint8Array; frames: Uint8Array[] } {
   return { film: bytes(voxels, frames), frames: Array.from({ length: frames }, (_, t) => frame(t)) };
 }
 
-/** Opens the small image, and waits until it is tracked. */
+/** Opens the small image and waits until it is tracked. */
 async function dropSmall(): Promise<void> {
   await drop(app.page, [{ name: 'small.nii', bytes: small().film }]);
   await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('small.nii'));
   await reach(app.page, 'done');
 }
 
-/** What a click saves. */
+/** Returns the file that a click downloads. */
 async function saved(selector: string): Promise<{ name: string; bytes: Uint8Array }> {
   const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click(selector)]);
   return { name: download.suggestedFilename(), bytes: new Uint8Array(await readFile(await download.path())) };
@@ -85,20 +85,20 @@ describe('the computed ventricle', () => {
     const { ejection, diastole, systole } = await beat();
     expect(ejection).toBeGreaterThan(0.58);
     expect(ejection).toBeLessThan(0.7);
-    // Volume hardly changes from the end of the beat to its beginning.
+    // The volume hardly changes from the end of the beat to its beginning.
     expect([10, 11, 0]).toContain(diastole);
     expect(systole).toBe(4);
   });
 
-  test('tells in words what the curve shows, beside the truth', async () => {
-    // It is written when the curve is drawn, in the next frame of the screen.
-    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /;
+  test('describes the curve in words, together with the truth', async () => {
+    // The text is updated when the curve is drawn, in the next animation frame.
+    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* Ground truth: /;
     await expect.poll(() => text('[data-beat]')).toMatch(words);
-    expect(await text('.status')).toMatch(/^Done: all 12 frames have their surface\. Ejection fraction [\d.]+ %\.$/);
+    expect(await text('.status')).toMatch(/^Done: all 12 frames tracked\. Ejection fraction [\d.]+ %\.$/);
     expect(await app.page.locator('.results table').first().locator('tbody tr').count()).toBe(12);
   });
 
-  test('shows each frame, by slider, button and key, and beats in a loop', async () => {
+  test('shows each frame, by slider, button and key, and plays in a loop', async () => {
     const volumes = new Set<unknown>();
     for (const frame of [0, 4]) {
       await app.page.locator('.frames input[type=range]').fill(String(frame));
@@ -113,7 +113,7 @@ describe('the computed ventricle', () => {
     await app.page.click('[data-frame=beat]');
     await expect.poll(shown).not.toBe(5);
     await app.page.click('[data-frame=beat]');
-    await expect.poll(() => text('[data-frame=beat]')).toBe('Beat');
+    await expect.poll(() => text('[data-frame=beat]')).toBe('Loop');
   });
 
   test('has votes on its surface and pictures below', async () => {
@@ -130,7 +130,7 @@ describe('the computed ventricle', () => {
   });
 
   test('is compared with the run without prediction', async () => {
-    await app.page.click('summary:has-text("With and without")');
+    await app.page.click('summary:has-text("Compare settings")');
     await app.page.selectOption('[data-compare=with]', 'prediction');
     await app.page.click('[data-compare=start]');
     const runs = async () =>
@@ -141,29 +141,29 @@ describe('the computed ventricle', () => {
       }[];
     await expect.poll(async () => (await runs()).length).toBe(2);
     const [present, other] = await runs();
-    expect([present?.name, other?.name]).toEqual(['predicted', 'not predicted']);
+    expect([present?.name, other?.name]).toEqual(['with prediction', 'without prediction']);
     expect(other?.steps).toBeGreaterThanOrEqual(present?.steps ?? 0);
     expect(other?.error).toBeLessThan(1);
     await expect.poll(() => text('[data-beat]')).toContain('not predicted:');
     expect(await state()).toBe('done');
   });
 
-  test('all controls have names, and a phone is wide enough', async () => {
+  test('all controls have names, and it fits a phone', async () => {
     expect(await unnamedControls(app.page)).toEqual([]);
     expect(await overflow(app.page, 390, 844)).toBeLessThanOrEqual(0);
     await app.page.setViewportSize({ width: 1280, height: 800 });
   });
 });
 
-describe('an image of one’s own', () => {
+describe('the user’s own image', () => {
   beforeAll(() => dropSmall());
 
-  test('is prepared with in-between slices where they help, and tracked', async () => {
+  test('is enriched with slices if they help, and tracked', async () => {
     expect(await measured()).toMatchObject({ frames: 4, tracked: 4, closed: true, crossings: 0 });
     expect(await hash()).toContain('file=small.nii');
   });
 
-  test('may come as its frames', async () => {
+  test('can be opened as its frames', async () => {
     const { frames } = small();
     const files = frames.map((bytes, i) => ({ name: `t${i + 1}.nii`, bytes }));
     const before = (await measured()).volume;
@@ -173,7 +173,7 @@ describe('an image of one’s own', () => {
     expect((await measured()).volume).toBe(before);
   });
 
-  test('is refused with the library’s words where it has one frame, and the former stays', async () => {
+  test('is refused with the library’s message if it has one frame, and the previous one is kept', async () => {
     const [first] = small().frames;
     await drop(app.page, [{ name: 'still.nii', bytes: first as Uint8Array }]);
     await expect.poll(state).toBe('error');
@@ -187,7 +187,7 @@ describe('an image of one’s own', () => {
 describe('changes', () => {
   beforeAll(() => dropSmall());
 
-  test('of the step height begin again, are undone and done again', async () => {
+  test('of the edge threshold restart tracking, and can be undone and redone', async () => {
     const { volume } = await measured();
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
     await threshold.fill('80');
@@ -208,7 +208,7 @@ describe('changes', () => {
     await expect.poll(async () => (await measured()).volume).toBe(volume);
   });
 
-  test('that cannot be are refused beside their control', async () => {
+  test('that are invalid are refused beside their control', async () => {
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
     const before = await threshold.inputValue();
     await threshold.fill('-3');
@@ -217,18 +217,18 @@ describe('changes', () => {
     expect(await threshold.inputValue()).toBe(before);
   });
 
-  test('of a step height beyond any step stop the run and say the largest', async () => {
+  test('to an edge threshold above any step stop the run and report the largest', async () => {
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
     await threshold.fill('250');
     await threshold.press('Enter');
-    await expect.poll(() => text('.banner')).toMatch(/The run has stopped\..*largest step/);
+    await expect.poll(() => text('.banner')).toMatch(/The run failed\..*largest step/);
     await app.page.click('.banner button');
     await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
     await app.page.click('[data-transport=undo]');
     await tracked(4);
   });
 
-  test('warn where noise alone makes boundaries', async () => {
+  test('to a threshold within the noise show a warning', async () => {
     const warning = () => text('[data-param=threshold] .warning');
     expect(await warning()).toBe('');
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
@@ -258,7 +258,7 @@ describe('changes', () => {
     const box = await slice.boundingBox();
     if (!box) throw new Error('there is no slice');
     const before = await app.page.locator('[data-box="0-first"]').inputValue();
-    // The picture is as wide as high in the middle of its canvas; patients' right is on the left.
+    // The image is a square in the centre of its canvas; the patient's right is on the left.
     const [middle, half] = [box.x + box.width / 2, Math.min(box.width, box.height) / 2];
     await app.page.mouse.move(middle - half + 2, box.y + box.height / 2);
     await app.page.mouse.down();
@@ -275,7 +275,7 @@ describe('changes', () => {
     await tracked(4);
   });
 
-  test('of the preparation show the image as it is then', async () => {
+  test('of the preparation show the prepared image', async () => {
     await app.page.click('summary:has-text("Preparation")');
     await app.page.selectOption('[data-prepare=binning]', '2');
     await expect.poll(hash).toContain('binning=2');
@@ -287,7 +287,7 @@ describe('changes', () => {
     await expect.poll(async () => (await measured()).tracked).toBe(4);
   });
 
-  test('reset stands before the first step; steps and play go on from there', async () => {
+  test('reset returns to before the first step; steps and play continue from there', async () => {
     await app.page.click('text=Reset');
     await expect.poll(async () => [await state(), (await measured()).tracked]).toEqual(['paused', 0]);
     await app.page.click('text="Step"');
@@ -298,10 +298,10 @@ describe('changes', () => {
   });
 });
 
-describe('what is saved', () => {
+describe('saving', () => {
   beforeAll(() => dropSmall());
 
-  test('is the frame that is shown', async () => {
+  test('the displayed frame', async () => {
     await app.page.locator('.frames input[type=range]').fill('2');
     await expect.poll(shown).toBe(3);
     const { name, bytes } = await saved('[data-export=ply]');
@@ -311,7 +311,7 @@ describe('what is saved', () => {
     mesh.free();
   });
 
-  test('are all frames, each a file', async () => {
+  test('all frames, each as a file', async () => {
     const { name, bytes } = await saved('[data-action=save-frames]');
     expect(name).toBe('small.zip');
     const files = unzipSync(bytes);
@@ -319,7 +319,7 @@ describe('what is saved', () => {
     expect(strFromU8(files['frame-1.ply']?.subarray(0, 3) ?? new Uint8Array())).toBe('ply');
   });
 
-  test('is the beat as an animation, and the table of frames', async () => {
+  test('the beat as an animation, and the table of frames', async () => {
     const glb = await saved('[data-action=save-animation]');
     expect(new TextDecoder().decode(glb.bytes.subarray(0, 4))).toBe('glTF');
     const csv = await saved('[data-action=save-table]');
@@ -328,7 +328,7 @@ describe('what is saved', () => {
 });
 
 describe('links', () => {
-  test('restore parameters, preparation, box and what is shown', async () => {
+  test('restore parameters, preparation, box and displayed items', async () => {
     const there =
       '#track?example=ventricle&binning=2&below=time&box=10,10,10,60,60,60&at=largest&p.threshold=70&p.prediction=false';
     await openAt(there, 'done');
@@ -337,13 +337,13 @@ describe('links', () => {
     expect(await app.page.locator('[data-param=threshold] input[type=number]').inputValue()).toBe('70');
   });
 
-  test('whose settings cannot be are followed without them', async () => {
+  test('with invalid settings are followed without them', async () => {
     await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
-    await expect.poll(() => text('.banner')).toContain('The link’s settings are left out.');
+    await expect.poll(() => text('.banner')).toContain('The link’s settings were ignored.');
   });
 });
 
-test('hands the surface of a frame to the Sculpt lab, and is there again on the way back', async () => {
+test('passes the surface of a frame to the Sculpt lab, and is restored on the way back', async () => {
   await openAt('#track?example=ventricle&binning=2', 'done');
   await app.page.click('[data-action=sculpt]');
   await expect.poll(() => app.page.title()).toBe('Vesicle: Sculpt');
@@ -355,7 +355,7 @@ test('hands the surface of a frame to the Sculpt lab, and is there again on the 
   await tracked(12);
 });
 
-test('is cancelled while an image is being opened: what was open is there again', async () => {
+test('can be cancelled while an image is being opened, which restores the previous one', async () => {
   const news = await recordNews(app.page);
   await cancelAtOnce(app.page);
   const before = await text('.facts');
@@ -363,13 +363,13 @@ test('is cancelled while an image is being opened: what was open is there again'
   await expect.poll(news).toContainEqual('Cancelled.');
   await expect.poll(state).toMatch(/running|done/);
   expect(await text('.facts')).toBe(
-    before.replace(/Prepared in.*$/, (await text('.facts')).match(/Prepared in.*$/)?.[0] ?? ''),
+    before.replace(/Opening time.*$/, (await text('.facts')).match(/Opening time.*$/)?.[0] ?? ''),
   );
   expect(await app.page.locator('.banner').isVisible()).toBe(false);
 });
 
-test('pauses at any time, and a new image ends what runs', async () => {
-  // Pressed in the page, the moment it can be: a fast machine is done before a click from outside arrives.
+test('can be paused at any time, and a new image ends the run', async () => {
+  // From inside the page: a fast machine is done before a click from outside arrives.
   await app.page.evaluate(() => {
     const press = () => {
       const runs = document.querySelector('.facts')?.textContent?.includes('heart');

@@ -1,4 +1,4 @@
-/** The parts of the app that are plain functions. */
+/** Parts of the app that are plain functions. */
 import { describe, expect, test } from 'vitest';
 import { EXAMPLES } from '../../www/src/examples';
 import { toCsv } from '../../www/src/labs/csv';
@@ -8,12 +8,12 @@ import type { StepReport } from '../../www/src/protocol';
 import { quantize } from '../../www/src/quantize';
 import { otsu, quantiles } from '../../www/src/threshold';
 import { History } from '../../www/src/ui/history';
-import { anatomyOf, type Grid, invert, sliceFrames, slicePlane, toWorld } from '../../www/src/view/anatomy';
+import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
-import { diverging, robustRange, shadeColors, shadeTitle } from '../../www/src/view/shading';
-import { discOf, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
+import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/view/shading';
+import { ballSection, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
 
-/** A grid with the given columns as voxel axes. */
+/** Returns a grid with the given columns as voxel axes. */
 function grid(columns: [number, number, number][], space: 'RAS' | 'LPS' = 'RAS'): Grid {
   const affine = new Float64Array(16);
   for (const [i, column] of columns.entries()) affine.set(column, 4 * i);
@@ -36,10 +36,10 @@ test('in RAS the first voxel axis runs to the right, in LPS to the left', () => 
   expect(anatomyOf(grid(STRAIGHT, 'LPS'))[0]).toEqual({ anatomical: 0, positive: false });
 });
 
-test('slices lie as in a reading room, whatever the order of the voxel axes', () => {
+test('slices are oriented by radiological convention, whatever the order of the voxel axes', () => {
   for (const columns of [STRAIGHT, TILTED]) {
     for (const space of ['RAS', 'LPS'] as const) {
-      const frames = sliceFrames(grid(columns, space));
+      const frames = sliceOrientations(grid(columns, space));
       const axial = frames.find((frame) => frame.name === 'Axial');
       const sagittal = frames.find((frame) => frame.name === 'Sagittal');
       expect(axial?.labels).toEqual({ left: 'R', right: 'L', top: 'A', bottom: 'P' });
@@ -48,19 +48,19 @@ test('slices lie as in a reading room, whatever the order of the voxel axes', ()
   }
 });
 
-test('a picture shows each voxel where its labels say', () => {
+test('a picture shows each voxel on the side that its labels say', () => {
   const voxels = Uint8Array.from({ length: 4 * 5 * 6 }, (_, i) => i);
   const volume = { ...grid(STRAIGHT), voxels };
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const out = new Uint8ClampedArray(4 * 4 * 5);
   paintSlice(volume, axial, 1, out);
-  // Top left is right and anterior: the largest x and y of the slice.
+  // The top left is right and anterior: the largest x and y of the slice.
   expect(out[0]).toBe(1 * 20 + 4 * 4 + 3);
   expect(out[out.length - 4]).toBe(1 * 20);
 });
 
-test('the inverse undoes the affine, also a tilted one', () => {
+test('the inverse reverts the affine, also an oblique one', () => {
   const { affine } = grid(TILTED);
   const back = toWorld(invert(affine), toWorld(affine, [1.5, -2, 3]));
   expect(back[0]).toBeCloseTo(1.5, 10);
@@ -68,7 +68,7 @@ test('the inverse undoes the affine, also a tilted one', () => {
   expect(back[2]).toBeCloseTo(3, 10);
 });
 
-test('the plane of a slice holds its voxels', () => {
+test('the plane of a slice contains its voxels', () => {
   const { affine } = grid(TILTED);
   const { origin, normal } = slicePlane(affine, invert(affine), 1, 3);
   const point = toWorld(affine, [2, 3, -4]);
@@ -77,9 +77,9 @@ test('the plane of a slice holds its voxels', () => {
   expect(Math.hypot(...normal)).toBeCloseTo(1, 10);
 });
 
-test('an outline lies over the voxels it goes through', () => {
+test('an outline lies over the voxels it passes through', () => {
   const volume = grid(STRAIGHT);
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const segment = new Float32Array([...toWorld(volume.affine, [3, 4, 0]), ...toWorld(volume.affine, [0, 0, 0])]);
   const [x1, y1, x2, y2] = projectSegments(segment, invert(volume.affine), volume, axial);
@@ -87,14 +87,14 @@ test('an outline lies over the voxels it goes through', () => {
   expect([x2, y2]).toEqual([3.5, 4.5]);
 });
 
-test('the threshold falls between two peaks, in the middle of the gap', () => {
+test('the threshold is in the middle of the gap between two peaks', () => {
   const histogram = new Array(100).fill(0);
   histogram[20] = 50;
   histogram[60] = 50;
   expect(otsu(histogram, [0, 100])).toBeCloseTo(40.5, 5);
 });
 
-test('quantiles find the ends of what is common', () => {
+test('quantiles find the range of common values', () => {
   const histogram = [0, 10, 80, 10, 0];
   expect(quantiles(histogram, [0, 5], [0.05, 0.5, 0.95])).toEqual([1.5, 2.5, 3.5]);
 });
@@ -113,7 +113,7 @@ describe('undo', () => {
   const stack = (limits = { entries: 10, bytes: 1000 }) => new UndoStack<string>(limits);
   const at = (state: string, bytes = 1) => ({ state, bytes });
 
-  test('goes back and forth through what was done', () => {
+  test('moves back and forth through the history', () => {
     const done = stack();
     done.push({ label: 'one', ...at('before one') });
     done.push({ label: 'two', ...at('before two') });
@@ -127,7 +127,7 @@ describe('undo', () => {
     expect(done.undo(at('before one'))).toBeUndefined();
   });
 
-  test('something else done takes back what could be done again', () => {
+  test('a new action discards what could be redone', () => {
     const done = stack();
     done.push({ label: 'one', ...at('before one') });
     done.undo(at('after one'));
@@ -135,7 +135,7 @@ describe('undo', () => {
     expect(done.redoable).toBeUndefined();
   });
 
-  test('keeps no more than fits, but always the last', () => {
+  test('keeps as many states as fit, but always the last', () => {
     const done = stack({ entries: 10, bytes: 100 });
     for (let i = 0; i < 5; i++) done.push({ label: String(i), ...at(`before ${i}`, 40) });
     expect(done.undo(at('after 4', 0))).toBe('before 4');
@@ -146,7 +146,7 @@ describe('undo', () => {
   });
 });
 
-/** A report as the model gives them. */
+/** Returns a report with the fields of the model's. */
 function report(iteration: number, more: Partial<StepReport> = {}): StepReport {
   const events = { creations: 0, deletions: 0, inversions: 0, axial: 0, annular: 0, vanished: 0, seeds: 0 };
   const counts = { vertices: 10, triangles: 16, components: 1, euler: 2 };
@@ -155,7 +155,7 @@ function report(iteration: number, more: Partial<StepReport> = {}): StepReport {
 }
 
 describe('the history', () => {
-  test('goes back to an iteration, and forth to what followed it', () => {
+  test('returns to an iteration, and forth to those that followed it', () => {
     const history = new History();
     history.add([report(1), report(2)]);
     const early = history.marker();
@@ -169,14 +169,14 @@ describe('the history', () => {
     expect(history.reports.at(-1)).toMatchObject({ iteration: 3, vertices: 10, phase: 'level 0' });
   });
 
-  test('adds up times by level and part, the end with the last level', () => {
+  test('sums times by level and part; the last report counts to the last level', () => {
     const history = new History();
     history.add([report(1), report(2), report(3, { phase: 'level 0' }), report(4, { phase: 'done', done: true })]);
     expect([...history.times.keys()]).toEqual(['level 1', 'level 0']);
     expect(history.times.get('level 0')?.get('forces')).toBe(4);
   });
 
-  test('as CSV has a line an iteration and a column for all that is shown', () => {
+  test('as CSV has a line per iteration and a column for each plotted value', () => {
     const history = new History();
     history.add([report(1), report(2, { residual: 0.25 })]);
     const [head, first, second, end] = toCsv(history).split('\n');
@@ -202,7 +202,7 @@ describe('a link', () => {
     color: 'speed' as const,
   };
 
-  test('says what differs from the example, and is read back as it was', () => {
+  test('contains the differences from the example, and is read back unchanged', () => {
     const linked = linkOf(settings);
     expect(linked).toEqual({
       example: 'tooth',
@@ -216,7 +216,7 @@ describe('a link', () => {
     expect(fromHash(toHash(linked))).toEqual(linked);
   });
 
-  test('is the bare address where nothing differs', () => {
+  test('is the bare address if nothing differs', () => {
     const [first] = EXAMPLES;
     if (!first) throw new Error('no example');
     const choice = { kind: 'contour', bubbles: 5, levels: first.levels, edge: first.edge } as const;
@@ -224,7 +224,7 @@ describe('a link', () => {
     expect(toHash(linkOf({ ...plain, params: { ...first.params, damping: 0.4 } }))).toBe('#extract');
   });
 
-  test('of another lab, or with nonsense in it, does no harm', () => {
+  test('of another lab, or with invalid parts, does no harm', () => {
     expect(fromHash('#track?example=tooth')).toBeUndefined();
     expect(fromHash('#extract')).toBeUndefined();
     expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=&v=2')).toEqual({
@@ -243,16 +243,16 @@ describe('numbers as colours', () => {
     expect(diverging(5)).toEqual(high);
   });
 
-  test('have a range that a few wild vertices do not widen', () => {
+  test('have a range that a few outliers do not widen', () => {
     const values = Float32Array.from({ length: 1000 }, (_, i) => (i % 2 ? 0.011 : -0.015));
     values.set([50, -80], 10);
     expect(robustRange(values, 1e-4)).toBe(0.02);
     expect(robustRange(new Float32Array(10), 1e-4)).toBe(1e-4);
   });
 
-  test('are told with the unit they are one over', () => {
-    expect(shadeTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
-    expect(shadeTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
+  test('have a title with the reciprocal unit', () => {
+    expect(quantityTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
+    expect(quantityTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
   });
 
   test('reach the GPU as linear light, and NaN as zero', () => {
@@ -264,22 +264,22 @@ describe('numbers as colours', () => {
   });
 });
 
-test('a slice of a coarser copy lies where the slice of the volume lies', () => {
+test("a slice of a coarser level is at the position of the volume's slice", () => {
   const fine = { dims: [9, 9, 9] as [number, number, number], voxels: new Uint8Array() };
   const coarse = { dims: [3, 3, 3] as [number, number, number], voxels: new Uint8Array() };
-  const [frame] = sliceFrames({ ...grid(STRAIGHT), dims: [9, 9, 9] });
+  const [frame] = sliceOrientations({ ...grid(STRAIGHT), dims: [9, 9, 9] });
   if (!frame) throw new Error('no slice');
   expect([0, 2, 3, 8].map((index) => levelIndex(fine, coarse, frame, index))).toEqual([0, 0, 1, 2]);
 });
 
-test('the reach of an attractor is a disc in the slices it meets', () => {
+test('the radius of an attractor is a disc in the slices it intersects', () => {
   const { dims, ...rest } = grid(STRAIGHT);
   const volume = { ...rest, dims };
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const attractor = { point: toWorld(rest.affine, [1, 2, 3]), strength: 1, radius: 5 };
-  const disc = (slice: number) => discOf(attractor, slice, invert(rest.affine), volume, axial);
-  // Slices are 3 apart, rows 2: at the next slice a radius of 4 is left.
+  const disc = (slice: number) => ballSection(attractor, slice, invert(rest.affine), volume, axial);
+  // Slices are 3 apart, rows 2: in the next slice the disc has a radius of 4.
   expect(disc(3)).toMatchObject({ radiusX: 5, radiusY: 2.5, near: true });
   expect(disc(4)?.radiusX).toBeCloseTo(4, 5);
   expect(disc(4)?.near).toBe(false);

@@ -25,7 +25,7 @@ afterAll(async () => {
   await server.close();
 });
 
-/** Runs a module in a page of an address; it leaves what it has to say in the title, as JSON. */
+/** Runs a module in a page at an address; returns the JSON that it leaves in the title. */
 async function told(address: string, content: string): Promise<unknown> {
   const page = await browser.newPage();
   try {
@@ -37,7 +37,7 @@ async function told(address: string, content: string): Promise<unknown> {
   }
 }
 
-/** `tell` writes the title; so does what is thrown. */
+/** Wraps a module: `tell` writes the title, and so does a thrown error. */
 const caught = (content: string) => `
   const tell = (value) => { document.title = JSON.stringify(value); };
   try { ${content} } catch (error) { tell(String(error)); }`;
@@ -49,7 +49,7 @@ async function title(page: Page): Promise<unknown> {
 
 const LIBRARY = `const library = await import('/worker.js'); const { default: init, Mesh, Volume, DeformableModel } = library;`;
 
-test('two hundred steps end in the bits that the core gives natively, and the page is free meanwhile', async () => {
+test('two hundred steps give the same bits as the native core, and the page stays responsive', async () => {
   const content = `${LIBRARY}
     await init();
     let frames = 0;
@@ -69,7 +69,7 @@ test('two hundred steps end in the bits that the core gives natively, and the pa
   expect(await told(`${server.address}package.json`, content)).toEqual([SPONGE_BITS, true]);
 });
 
-test('a run is aborted from the page, and buffers are handed over', async () => {
+test('a run is aborted from the page, and buffers are transferred', async () => {
   const content = `${LIBRARY}
     await init({ module_or_path: 'vesicle_bg.wasm' });
     const data = Uint8Array.from({ length: 8000 }, (_, i) => (i % 20 > 5 && i % 20 < 15 ? 100 : 0));
@@ -88,7 +88,7 @@ test('a run is aborted from the page, and buffers are handed over', async () => 
   expect(await told(`${server.address}package.json`, content)).toEqual(expected);
 });
 
-test('a worker made by hand serves as well; one whose script is not there says so', async () => {
+test('a worker made by hand works as well; a missing script is reported', async () => {
   const content = `${LIBRARY}
     const make = (name) => new Worker(name, { type: 'module' });
     const failed = await init({ worker: make('/nowhere.js') }).catch(({ message }) => message);
@@ -99,7 +99,7 @@ test('a worker made by hand serves as well; one whose script is not there says s
   expect(genus).toBe(0);
 });
 
-/** The package on an origin of its own, with headers of ours, and a few files more. */
+/** Serves the package on an origin of its own, with the given headers and additional files. */
 async function publish(headers: Record<string, string>, files: Record<string, string> = {}) {
   const types: Record<string, string> = { '.js': 'text/javascript', '.html': 'text/html', '.wasm': 'application/wasm' };
   const answer = async (path: string, response: ServerResponse) => {
@@ -114,7 +114,7 @@ async function publish(headers: Record<string, string>, files: Record<string, st
   return { address: `http://localhost:${port}/`, close: () => server.close() };
 }
 
-test('a strict content security policy is enough', async () => {
+test('a strict content security policy is sufficient', async () => {
   const headers = {
     'Content-Security-Policy': `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'`,
   };
@@ -131,7 +131,7 @@ test('a strict content security policy is enough', async () => {
   }
 });
 
-test('from another origin the worker starts by way of this one', async () => {
+test("from another origin the worker starts through a script of the page's own", async () => {
   const network = await publish({ 'Access-Control-Allow-Origin': '*' });
   try {
     const content = `
@@ -162,7 +162,7 @@ test('Vite bundles the worker and the module in it', async () => {
     page.on('request', (request) => fetched.push(new URL(request.url()).pathname));
     await page.goto(built.address);
     expect(await title(page)).toBe(0);
-    // All of it from the bundle, which has names of its own.
+    // All files are from the bundle, which has names of its own.
     expect(fetched.filter((path) => /\.(js|wasm)$/.test(path)).every((path) => path.startsWith('/assets/'))).toBe(true);
   } finally {
     await page.close();

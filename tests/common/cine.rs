@@ -1,4 +1,4 @@
-//! A beating ventricle with known truth: a cavity with papillary muscles, as cine MR would show it.
+//! A beating ventricle with known geometry: a cavity with papillary muscles, as in cine MR.
 
 #![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
@@ -12,23 +12,23 @@ const BLOOD: f64 = 200.0;
 const MUSCLE: f64 = 90.0;
 const LUNG: f64 = 45.0;
 
-/// What is imaged, and how.
+/// Parameters of the synthetic 4D image.
 #[derive(Clone, Copy)]
 pub struct Cine {
     pub dims: [usize; 3],
     pub spacing: DVec3,
     pub frames: usize,
-    /// Heart beats within the frames.
+    /// Number of heart beats in all frames.
     pub beats: f64,
     /// Standard deviation of the noise.
     pub noise: f64,
-    /// Half the length of the long axis, mm; all else goes with it.
+    /// Half the length of the long axis in mm; all other lengths scale with it.
     pub size: f64,
     pub papillary: bool,
 }
 
 impl Cine {
-    /// As large as the paper's: 25 frames of 156 × 192 × 25.
+    /// Returns parameters of the paper's size: 25 frames of 156 × 192 × 25 voxels.
     pub fn full() -> Self {
         let spacing = DVec3::new(1.67, 1.67, 5.0);
         Self {
@@ -42,12 +42,12 @@ impl Cine {
         }
     }
 
-    /// Its first frames.
+    /// Returns the same parameters with the first `frames` frames only.
     pub fn first(self, frames: usize) -> Self {
         Self { frames, beats: self.beats * frames as f64 / self.frames as f64, ..self }
     }
 
-    /// What a test can afford: a small heart on few voxels.
+    /// Returns a small heart on few voxels, for fast tests.
     pub fn small() -> Self {
         let spacing = DVec3::new(2.0, 2.0, 2.0);
         Self { dims: [36, 36, 36], spacing, frames: 16, beats: 1.0, noise: 8.0, size: 24.0, papillary: false }
@@ -58,7 +58,7 @@ impl Cine {
         DVec3::new(x, y, z) * self.spacing
     }
 
-    /// 0 in diastole, 1 in systole.
+    /// Returns the contraction at a frame: 0 in diastole, 1 in systole.
     pub fn contraction(&self, frame: f64) -> f64 {
         let phase = frame * self.beats / self.frames as f64;
         let phase = phase - phase.floor();
@@ -66,7 +66,7 @@ impl Cine {
         rise(phase / 0.35) - 0.92 * rise((phase - 0.35) / 0.3) - 0.08 * rise((phase - 0.65) / 0.35)
     }
 
-    /// Signed distances, about, of the cavity and of the heart: negative inside. `p` in the world.
+    /// Returns approximate signed distances from `p`, in world units, to the cavity and to the heart, negative inside.
     fn distances(&self, p: DVec3, contraction: f64) -> (f64, f64) {
         let unit = self.size / 42.0;
         let p = (p - self.middle()) / unit;
@@ -78,7 +78,7 @@ impl Cine {
         let heart = smooth_max(ellipsoid(p, outside), p.z - base - 4.0, 3.0);
         let cavity = if self.papillary {
             [0.7, 3.0].iter().fold(cavity, |d, &angle| {
-                // Away from the wall but for its foot; the gap closes in systole.
+                // Away from the wall except at its base; the gap closes in systole.
                 let away = wide - 9.0 + 4.5 * contraction;
                 let at = DVec3::new(away * libm::cos(angle), away * libm::sin(angle), -12.0);
                 let muscle = ellipsoid(p - at, DVec3::new(5.0, 5.0, 18.0));
@@ -90,7 +90,7 @@ impl Cine {
         (cavity * unit, heart * unit)
     }
 
-    /// Of one voxel before noise, blurred as by its own size.
+    /// Returns the intensity of a voxel before noise; edges are blurred over one voxel.
     fn clean(&self, at: [usize; 3], contraction: f64) -> f64 {
         let p = DVec3::from(at.map(|i| i as f64)) * self.spacing;
         let shade = |p: DVec3| {
@@ -103,13 +103,13 @@ impl Cine {
         if cavity.abs().min(heart.abs()) > self.spacing.max_element() {
             return shade(p);
         }
-        // Slices are thick: what is above and below is in them.
+        // Slices are thick, so the intensity is averaged over their height.
         let steps = 5;
         let along = |k: usize| DVec3::Z * self.spacing.z * ((k as f64 + 0.5) / f64::from(steps) - 0.5);
         (0..steps as usize).map(|k| shade(p + along(k))).sum::<f64>() / f64::from(steps)
     }
 
-    /// The volume; without noise where `noise` is 0.
+    /// Returns the volume; noise-free if `noise` is 0.
     pub fn volume(&self) -> Volume {
         let mut random = Random(17);
         let [nx, ny, nz] = self.dims;
@@ -118,7 +118,7 @@ impl Cine {
             let contraction = self.contraction(frame as f64);
             for i in 0..nx * ny * nz {
                 let clean = self.clean([i % nx, i / nx % ny, i / (nx * ny)], contraction);
-                // Rician, as magnitudes of MR are.
+                // Rician noise, as in MR magnitude images.
                 let (a, b) = (clean + self.noise * normal(&mut random), self.noise * normal(&mut random));
                 values.push(libm::hypot(a, b).round().clamp(0.0, 255.0) as u8);
             }
@@ -135,14 +135,14 @@ impl Cine {
         .unwrap()
     }
 
-    /// A box around the cavity in all frames, in the world.
+    /// Returns a box around the cavity in all frames, in world units.
     pub fn cavity_box(&self) -> [DVec3; 2] {
         let unit = self.size / 42.0;
         let reach = DVec3::new(33.0, 33.0, 50.0) * unit;
         [self.middle() - reach, self.middle() + DVec3::new(reach.x, reach.y, 30.0 * unit)]
     }
 
-    /// The cavity as it is, with triangles of about `step` mm.
+    /// Returns the true surface of the cavity at a frame, with edges of about `step` mm.
     pub fn truth(&self, frame: f64, step: f64) -> TriangleMesh {
         let [low, high] = self.cavity_box();
         let dims = [0, 1, 2].map(|k| ((high[k] - low[k]) / step) as usize + 2);
@@ -166,7 +166,7 @@ fn ellipsoid(p: DVec3, axes: DVec3) -> f64 {
     if gradient > 0.0 { unit * (unit - 1.0) / gradient } else { -axes.min_element() }
 }
 
-/// The larger of two, rounded where they meet.
+/// Returns the maximum of two values, smoothed where they are nearly equal.
 fn smooth_max(a: f64, b: f64, width: f64) -> f64 {
     let h = (width - (a - b).abs()).max(0.0) / width;
     a.max(b) + h * h * width * 0.25

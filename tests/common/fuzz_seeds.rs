@@ -1,4 +1,4 @@
-//! What fuzzing starts from: small files of every kind, and scenes.
+//! Seed inputs for fuzzing: small files of every format, and random scenes.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
 use super::common::{Random, shapes};
@@ -8,10 +8,10 @@ use std::path::Path;
 use vesicle::io::{MeshFormat, write_animation, write_mesh};
 use vesicle::mesh::{Texture, TriangleMesh};
 
-/// A name and the bytes.
+/// A seed input: its file name and its bytes.
 pub type Seed = (String, Vec<u8>);
 
-/// The seeds of a target.
+/// Returns the seeds of a fuzz target.
 pub fn of(target: &str) -> Vec<Seed> {
     match target {
         "nifti" => made(&[
@@ -66,7 +66,7 @@ pub fn of(target: &str) -> Vec<Seed> {
     }
 }
 
-/// Bytes at random: every one is a scene.
+/// Returns random bytes; every byte string describes a scene.
 fn scene(seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
     (0..96).map(|_| random.next() as u8).collect()
@@ -89,7 +89,7 @@ fn hex() -> Seed {
     )
 }
 
-/// A file whose voxels lie where no position in `f32` can be.
+/// Returns a file whose origin is beyond the range of `f32`.
 fn far_away(file: &str) -> Seed {
     let mut bytes = data(file);
     if file.ends_with(".nii") {
@@ -147,7 +147,7 @@ fn movie() -> Vec<Seed> {
     )]
 }
 
-/// The text of a GLB, a 0, and its binary part.
+/// Returns the JSON text of a GLB file, a zero byte, and its binary chunk.
 fn opened(file: &[u8]) -> Vec<u8> {
     let text = u32::from_le_bytes(*file[12..].first_chunk().unwrap()) as usize;
     [&file[20..20 + text], &[0], file.get(28 + text..).unwrap_or_default()].concat()

@@ -1,4 +1,4 @@
-//! What several test files need.
+//! Helpers that several test files use.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
@@ -15,7 +15,7 @@ use std::ops::Range;
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, measure};
 
-/// A small seeded generator (SplitMix64), the same numbers natively and in wasm.
+/// A small seeded random generator (SplitMix64) with the same numbers natively and in wasm.
 pub struct Random(pub u64);
 
 impl Random {
@@ -27,23 +27,23 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Below `n`, which is not 0.
+    /// Returns a random number below `n`, which must not be 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.next() % n as u64) as usize
     }
 
-    /// In `low`..`high`.
+    /// Returns a random number in `low`..`high`.
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * f64::from(self.unit())
     }
 
-    /// In 0..1.
+    /// Returns a random number in 0..1.
     pub fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1u64 << 24) as f32
     }
 }
 
-/// The seeds of a test: `0..usual`, or those of the environment's `FUZZ_SEEDS=<first>..<last>`.
+/// Returns the seeds of a test: `0..usual`, or those of the environment variable `FUZZ_SEEDS=<first>..<last>`.
 pub fn seeds(usual: u64) -> Range<u64> {
     let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..usual };
     let ends =
@@ -52,7 +52,7 @@ pub fn seeds(usual: u64) -> Range<u64> {
     first..last
 }
 
-/// Names the seed of a run that panics. In wasm a panic ends the program, so each seed is said before.
+/// Prints the seed of a test run that panics. In wasm a panic ends the program, so each seed is printed beforehand.
 pub struct Named(pub u64);
 
 impl Named {
@@ -71,7 +71,7 @@ impl Drop for Named {
     }
 }
 
-/// A torus of `n` × `m` vertices around the z axis through `centre`; the radii are those of the ring and of the tube.
+/// Returns a torus of `n` × `m` vertices around the z axis through `centre`, with the given ring and tube radii.
 pub fn torus_around(centre: Vec3, [n, m]: [u32; 2], [ring, tube]: [f32; 2]) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for i in 0..n {
@@ -88,14 +88,15 @@ pub fn torus_around(centre: Vec3, [n, m]: [u32; 2], [ring, tube]: [f32; 2]) -> T
     mesh
 }
 
-/// χ of each component, lowest first.
+/// Returns the Euler characteristic of each component, in ascending order.
 pub fn euler_of_parts(surface: &TriangleMesh) -> Vec<i64> {
     let mut euler: Vec<i64> = surface.components().iter().map(|part| measure(part).euler).collect();
     euler.sort_unstable();
     euler
 }
 
-/// The parts of a surface that are not where they belong: solid ones within others, and cavities not within one.
+/// Describes the components of a surface that are misplaced: solids inside other components, and cavities that are not
+/// inside exactly one.
 pub fn misplaced_parts(surface: &TriangleMesh) -> Vec<String> {
     let parts = surface.components();
     let windings = |k: usize| {
@@ -111,7 +112,7 @@ pub fn misplaced_parts(surface: &TriangleMesh) -> Vec<String> {
     (0..parts.len()).filter_map(misplaced).collect()
 }
 
-/// The solid angle under which a closed surface is seen from `p`: 4π from within.
+/// Returns the solid angle that a closed surface subtends at `p`: 4π if `p` is inside.
 fn solid_angle(surface: &TriangleMesh, p: Vec3) -> f64 {
     let seen = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|i| DVec3::from(surface.positions[i as usize]) - DVec3::from(p));
@@ -121,7 +122,7 @@ fn solid_angle(surface: &TriangleMesh, p: Vec3) -> f64 {
     surface.triangles.iter().map(seen).sum()
 }
 
-/// FNV-1a over the bits of all positions.
+/// Returns the FNV-1a hash of the bits of all positions.
 pub fn fingerprint(positions: &[Vec3]) -> u64 {
     let bytes = positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))

@@ -1,9 +1,9 @@
-//! Points on shapes whose distance is known.
+//! Points on shapes with known signed distance functions.
 
 use crate::common::Random;
 use vesicle::math::{DVec3, Vec3};
 
-/// A body by a function that is its distance near the surface, negative inside. All fit a box of side 2.
+/// A solid as a function that is its signed distance near the surface, negative inside. All shapes fit a box of side 2.
 pub type Shape = fn(DVec3) -> f64;
 
 pub fn sphere(p: DVec3) -> f64 {
@@ -15,7 +15,7 @@ pub fn torus(p: DVec3) -> f64 {
     (ring * ring + p.z * p.z).sqrt() - 0.3
 }
 
-/// A ring with two balls grown into it: genus 1.
+/// A torus blended with two balls: genus 1.
 pub fn blend(p: DVec3) -> f64 {
     let ring = {
         let across = (p.x * p.x + p.y * p.y).sqrt() - 0.62;
@@ -26,14 +26,14 @@ pub fn blend(p: DVec3) -> f64 {
     merged(merged(ring, first), second)
 }
 
-/// Two balls of different size, apart.
+/// Two disjoint balls of different size.
 pub fn pair(p: DVec3) -> f64 {
     let (near, far) =
         (p.distance(DVec3::new(-0.5, 0.0, 0.0)) - 0.5, p.distance(DVec3::new(0.65, 0.2, 0.0)) - 0.35);
     if near < far { near } else { far }
 }
 
-/// The union of two bodies, rounded where they meet.
+/// Returns the union of two solids, blended where they meet.
 fn merged(a: f64, b: f64) -> f64 {
     let width = 0.15;
     let overlap = (width - (a - b).abs()).max(0.0) / width;
@@ -46,12 +46,12 @@ pub fn gradient(shape: Shape, p: DVec3) -> DVec3 {
     DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z))
 }
 
-/// Distance from `p` to the surface, signed; right to second order.
+/// Returns the signed distance from `p` to the surface, accurate to second order.
 pub fn distance(shape: Shape, p: DVec3) -> f64 {
     shape(p) / gradient(shape, p).length()
 }
 
-/// A number of normal distribution.
+/// Returns a random number from the standard normal distribution.
 pub fn normal(random: &mut Random) -> f64 {
     let radius = (-2.0 * libm::log(1.0 - f64::from(random.unit()))).sqrt();
     radius * libm::cos(std::f64::consts::TAU * f64::from(random.unit()))
@@ -62,7 +62,7 @@ pub fn direction(random: &mut Random) -> DVec3 {
     DVec3::from_array(all).normalize_or(DVec3::X)
 }
 
-/// Points spread evenly over a surface, and the outward normals there.
+/// Returns uniformly distributed points of a surface, and the outward normals there.
 pub fn surface_points(shape: Shape, count: usize, random: &mut Random) -> (Vec<DVec3>, Vec<DVec3>) {
     let (mut points, mut normals) = (Vec::new(), Vec::new());
     while points.len() < count {
@@ -80,7 +80,7 @@ pub fn surface_points(shape: Shape, count: usize, random: &mut Random) -> (Vec<D
     (points, normals)
 }
 
-/// Points of a surface, displaced by noise of a standard deviation.
+/// Returns points of a surface, displaced by Gaussian noise of the given standard deviation along each axis.
 pub fn noisy(shape: Shape, count: usize, noise: f64, seed: u64) -> Vec<Vec3> {
     let mut random = Random(seed);
     let (points, _) = surface_points(shape, count, &mut random);

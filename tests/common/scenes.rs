@@ -1,9 +1,9 @@
-//! Synthetic volumes with a known answer.
+//! Synthetic volumes with known surfaces.
 
 use vesicle::math::{DAffine3, Vec3};
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 
-/// A volume whose intensity at voxel index `p` is `value(p)`.
+/// Returns a volume whose intensity at voxel index `p` is `value(p)`.
 pub fn volume(dims: [usize; 3], value: impl Fn(Vec3) -> f32) -> Volume {
     let at = |i: usize| {
         value(Vec3::new((i % dims[0]) as f32, (i / dims[0] % dims[1]) as f32, (i / dims[0] / dims[1]) as f32))
@@ -11,7 +11,7 @@ pub fn volume(dims: [usize; 3], value: impl Fn(Vec3) -> f32) -> Volume {
     placed(Voxels::F32((0..dims[0] * dims[1] * dims[2]).map(at).collect()), dims, DAffine3::IDENTITY)
 }
 
-/// Voxels as they are, placed in the world by `affine`.
+/// Returns a volume of unscaled voxels, placed in the world by `affine`.
 pub fn placed(voxels: Voxels, [nx, ny, nz]: [usize; 3], affine: DAffine3) -> Volume {
     Volume::new(VolumeInit {
         voxels,
@@ -25,24 +25,25 @@ pub fn placed(voxels: Voxels, [nx, ny, nz]: [usize; 3], affine: DAffine3) -> Vol
     .unwrap()
 }
 
-/// Falls with the distance from the skeleton of a shape: 1 up to half of `radius`, 0.5 at `radius`, 0 from 1.5 on.
+/// Returns an intensity that falls with the distance from a skeleton: 1 up to half of `radius`, 0.5 at `radius`, 0
+/// beyond 1.5 times `radius`.
 pub fn potential(distance: f32, radius: f32) -> f32 {
     (1.5 - distance / radius).clamp(0.0, 1.0)
 }
 
-/// Distance from `p` to a circle around the origin in the xy plane.
+/// Returns the distance from `p` to a circle around the origin in the xy plane.
 pub fn to_circle(p: Vec3, radius: f32) -> f32 {
     let ring = (p.x * p.x + p.y * p.y).sqrt() - radius;
     (ring * ring + p.z * p.z).sqrt()
 }
 
-/// Distance from `p` to the straight way from `a` to `b`.
+/// Returns the distance from `p` to the segment from `a` to `b`.
 pub fn to_segment(p: Vec3, a: Vec3, b: Vec3) -> f32 {
     let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
     p.distance(a + (b - a) * along)
 }
 
-/// Figure 7: two linked tori of major radius 16 and tube radius 4.5 as a potential, surface at 0.5.
+/// Figure 7: two linked tori of major radius 16 and tube radius 4.5 as a potential; the surface is at 0.5.
 pub fn chain() -> Volume {
     chain_of(16.0, 4.5, 2.0)
 }
@@ -52,24 +53,24 @@ fn chain_dims(major: f32, tube: f32, margin: f32) -> [usize; 3] {
     [(2.0 * reach + major) as usize, (2.0 * reach) as usize, (2.0 * reach) as usize]
 }
 
-/// Distance to two linked circles about the origin.
+/// Returns the distance from `p` to two linked circles about the origin.
 fn to_linked_circles(p: Vec3, major: f32) -> f32 {
     let half = Vec3::X * 0.5 * major;
     let (a, b) = (p + half, p - half);
     to_circle(a, major).min(to_circle(Vec3::new(b.x, b.z, b.y), major))
 }
 
-/// Two linked tori with `margin` voxels of empty space around them.
+/// Returns a volume of two linked tori with `margin` voxels of empty space around them.
 pub fn chain_of(major: f32, tube: f32, margin: f32) -> Volume {
     let dims = chain_dims(major, tube, margin);
     let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
     volume(dims, |p| potential(to_linked_circles(p - centre, major), tube))
 }
 
-/// Figure 14: the Menger sponge of a depth in 81³ voxels, 1 inside and 0 outside.
+/// Figure 14: the Menger sponge of the given depth in 81³ voxels, 1 inside and 0 outside.
 pub fn menger(depth: u32) -> Volume {
     let solid = |mut x: u32, mut y: u32, mut z: u32| {
-        // The coarsest holes are cut first.
+        // The largest holes are cut first.
         let mut cell = 27;
         for _ in 0..depth {
             let middle = [x, y, z].iter().filter(|&&c| c / cell % 3 == 1).count();
@@ -84,15 +85,15 @@ pub fn menger(depth: u32) -> Volume {
     volume([81, 81, 81], |p| solid(p.x as u32, p.y as u32, p.z as u32))
 }
 
-/// Distance from `p` to the skeleton of [`chain`].
+/// Returns the distance from `p` to the skeleton of [`chain`].
 pub fn to_chain(p: Vec3) -> f32 {
     let centre = Vec3::from(chain_dims(16.0, 4.5, 2.0).map(|n| 0.5 * (n as f32 - 1.0)));
     to_linked_circles(p - centre, 16.0)
 }
 
-/// A vessel that parts in two, three times; in a volume of 64 × 64 × 72 voxels.
+/// A vessel that branches into two, three times; in a volume of 64 × 64 × 72 voxels.
 pub struct VesselTree {
-    /// Both ends and the radius of each branch.
+    /// End points and radius of each branch.
     branches: Vec<(Vec3, Vec3, f32)>,
 }
 
@@ -112,23 +113,23 @@ impl VesselTree {
         Self { branches }
     }
 
-    /// Distance from `p` to the surface, negative inside.
+    /// Returns the signed distance from `p` to the surface, negative inside.
     pub fn distance(&self, p: Vec3) -> f32 {
         let to_branch = |&(a, b, radius): &(Vec3, Vec3, f32)| to_segment(p, a, b) - radius;
         self.branches.iter().map(to_branch).fold(f32::INFINITY, f32::min)
     }
 
-    /// Intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
+    /// Returns a volume whose intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
     pub fn volume(&self) -> Volume {
         volume([64, 64, 72], |p| (0.5 - 0.25 * self.distance(p)).clamp(0.0, 1.0))
     }
 }
 
-/// A head of 256 × 256 × 68 voxels: two nested shells six voxels thick, with holes through them, in noise of deviation
-/// 0.02. The surface is at 0.5.
+/// Returns a head of 256 × 256 × 68 voxels: two nested shells six voxels thick, with holes through them, in noise of
+/// standard deviation 0.02. The surface is at 0.5.
 pub fn head_phantom() -> Volume {
     let centre = Vec3::new(127.5, 127.5, 33.5);
-    // About the distance to an ellipsoid.
+    // The approximate distance to an ellipsoid.
     let to_ellipsoid = |q: Vec3, axes: Vec3| {
         let steepness = (q / (axes * axes)).length().max(1e-6);
         (q / axes).length() * ((q / axes).length() - 1.0) / steepness

@@ -1,4 +1,4 @@
-//! Closed surfaces that are hard in one way each, and one with everything that a file can hold.
+//! Closed surfaces that are each difficult in one respect, and one with every attribute that a mesh file can hold.
 
 use crate::common::scenes::{chain, potential, volume};
 use crate::common::{Random, torus_around};
@@ -6,7 +6,8 @@ use vesicle::math::{Vec2, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh};
 use vesicle::volume::marching_cubes_world;
 
-/// What makes a good mesh flat, a line, a point, too small or too large for squares in single precision, or a thread.
+/// Scale factors that flatten a mesh to a plane, a line or a point, make squares underflow or overflow in single
+/// precision, or stretch it to a thread.
 pub const HOSTILE_SCALES: [Vec3; 6] = [
     Vec3::new(1.0, 1.0, 0.0),
     Vec3::new(1.0, 0.0, 0.0),
@@ -16,14 +17,14 @@ pub const HOSTILE_SCALES: [Vec3; 6] = [
     Vec3::new(100.0, 1e-3, 1e-3),
 ];
 
-/// A ball about the origin, its points stretched.
+/// Returns a unit sphere about the origin, scaled by `stretch`.
 pub fn ellipsoid(edge: f32, stretch: Vec3) -> TriangleMesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles();
     mesh.positions.iter_mut().for_each(|p| *p *= stretch);
     TriangleMesh { normals: None, ..mesh }
 }
 
-/// The octahedron |x| + |y| + |z| = 1, with every extra that a mesh can have.
+/// Returns the octahedron |x| + |y| + |z| = 1, with normals, texture coordinates and colours at its vertices.
 pub fn octahedron() -> TriangleMesh {
     let quarter = |[x, y]: [u32; 2]| [[x, y, 4], [y, x, 5]];
     let positions = vec![Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::Z, -Vec3::Z];
@@ -37,13 +38,13 @@ pub fn octahedron() -> TriangleMesh {
     }
 }
 
-/// The same without any extra.
+/// Returns the octahedron without any attributes.
 pub fn bare_octahedron() -> TriangleMesh {
     let TriangleMesh { positions, triangles, .. } = octahedron();
     TriangleMesh { positions, triangles, ..TriangleMesh::default() }
 }
 
-/// The octahedron with a seam: one triangle has texture coordinates of its own.
+/// Returns the octahedron with a seam: one triangle has texture coordinates of its own.
 pub fn octahedron_with_seam() -> TriangleMesh {
     let mesh = octahedron();
     let uvs = mesh.uvs.clone().unwrap_or_default();
@@ -52,7 +53,7 @@ pub fn octahedron_with_seam() -> TriangleMesh {
     TriangleMesh { uvs: None, corner_uvs: Some(corner_uvs), ..mesh }
 }
 
-/// Several surfaces as one.
+/// Joins several meshes into one.
 pub fn joined(parts: &[TriangleMesh]) -> TriangleMesh {
     let mut all = TriangleMesh::default();
     for part in parts {
@@ -73,7 +74,8 @@ fn inside_out(mut mesh: TriangleMesh) -> TriangleMesh {
     mesh
 }
 
-/// A box in squares of two triangles each, `n` along each axis; the size is that of the whole.
+/// Returns a box whose faces are grids of squares, two triangles each, with `n` squares along each axis; `size` is that
+/// of the box.
 pub fn cuboid(n: [u32; 3], size: Vec3) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut names = std::collections::BTreeMap::new();
@@ -99,7 +101,7 @@ pub fn cuboid(n: [u32; 3], size: Vec3) -> TriangleMesh {
     mesh
 }
 
-/// A ball of voxels with noise: rough all over, with crumbs and handles.
+/// Returns the contour of a ball with noise: rough, with small components and handles.
 pub fn noisy_ball() -> TriangleMesh {
     let noise = |p: Vec3| Random((p.x + 32.0 * (p.y + 32.0 * p.z)) as u64).unit();
     let centre = Vec3::splat(15.5);
@@ -107,7 +109,7 @@ pub fn noisy_ball() -> TriangleMesh {
     marching_cubes_world(&noisy, 0.65, 0).unwrap()
 }
 
-/// A gyroid in a ball: one surface with many handles, as marching cubes give it.
+/// Returns the marching-cubes surface of a gyroid in a ball: one component with many handles.
 pub fn gyroid() -> TriangleMesh {
     let centre = Vec3::splat(23.5);
     let solid = volume([48; 3], |p| {
@@ -118,7 +120,7 @@ pub fn gyroid() -> TriangleMesh {
     marching_cubes_world(&solid, 0.0, 0).unwrap()
 }
 
-/// A ball with twelve thorns.
+/// Returns a ball with twelve spikes.
 pub fn thorny() -> TriangleMesh {
     let thorns = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles().positions;
     let mut mesh = ellipsoid(0.05, Vec3::ONE);
@@ -129,7 +131,7 @@ pub fn thorny() -> TriangleMesh {
     mesh
 }
 
-/// A spindle: ten long triangles from one tip to the other.
+/// Returns a spindle: ten long triangles between its two tips.
 pub fn spindle() -> TriangleMesh {
     let around = |k: u32| {
         let (sine, cosine) = libm::sincosf(k as f32 * std::f32::consts::TAU / 5.0);
@@ -141,7 +143,7 @@ pub fn spindle() -> TriangleMesh {
     TriangleMesh { positions, triangles, ..Default::default() }
 }
 
-/// All of them, by name.
+/// Returns all shapes with their names.
 pub fn all() -> Vec<(&'static str, TriangleMesh)> {
     let ball = ellipsoid(0.1, Vec3::ONE);
     vec![

@@ -1,34 +1,34 @@
-//! What holds for every skin over ellipsoids, whatever was done to it.
+//! Properties that hold for every surface over ellipsoids, checked by the tests of the multiresolution model.
 #![allow(clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
 use vesicle::math::{DVec3, Vec3, triangle};
-use vesicle::mesh::{Mesh, count_crossings, measure};
+use vesicle::mesh::{Mesh, count_self_intersections, measure};
 use vesicle::methods::StepReport;
 use vesicle::methods::multires::{ControlEllipsoid, MultiresolutionModel};
 
-/// A ball.
+/// Returns a ball as a control ellipsoid.
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> ControlEllipsoid {
     ellipsoid([x, y, z], [radius; 3])
 }
 
-/// An ellipsoid along the axes.
+/// Returns an axis-aligned ellipsoid.
 pub fn ellipsoid(center: [f64; 3], [a, b, c]: [f64; 3]) -> ControlEllipsoid {
     ControlEllipsoid { center, axes: [[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]] }
 }
 
-/// The same turned about z.
+/// Returns the ellipsoid rotated about the z axis through its centre by an angle in radians.
 pub fn turned(e: &ControlEllipsoid, angle: f64) -> ControlEllipsoid {
     let (sine, cosine) = angle.sin_cos();
     let turn = |[x, y, z]: [f64; 3]| [cosine * x - sine * y, sine * x + cosine * y, z];
     ControlEllipsoid { center: e.center, axes: e.axes.map(turn) }
 }
 
-/// The shortest semi-axis.
+/// Returns the length of the shortest semi-axis.
 pub fn thinnest(e: &ControlEllipsoid) -> f64 {
     e.axes.iter().map(|axis| DVec3::from(*axis).length()).fold(f64::MAX, f64::min)
 }
 
-/// Distance from the middle, 1 on the surface.
+/// Returns the distance from the centre, scaled so that it is 1 on the surface.
 pub fn unit_distance(e: &ControlEllipsoid, p: DVec3) -> f64 {
     let way = p - DVec3::from(e.center);
     let along = e.axes.map(|axis| {
@@ -38,19 +38,19 @@ pub fn unit_distance(e: &ControlEllipsoid, p: DVec3) -> f64 {
     DVec3::from(along).length()
 }
 
-/// About how deep inside an ellipsoid the deepest vertex is, in its shortest semi-axis.
+/// Returns approximately how deep the deepest vertex is inside an ellipsoid, relative to its shortest semi-axis.
 pub fn penetration(mesh: &Mesh, e: &ControlEllipsoid) -> f64 {
     let depth = |v| 1.0 - unit_distance(e, mesh.position(v).as_dvec3());
     mesh.vertices().map(depth).fold(0.0, f64::max)
 }
 
-/// Times that the surface goes round a point: 1 inside.
+/// Returns the winding number of the surface around a point: 1 inside.
 pub fn winding(mesh: &Mesh, p: Vec3) -> f64 {
     let angles = mesh.triangles().map(|corners| triangle::solid_angle(mesh.facet(corners).points, p));
     angles.sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
-/// Whether the middle and the ends of the axes, drawn in by a `share`, are inside.
+/// Returns whether the centre and the end points of the axes, shortened by the fraction `share`, are inside the mesh.
 pub fn covers(mesh: &Mesh, e: &ControlEllipsoid, share: f64) -> bool {
     let center = DVec3::from(e.center);
     let ends = e
@@ -60,11 +60,12 @@ pub fn covers(mesh: &Mesh, e: &ControlEllipsoid, share: f64) -> bool {
     ends.chain([center]).all(|p| (winding(mesh, p.as_vec3()) - 1.0).abs() < 0.1)
 }
 
-/// Both surfaces are closed, oriented, manifold, as the edits predict, and cross nothing.
+/// Asserts that both surfaces are closed, oriented, manifold and free of self-intersections, and that the topology is
+/// as reported.
 pub fn assert_sound(model: &MultiresolutionModel, report: &StepReport) {
     for mesh in [model.base_mesh(), model.mesh()] {
         assert_eq!(mesh.check(), Ok(()));
-        assert_eq!(count_crossings(&mesh.to_triangles()), 0, "frame {}", report.iteration);
+        assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "frame {}", report.iteration);
     }
     let measures = measure(&model.base_mesh().to_triangles());
     assert_eq!(measures.components as u32, report.components);
@@ -72,7 +73,8 @@ pub fn assert_sound(model: &MultiresolutionModel, report: &StepReport) {
     assert_eq!(measure(&model.mesh().to_triangles()).euler, measures.euler);
 }
 
-/// How far inside an ellipsoid the middle of a triangle is whose corners are on it, in its shortest semi-axis: twice as much.
+/// Returns an upper bound, with a margin, of how deep a triangle with vertices on an ellipsoid cuts into it, relative
+/// to its shortest semi-axis.
 pub fn chord(model: &MultiresolutionModel, e: &ControlEllipsoid) -> f64 {
     let longest = e.axes.iter().map(|axis| DVec3::from(*axis).length()).fold(0.0, f64::max);
     let roundest = thinnest(e) * thinnest(e) / longest;
@@ -80,7 +82,7 @@ pub fn chord(model: &MultiresolutionModel, e: &ControlEllipsoid) -> f64 {
     0.5 * edge * edge / roundest / thinnest(e)
 }
 
-/// No vertex is inside an ellipsoid, and each is inside the surface.
+/// Asserts that no vertex is inside an ellipsoid and that the surface encloses every ellipsoid.
 pub fn assert_held(model: &MultiresolutionModel) {
     let mesh = model.base_mesh();
     for e in model.ellipsoids() {
@@ -90,7 +92,7 @@ pub fn assert_held(model: &MultiresolutionModel) {
     }
 }
 
-/// Steps until done, with all of that after every frame.
+/// Steps until done and asserts after each frame that the model is sound; panics after `most` frames.
 pub fn settle(model: &mut MultiresolutionModel, most: usize) -> StepReport {
     for _ in 0..most {
         let report = model.step().unwrap_or_else(|error| panic!("{error}"));

@@ -1,11 +1,11 @@
-//! The layers of the crate: no module uses one above it, and no method uses another.
+//! The layers of the crate: no module uses a module of a higher layer, and no method uses another method.
 //!
-//! Reads the sources, so it runs natively only.
+//! Reads the source files, so it runs natively only.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What each module may use besides itself. `lib.rs` says the same in words.
+/// The modules that each module may use besides itself. `lib.rs` documents the same order.
 const ALLOWED: [(&str, &[&str]); 8] = [
     ("math", &[]),
     ("mesh", &["math"]),
@@ -17,7 +17,7 @@ const ALLOWED: [(&str, &[&str]); 8] = [
     ("bindings", &["math", "mesh", "spatial", "volume", "remesh", "methods", "io"]),
 ];
 
-/// The names that follow `prefix` anywhere in the code: `crate::a::b` and `crate::{a::b, c}` give a; a and c.
+/// Returns the names that follow `prefix` anywhere in the code: `crate::a::b` and `crate::{a::b, c}` give a; a and c.
 fn names_after(prefix: &str, code: &str) -> Vec<String> {
     let bare = without_comments(code);
     bare.match_indices(prefix)
@@ -33,7 +33,7 @@ fn without_comments(code: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// The first name of a path, or of each path in a group in braces.
+/// Returns the first name of a path, or of each path of a group in braces.
 fn heads(path: &str) -> Vec<String> {
     let Some(group) = path.strip_prefix('{') else {
         return vec![path.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect()];
@@ -63,7 +63,7 @@ fn split_outside_braces(list: &str) -> Vec<String> {
     parts
 }
 
-/// Modules of the crate that `code`, part of `module`, uses and may not.
+/// Returns the modules of the crate that `code`, part of `module`, uses and must not.
 fn forbidden(module: &str, code: &str) -> Vec<String> {
     let known = |name: &str| ALLOWED.iter().find(|(module, _)| *module == name);
     let allowed = known(module).map_or(&[][..], |(_, allowed)| *allowed);
@@ -72,7 +72,7 @@ fn forbidden(module: &str, code: &str) -> Vec<String> {
     used
 }
 
-/// Other methods that `code`, part of one, uses.
+/// Returns the other methods that `code`, part of the method `method`, uses.
 fn other_methods(method: &str, methods: &[String], code: &str) -> Vec<String> {
     let mut used = names_after("crate::methods::", code);
     used.extend(names_after("super::super::", code));
@@ -104,7 +104,7 @@ fn folders(path: &Path) -> Vec<String> {
 }
 
 #[test]
-fn every_module_has_a_place_in_the_layers() {
+fn every_module_belongs_to_a_layer() {
     for module in folders(&source("")) {
         assert!(
             ALLOWED.iter().any(|(name, _)| *name == module),
@@ -114,7 +114,7 @@ fn every_module_has_a_place_in_the_layers() {
 }
 
 #[test]
-fn no_module_uses_one_above_it() {
+fn no_module_uses_a_higher_layer() {
     let mut files = 0;
     for (module, _) in ALLOWED {
         for file in rust_files(&source(module)) {
@@ -138,7 +138,7 @@ fn no_method_uses_another() {
 }
 
 #[test]
-fn an_import_that_points_up_is_found() {
+fn an_import_of_a_higher_layer_is_detected() {
     assert_eq!(forbidden("mesh", "use crate::volume::Volume;"), ["volume"]);
     assert_eq!(forbidden("math", "use crate::{mesh::{Mesh, Ring}, math::Vec3, io};"), ["mesh", "io"]);
     assert_eq!(forbidden("io", "fn f() -> crate::spatial::Tree {}"), ["spatial"]);

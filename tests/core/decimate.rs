@@ -1,18 +1,18 @@
-//! Decimation: fewer triangles, the same topology, nothing crosses, and little of the shape is lost.
+//! Decimation: the target is reached, the topology is preserved, nothing intersects, and the shape changes little.
 
 use crate::common::scenes;
 use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::decimate;
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// The mesh with `target` triangles or less, after all promises were checked.
+/// Returns the mesh decimated to at most `target` triangles if possible, after checking all guarantees.
 fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
-    assert_eq!(count_crossings(mesh), 0, "a crossing in the test's own mesh");
+    assert_eq!(count_self_intersections(mesh), 0, "the test mesh intersects itself");
     let mut dynamic = Mesh::from_triangles(mesh).unwrap();
     let collapses = decimate(&mut dynamic, target);
     assert_eq!(dynamic.check(), Ok(()));
@@ -24,7 +24,7 @@ fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
     coarse
 }
 
-/// Reaches the target, and keeps the volume but for `share`.
+/// Asserts that decimation reaches the target and changes the volume by less than the fraction `share`.
 fn keeps_volume(mesh: &TriangleMesh, target: usize, share: f64) {
     let coarse = decimated(mesh, target);
     let count = coarse.triangles.len();
@@ -42,14 +42,14 @@ fn surface(volume: &Volume, iso: f64) -> TriangleMesh {
 }
 
 #[test]
-fn a_ball() {
+fn a_ball_keeps_its_volume() {
     for (target, share) in [(1000, 0.005), (301, 0.02), (100, 0.06)] {
         keeps_volume(&ball(0.06), target, share);
     }
 }
 
 #[test]
-fn a_torus() {
+fn a_torus_keeps_its_volume() {
     let torus = torus_around(Vec3::ZERO, [120, 40], [3.0, 1.0]);
     for (target, share) in [(2000, 0.005), (500, 0.02), (100, 0.1)] {
         keeps_volume(&torus, target, share);
@@ -62,15 +62,15 @@ fn linked_rings_stay_linked() {
     for (target, share) in [(chain.triangles.len() / 10, 0.01), (400, 0.05)] {
         keeps_volume(&chain, target, share);
     }
-    // As coarse as it gets, where the rings are in each other's way.
+    // As coarse as possible, until the rings obstruct each other.
     let coarse = decimated(&chain, 1);
     assert!(coarse.triangles.len() < 100, "{} triangles", coarse.triangles.len());
 }
 
-/// A ball with noise so strong that crumbs float around it and holes go through it.
+/// A ball with noise so strong that small components float around it and holes go through it.
 #[test]
-fn a_noisy_surface() {
-    // By place, so that the order of voxels does not matter.
+fn a_noisy_surface_keeps_its_topology() {
+    // A function of position, so that the order of voxels does not matter.
     let noise = |p: Vec3| Random((p.x + 32.0 * (p.y + 32.0 * p.z)) as u64).unit();
     let centre = Vec3::splat(15.5);
     let noisy = scenes::volume([32; 3], |p| scenes::potential(p.distance(centre), 10.0) + 0.5 * noise(p));
@@ -84,9 +84,9 @@ fn a_noisy_surface() {
     decimated(&mesh, 1);
 }
 
-/// Two sheets much nearer to each other than the edges that are asked for.
+/// Two sheets much nearer to each other than the resulting edges are long.
 #[test]
-fn a_thin_shell() {
+fn a_thin_shell_does_not_intersect_itself() {
     let inner = ball(0.1);
     let mut shell = TriangleMesh { normals: None, ..inner.clone() };
     let first = shell.positions.len() as u32;
@@ -98,9 +98,9 @@ fn a_thin_shell() {
     }
 }
 
-/// Specks just below the surface, where the triangles of a coarser ball pass beneath them.
+/// Tiny components just below the surface, where triangles of a coarser ball would pass beneath them.
 #[test]
-fn specks_inside_stay_inside() {
+fn small_components_inside_a_ball_stay_inside() {
     let mut mesh = Mesh::from_triangles(&ball(0.05)).unwrap();
     let ball_vertices = mesh.vertex_count();
     let mut random = Random(3);
@@ -119,8 +119,8 @@ fn specks_inside_stay_inside() {
 }
 
 #[test]
-fn flat_parts_and_sharp_edges() {
-    // A box of 2 × 3 × 4 voxels, cut to pieces of a tenth.
+fn a_box_keeps_its_corners() {
+    // A box of 2 × 3 × 4, sampled with voxels of a tenth.
     let mesh = surface(
         &scenes::volume([30, 40, 50], |p| {
             let inside = |c: f32, n: f32| (c - 4.5).min(n - 5.5 - c);
@@ -137,13 +137,13 @@ fn flat_parts_and_sharp_edges() {
 }
 
 #[test]
-fn four_triangles_are_the_least_of_a_ball() {
+fn a_ball_is_reduced_to_a_tetrahedron_at_most() {
     assert_eq!(decimated(&ball(0.2), 1).triangles.len(), 4);
     assert_eq!(decimated(&ball(0.2), 4).triangles.len(), 4);
 }
 
 #[test]
-fn nothing_to_do_changes_nothing() {
+fn a_target_above_the_triangle_count_changes_nothing() {
     let before = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
     let mut mesh = before.clone();
     for target in [mesh.triangle_count(), mesh.triangle_count() + 1, usize::MAX] {
@@ -156,7 +156,7 @@ fn nothing_to_do_changes_nothing() {
 }
 
 #[test]
-fn what_crosses_keeps_its_topology() {
+fn self_intersecting_meshes_keep_their_topology() {
     let mut mesh = Mesh::from_triangles(&ball(0.1)).unwrap();
     let shifted = Mesh::icosphere(Vec3::X * 0.7, 1.0, 0.1).unwrap();
     mesh.append(&shifted).unwrap();
@@ -166,9 +166,9 @@ fn what_crosses_keeps_its_topology() {
     assert!(mesh.triangle_count() < before / 2);
 }
 
-/// Flat, doubled, tiny and huge ones: the work ends, the invariants hold.
+/// Flat, collapsed, tiny and huge meshes: decimation terminates, and the invariants hold.
 #[test]
-fn hostile_meshes() {
+fn degenerate_meshes_stay_valid() {
     for size in HOSTILE_SCALES {
         let mut mesh = Mesh::from_triangles(&ball(0.3)).unwrap();
         mesh.positions_mut().iter_mut().for_each(|p| *p *= size);
@@ -181,7 +181,7 @@ fn hostile_meshes() {
 }
 
 #[test]
-fn the_same_every_time() {
+fn decimation_is_deterministic() {
     let run = || {
         let mut mesh = Mesh::from_triangles(&surface(&scenes::chain(), 0.5)).unwrap();
         decimate(&mut mesh, 1500);

@@ -1,10 +1,10 @@
-//! The deformable model against shapes with a known answer, and its promises: sound at every iteration, the same bits
-//! every time, clear refusals.
+//! The deformable model on shapes with known surfaces, and its guarantees: a valid mesh at every iteration,
+//! reproducible bits, clear errors.
 
 use crate::common::euler_of_parts;
 use crate::common::scenes;
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
-use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
 };
@@ -13,15 +13,15 @@ use vesicle::volume::{Volume, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Steps to the end or `most` iterations; after every one the mesh is sound and does not cross itself.
+/// Steps until done or for `most` iterations; asserts after each that the mesh is valid and free of self-intersections.
 fn run(model: &mut DeformableModel, most: u32) -> StepReport {
     loop {
         let report = model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "iteration {}", report.iteration);
         assert_eq!(report.euler as i64, model.mesh().euler());
         assert!((0.0..=1.0).contains(&report.progress) && (report.progress == 1.0 || !report.done));
-        let crossing = count_crossings(&model.mesh().to_triangles());
-        assert_eq!(crossing, 0, "iteration {}", report.iteration);
+        let self_intersections = count_self_intersections(&model.mesh().to_triangles());
+        assert_eq!(self_intersections, 0, "iteration {}", report.iteration);
         if report.done || report.iteration >= most {
             return report;
         }
@@ -36,7 +36,7 @@ fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> Deformabl
     DeformableParams { iso, rigidity, stiffness, ..DeformableParams::for_volume(volume) }
 }
 
-/// Edge of the chain scene: its gap of seven voxels is then four δ wide.
+/// Target edge length of the chain scene; its gap of seven voxels is then four δ wide.
 const CHAIN_EDGE: f64 = 3.15;
 
 fn the_chain_is_two_rings(most: u32, options: DeformableOptions) {
@@ -89,7 +89,7 @@ fn surface_of(volume: &Volume, options: DeformableOptions) -> (DeformableModel, 
     (model, measures)
 }
 
-/// The radius of the ball of the same volume.
+/// Returns the radius of the ball of equal volume.
 fn radius_of(found: &Measures) -> f64 {
     libm::cbrt(found.volume * 3.0 / (4.0 * std::f64::consts::PI))
 }
@@ -117,7 +117,7 @@ fn a_ball_is_found_from_every_start() {
 }
 
 #[test]
-fn the_mean_edge_is_the_edge_asked_for() {
+fn the_mean_edge_is_the_target_edge() {
     let volume = ball([40, 40, 40], 13.0);
     for edge in [1.2, 2.0, 3.0] {
         let params = Some(DeformableParams { adaptivity: 0.0, ..DeformableParams::for_volume(&volume) });
@@ -153,7 +153,8 @@ fn the_darker_object_is_found_with_the_opposite_sign() {
     close("radius", radius_of(&found), 8.0, 0.015);
 }
 
-/// Voxels of 1 × 2 × 4 in a sheared, mirrored world: the model evolves where voxels are cubes and answers in world.
+/// Voxels of 1 × 2 × 4 in a sheared, mirrored world: the model evolves in a space of cubic voxels and returns world
+/// positions.
 #[test]
 fn anisotropic_mirrored_volumes_come_out_right_in_world_space() {
     let linear =
@@ -221,7 +222,7 @@ fn fixed_topology_moves_vertices_and_keeps_every_edge() {
 }
 
 #[test]
-fn speeds_are_the_way_of_each_vertex_along_its_normal() {
+fn speeds_are_displacements_along_the_normal_per_time() {
     let volume = ball([24, 24, 24], 6.0);
     let params = DeformableParams {
         topology: Topology::Fixed,
@@ -246,7 +247,7 @@ fn speeds_are_the_way_of_each_vertex_along_its_normal() {
         let way = (after.positions[i] - before[i]).dot(*normal) / 0.5;
         assert!((speeds[i] - way).abs() < 1e-4, "vertex {i}: {} for {way}", speeds[i]);
     }
-    // The surface around the ball comes in.
+    // The enclosing surface moves inwards.
     assert!(speeds.iter().all(|&speed| speed < 0.0));
 }
 
@@ -266,7 +267,7 @@ fn stiffness_and_rest_lengths_even_out_edges() {
 }
 
 #[test]
-fn an_attractor_pulls_the_surface_and_lets_go() {
+fn an_attractor_pulls_the_surface_until_it_is_removed() {
     let volume = ball([40, 40, 40], 9.0);
     let (mut model, before) = surface_of(&volume, enclosing());
     let point = DVec3::new(34.0, 19.5, 19.5);
@@ -283,7 +284,7 @@ fn an_attractor_pulls_the_surface_and_lets_go() {
 }
 
 #[test]
-fn a_state_goes_on_bit_for_bit() {
+fn a_restored_run_continues_bit_for_bit() {
     let volume = scenes::chain();
     let options = || DeformableOptions {
         start: Start::Bubbles(9),
@@ -301,14 +302,14 @@ fn a_state_goes_on_bit_for_bit() {
     assert!(other.save() == state);
     for _ in 0..20 {
         assert_eq!(model.step().unwrap(), other.step().unwrap());
-        // Not assert_eq: it would print both.
+        // Not assert_eq, which would print both.
         assert!(model.save() == other.save());
     }
     assert!(model.save() == other.save());
 }
 
 #[test]
-fn a_state_of_any_iteration_goes_on_bit_for_bit() {
+fn a_run_restored_at_any_iteration_continues_bit_for_bit() {
     let volume = scenes::chain();
     let new =
         || DeformableModel::new(&volume, DeformableOptions { levels: 1, ..Default::default() }).unwrap();
@@ -325,7 +326,7 @@ fn a_state_of_any_iteration_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn damaged_states_are_refused_and_nothing_is_lost() {
+fn damaged_states_are_refused_and_change_nothing() {
     let volume = ball([24, 24, 24], 6.0);
     let mut model = DeformableModel::new(&volume, enclosing()).unwrap();
     for _ in 0..5 {
@@ -352,7 +353,7 @@ fn damaged_states_are_refused_and_nothing_is_lost() {
 }
 
 #[test]
-fn live_parameters_are_taken_whole_or_not_at_all() {
+fn parameters_are_set_together_or_not_at_all() {
     let volume = ball([24, 24, 24], 6.0);
     let (mut model, small) = surface_of(&volume, enclosing());
     let bad = DeformableParams { damping: -1.0, iso: 0.9, ..model.params().clone() };
@@ -365,7 +366,7 @@ fn live_parameters_are_taken_whole_or_not_at_all() {
 }
 
 #[test]
-fn refusals_name_the_option_and_what_is_accepted() {
+fn errors_name_the_option_and_what_is_accepted() {
     let volume = ball([24, 24, 24], 6.0);
     let refusal = |options| DeformableModel::new(&volume, options).unwrap_err().to_string();
     let of = |start| refusal(DeformableOptions { start, ..Default::default() });
@@ -420,12 +421,12 @@ fn flat_and_tiny_volumes_have_an_enclosing_start() {
                 DeformableOptions { start: Start::Enclosing, edge: Some(edge), ..Default::default() };
             let model = DeformableModel::new(&volume, options).unwrap();
             assert_eq!((model.mesh().check(), model.mesh().euler()), (Ok(()), 2), "{dims:?} {edge}");
-            assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "{dims:?} {edge}");
+            assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "{dims:?} {edge}");
         }
     }
 }
 
-/// Around what is bright, not around all of the image; with room, and wherever it lies.
+/// The enclosing start surrounds the bright object, not the whole image, with a margin, wherever the object is.
 #[test]
 fn the_enclosing_start_is_around_the_object() {
     for (dims, centres, radius) in [
@@ -463,7 +464,7 @@ fn the_enclosing_start_is_around_the_object() {
 }
 
 #[test]
-fn an_empty_image_lets_the_surface_vanish() {
+fn in_an_empty_image_the_surface_vanishes() {
     let volume = scenes::volume([12, 12, 12], |_| 0.0);
     let params = Some(params(&volume, 0.5, 0.1, 0.0));
     let mut model = DeformableModel::new(
@@ -476,9 +477,9 @@ fn an_empty_image_lets_the_surface_vanish() {
     assert!(model.surface().triangles.is_empty());
 }
 
-/// Nothing stops an inflating force but the domain; nothing stops an absurd sampling but the bound on vertices.
+/// Only the domain limits an inflating force; only the bound on vertices limits an absurdly fine sampling.
 #[test]
-fn a_surface_that_inflates_for_ever_stays_in_its_domain() {
+fn an_inflating_surface_stays_in_its_domain() {
     let volume = ball([16, 16, 16], 4.0);
     let inflating = DeformableParams { iso_force: 1.0, iso: 1.0, ..params(&volume, 1.0, 0.0, 0.0) };
     let options =
@@ -512,9 +513,10 @@ fn a_start_mesh_turned_inside_out_is_refused() {
     assert!(refusal.contains("face inwards"), "{refusal}");
 }
 
-/// Both sides of a cut handle are one component: it was removed twice, and two vertices later shared a slot.
+/// Both sides of a cut handle are the same component. Regression: it was removed twice, and two vertices later shared a
+/// slot.
 #[test]
-fn a_handle_too_thin_to_keep_vanishes_once() {
+fn a_cut_handle_is_removed_once() {
     let volume = ball([24, 24, 24], 7.0);
     let torus = crate::common::torus_around(Vec3::splat(4.0), [8, 3], [1.3, 0.25]);
     let mut start = Mesh::from_triangles(&torus).unwrap();
@@ -524,9 +526,9 @@ fn a_handle_too_thin_to_keep_vanishes_once() {
     assert_eq!(euler_of_parts(&model.surface()), [2]);
 }
 
-/// Numbers that overflow when they are scaled: the surface neither vanishes nor stands still.
+/// Numbers that overflow when they are scaled: the surface neither vanishes nor stops.
 #[test]
-fn numbers_beyond_all_measure_push_or_are_refused() {
+fn huge_numbers_move_the_surface_or_are_refused() {
     let volume = ball([24, 24, 24], 7.0);
     let mut model = DeformableModel::new(&volume, enclosing()).unwrap();
     let before = measure(&model.surface()).volume;
@@ -543,9 +545,10 @@ fn numbers_beyond_all_measure_push_or_are_refused() {
     }
 }
 
-/// A surface that has just begun to move is slow too. (The implicit integrator is there after 600 of its long steps.)
+/// A surface that has just begun to move is slow as well, but has not converged. (The implicit integrator takes longer
+/// steps and has converged after 600 of them.)
 #[test]
-fn small_time_steps_are_no_rest() {
+fn small_time_steps_are_not_taken_for_convergence() {
     let volume = ball([24, 24, 24], 7.0);
     for (time_step, mass, iso) in [(0.02, 1.0, 0.5), (0.01, 100.0, 0.2)] {
         let integrator = Integrator::Euler;
@@ -557,7 +560,7 @@ fn small_time_steps_are_no_rest() {
     }
 }
 
-/// Small differences on top of a number that f32 cannot tell apart from its neighbours.
+/// Small differences added to an intensity so large that f32 cannot resolve them.
 #[test]
 fn intensities_far_from_zero_keep_their_contrast() {
     let near = ball([24, 24, 24], 7.0).intensities(0).unwrap();
@@ -567,9 +570,9 @@ fn intensities_far_from_zero_keep_their_contrast() {
     close("radius", radius_of(&found), 7.0, 0.02);
 }
 
-/// Seeds and attractors are round in the world, whatever the voxels are.
+/// Seeds and attractors are spheres in world space, whatever the voxel sizes.
 #[test]
-fn seeds_and_attractors_are_round_in_the_world() {
+fn seeds_and_attractors_are_spheres_in_world_space() {
     let tall = DAffine3::from_scale(DVec3::new(1.0, 1.0, 4.0));
     let volume = scenes::placed(Voxels::F32(vec![0.0; 32 * 32 * 8]), [32, 32, 8], tall);
     let middle = DVec3::splat(15.0);
@@ -593,9 +596,9 @@ fn seeds_and_attractors_are_round_in_the_world() {
     assert!(moved_by(middle + DVec3::Z * 11.0).z > 0.1, "felt 2 above the top");
 }
 
-/// A saved state brings its edge length along, and the bounds that follow from it.
+/// A restored state includes its edge length and the bounds derived from it.
 #[test]
-fn a_state_of_another_edge_goes_on() {
+fn a_state_with_another_edge_length_continues() {
     let volume = ball([32, 32, 32], 10.0);
     let options =
         |edge| DeformableOptions { start: Start::Enclosing, edge: Some(edge), ..Default::default() };
@@ -607,17 +610,17 @@ fn a_state_of_another_edge_goes_on() {
 }
 
 #[test]
-fn a_volume_too_long_for_memory_is_refused_at_once() {
+fn a_volume_whose_mesh_exceeds_memory_is_refused_at_once() {
     let volume = scenes::volume([20_000, 1, 1], |p| p.x);
     let refusal = DeformableModel::new(&volume, enclosing()).unwrap_err();
     assert!(matches!(refusal, MethodError::TooManyVertices { .. }), "{refusal}");
 }
 
-/// On a coarse level, some vertices of this tooth lie where the image is so steep that they swung to and fro for ever under the
-/// force that coarse levels have.
+/// Regression: on a coarse level, some vertices of this tooth are where the image is so steep that they oscillated
+/// forever under the forces of coarse levels.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
-fn a_swing_on_a_coarse_level_comes_to_rest() {
+fn oscillations_on_a_coarse_level_converge() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/tooth.nrrd");
     let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
     let mut model = DeformableModel::new(
@@ -638,10 +641,11 @@ fn a_swing_on_a_coarse_level_comes_to_rest() {
     assert!(report.iteration > 600, "nothing swings any more: {} iterations", report.iteration);
 }
 
-/// Regression: with a strong image force, vertices moved to and fro across the steps of noisy images; this took 1,399 iterations.
+/// Regression: with a strong image force, vertices oscillated across intensity steps of noisy images; this took 1,399
+/// iterations.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
-fn a_surface_between_steps_of_the_image_comes_to_rest() {
+fn oscillations_in_a_noisy_image_converge() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head.nii.gz");
     let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
     let params = |iso| DeformableParams { iso, iso_force: -10.0, ..params(&volume, iso, 0.05, 0.001) };
@@ -653,5 +657,5 @@ fn a_surface_between_steps_of_the_image_comes_to_rest() {
     while !model.step().unwrap().done {}
     let iterations = model.step().unwrap().iteration - before;
     assert!(iterations <= 150, "done after {iterations}");
-    assert_eq!(count_crossings(&model.mesh().to_triangles()), 0);
+    assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0);
 }

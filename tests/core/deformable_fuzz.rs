@@ -1,11 +1,11 @@
-//! The deformable model under random images, starts and parameters: sound after every step, whatever they are.
+//! The deformable model with random images, starts and parameters: the mesh is valid after every step.
 //!
-//! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
+//! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
 use crate::common::scenes;
 use crate::common::{Named, Random, misplaced_parts, seeds};
 use vesicle::math::{DVec3, Vec3};
-use vesicle::mesh::count_crossings;
+use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Seeding, Start,
 };
@@ -15,14 +15,14 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 const STEPS: usize = 40;
 
-/// Where the usual seeds end; in wasm, which is slower to report, fewer do.
+/// Number of seeds; fewer in wasm, which reports more slowly.
 const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 100 } else { 400 };
 
 fn dims(random: &mut Random) -> [usize; 3] {
     [8 + random.below(30), 8 + random.below(30), 4 + random.below(30)]
 }
 
-/// Noise, a noisy lattice of holes, or a ball.
+/// Returns an image of noise, a noisy lattice with holes, or a ball.
 fn image(random: &mut Random, dims: [usize; 3]) -> Volume {
     let noise: Vec<f32> = (0..dims[0] * dims[1] * dims[2]).map(|_| random.unit()).collect();
     let (kind, frequency) = (random.below(3), 0.2 + random.unit());
@@ -69,8 +69,8 @@ fn params(random: &mut Random, volume: &Volume) -> DeformableParams {
     }
 }
 
-/// One run, with parameters changed and attractors set on the way. A start that does not fit is refused.
-/// Returns how many steps were made.
+/// Runs the model once, with parameter changes and attractors in between; a start that does not fit is refused. Returns
+/// the number of steps.
 fn run(seed: u64) -> usize {
     let mut random = Random(seed);
     let dims = dims(&mut random);
@@ -87,8 +87,8 @@ fn run(seed: u64) -> usize {
         let report = model.step().unwrap_or_else(|error| panic!("seed {seed}, step {step}: {error}"));
         assert_eq!(model.mesh().check(), Ok(()), "seed {seed}, step {step}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "seed {seed}, step {step}");
-        let crossings = count_crossings(&model.mesh().to_triangles());
-        assert_eq!(crossings, 0, "seed {seed}, step {step}: {report:?}");
+        let self_intersections = count_self_intersections(&model.mesh().to_triangles());
+        assert_eq!(self_intersections, 0, "seed {seed}, step {step}: {report:?}");
         match random.below(40) {
             0 => model.set_params(params(&mut random, &volume)).unwrap(),
             1 => {
@@ -105,7 +105,7 @@ fn run(seed: u64) -> usize {
 }
 
 #[test]
-fn any_run_is_sound_after_every_step() {
+fn every_run_keeps_the_mesh_valid() {
     let mut steps = 0;
     for seed in seeds(SEEDS) {
         let named = Named::new(seed);
@@ -114,10 +114,10 @@ fn any_run_is_sound_after_every_step() {
     println!("{steps} steps");
 }
 
-/// Marching cubes of noise, resolved with edges much longer than voxels. Collapses drew needles through all of it, and a
-/// step took half a minute.
+/// Regression: marching cubes of noise, resolved with edges much longer than voxels. Collapses drew needles through all
+/// of the mesh, and a step took half a minute.
 #[test]
-fn a_start_much_finer_than_its_edges_makes_no_needles() {
+fn a_start_much_finer_than_its_edges_creates_no_needles() {
     let mut random = Random(201_797);
     let dims = dims(&mut random);
     let volume = image(&mut random, dims);

@@ -1,8 +1,8 @@
-//! A mesh that is moved and edited at random never crosses itself.
+//! Meshes that are moved and edited at random never intersect themselves.
 
 use crate::common::{Random, torus_around};
 use vesicle::math::Vec3;
-use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_crossings};
+use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_self_intersections};
 use vesicle::remesh::{Embedding, Resolver, Sampling};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -11,10 +11,10 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 const EDGE: f32 = 2.5;
 
 fn embedded(mesh: &Mesh) -> bool {
-    count_crossings(&mesh.to_triangles()) == 0
+    count_self_intersections(&mesh.to_triangles()) == 0
 }
 
-/// Two spheres and two tori, side by side with little between them.
+/// Returns two spheres and two tori, side by side with little space between them.
 fn crowd() -> Mesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.8).unwrap();
     mesh.append(&Mesh::icosphere(Vec3::X * 8.5, 4.0, 2.4).unwrap()).unwrap();
@@ -25,7 +25,7 @@ fn crowd() -> Mesh {
     mesh
 }
 
-/// A way for every vertex: a common drift of each region, and something of its own.
+/// Returns a random displacement for every vertex: a smooth part, common to each region, and an individual part.
 fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
     let mut any = || Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
     let (drift, place) = (any(), any());
@@ -33,10 +33,10 @@ fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
     mesh.positions().iter().map(|&p| (regional(p) + any() * 0.3) * size).collect()
 }
 
-/// Which vertices are looked at must not matter: one that has followed from the beginning and one that knows nothing
-/// carry the same mesh to the same place.
+/// The result must not depend on which vertices are checked: an embedding that has followed the mesh from the start and
+/// a new one apply the same displacements.
 #[test]
-fn a_mesh_carried_at_random_never_crosses_itself() {
+fn a_mesh_moved_at_random_never_intersects_itself() {
     for seed in 0..12 {
         let mut random = Random(seed);
         let mut mesh = crowd();
@@ -49,11 +49,11 @@ fn a_mesh_carried_at_random_never_crosses_itself() {
             let (mut other, mut other_ways) = (mesh.clone(), ways.clone());
             let before = mesh.positions().to_vec();
 
-            follower.follow_with(&mesh, EDGE);
-            let shares = follower.carry(&mut mesh, &mut ways);
+            follower.sync_with_edge(&mesh, EDGE);
+            let shares = follower.move_all(&mut mesh, &mut ways);
             let mut stranger = Embedding::default();
-            stranger.follow_with(&other, EDGE);
-            assert_eq!(stranger.carry(&mut other, &mut other_ways), shares, "{what}");
+            stranger.sync_with_edge(&other, EDGE);
+            assert_eq!(stranger.move_all(&mut other, &mut other_ways), shares, "{what}");
 
             assert!(mesh.positions() == other.positions(), "{what}");
             assert!(embedded(&mesh), "{what}");
@@ -67,7 +67,7 @@ fn a_mesh_carried_at_random_never_crosses_itself() {
     }
 }
 
-/// Two spheres pushed into each other come to rest on each other; the rest of them goes on.
+/// Two spheres pushed against each other flatten where they touch; the rest of them moves on.
 #[test]
 fn spheres_pushed_together_flatten() {
     let mut mesh = Mesh::icosphere(-Vec3::X * 4.5, 4.0, 1.5).unwrap();
@@ -77,17 +77,17 @@ fn spheres_pushed_together_flatten() {
     let mut embedding = Embedding::default();
     for _ in 0..20 {
         let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| Vec3::X * 0.1 * -p.x.signum()).collect();
-        embedding.follow_with(&mesh, EDGE);
-        embedding.carry(&mut mesh, &mut ways);
+        embedding.sync_with_edge(&mesh, EDGE);
+        embedding.move_all(&mut mesh, &mut ways);
         assert!(embedded(&mesh));
     }
     let gone = began - far(&mesh);
     assert!((gone - 2.0).abs() < 1e-3, "the far side went {gone}");
 }
 
-/// A large triangle mesh beside small ones, all vertices moved far: found across all sizes.
+/// Large triangles beside small ones, all vertices with large displacements: contacts are found at all sizes.
 #[test]
-fn large_and_small_triangles_do_not_cross() {
+fn large_and_small_triangles_do_not_intersect() {
     let mut mesh = Mesh::icosahedron(Vec3::ZERO, 40.0);
     for k in 0..6 {
         let turn = std::f32::consts::TAU * k as f32 / 6.0;
@@ -97,19 +97,18 @@ fn large_and_small_triangles_do_not_cross() {
     assert!(embedded(&mesh));
     let mut embedding = Embedding::default();
     for _ in 0..30 {
-        // The small spheres fly outwards, the large one shrinks.
+        // The small spheres move outwards; the large one shrinks.
         let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| *p * 0.02).collect();
         ways[..12].iter_mut().for_each(|way| *way *= -0.5);
-        embedding.follow_with(&mesh, EDGE);
-        embedding.carry(&mut mesh, &mut ways);
+        embedding.sync_with_edge(&mesh, EDGE);
+        embedding.move_all(&mut mesh, &mut ways);
         assert!(embedded(&mesh));
     }
 }
 
 #[test]
-fn an_edit_that_would_cross_is_taken_back() {
-    // A plate with a sphere just above it: drawing an edge of the plate together at a place above the sphere's bottom
-    // would pierce it.
+fn an_edit_that_would_intersect_is_rolled_back() {
+    // Two spheres near each other: collapsing an edge of one to a position inside the other would pierce it.
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.5).unwrap();
     mesh.append(&Mesh::icosphere(Vec3::X * 8.2, 4.0, 1.5).unwrap()).unwrap();
     let nearest = |mesh: &Mesh| {
@@ -120,31 +119,31 @@ fn an_edit_that_would_cross_is_taken_back() {
     let v = mesh.ring(u).as_slice()[0];
     let before = mesh.to_triangles();
     let mut embedding = Embedding::default();
-    embedding.follow_with(&mesh, EDGE);
+    embedding.sync_with_edge(&mesh, EDGE);
     let piercing = Vec3::X * 5.0;
     let refused = embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, piercing));
-    assert_eq!(refused, Err(EditError::WouldCross));
+    assert_eq!(refused, Err(EditError::WouldSelfIntersect));
     assert!(mesh.to_triangles() == before);
     let beside = mesh.position(u);
     assert_eq!(embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, beside)), Ok(()));
     assert!(embedded(&mesh) && mesh.check() == Ok(()));
 }
 
-/// Moves and passes in turn, with parts that meet and part; what is left of the mesh is sound after each.
+/// Moves alternate with remeshing, while components join and split; the mesh is valid after each.
 #[test]
-fn a_mesh_resolved_after_every_move_never_crosses_itself() {
+fn a_mesh_resolved_after_every_move_never_intersects_itself() {
     let sampling = Sampling::new(1.0);
     for seed in 0..10 {
         let mut random = Random(seed);
         let mut mesh = crowd();
-        let mut resolver = Resolver::with_room_for(100_000);
+        let mut resolver = Resolver::with_max_vertices(100_000);
         let everything: Vec<VertexId> = mesh.vertices().collect();
         resolver.resolve(&mut mesh, sampling, &everything);
         let mut changes = resolver.resolve(&mut mesh, sampling, &[]);
         for step in 0..30 {
             let size = [0.5, 0.3, 0.1][random.below(3)];
             let mut ways = random_ways(&mesh, &mut random, size);
-            resolver.carry(&mut mesh, sampling, &mut ways);
+            resolver.move_all(&mut mesh, sampling, &mut ways);
             let everything: Vec<VertexId> = mesh.vertices().collect();
             changes += resolver.resolve(&mut mesh, sampling, &everything);
             assert_eq!(mesh.check(), Ok(()), "seed {seed}, step {step}");
@@ -157,7 +156,8 @@ fn a_mesh_resolved_after_every_move_never_crosses_itself() {
     }
 }
 
-/// The largest factor up to `most` by which `inner` can be scaled about the origin and still not touch `outer`.
+/// Returns both meshes as one, with `inner` scaled about the origin, by at most `most`, until it nearly touches
+/// `outer`.
 fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
     let within = |factor: f32| {
         let mut both = inner.clone();
@@ -174,8 +174,8 @@ fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
 }
 
 #[test]
-fn refinement_of_facing_sheets_does_not_cross() {
-    let mut crossed = 0;
+fn refinement_of_facing_sheets_does_not_intersect() {
+    let mut intersecting = 0;
     for seed in 0..6 {
         let mut random = Random(seed);
         let mut ball = |edge: f32| {
@@ -187,15 +187,15 @@ fn refinement_of_facing_sheets_does_not_cross() {
         let mut mesh = nearly_touching(&ball(2.0), &ball(2.6), 1.2);
         let mut unguarded = mesh.clone();
         unguarded.refine().unwrap();
-        crossed += usize::from(!embedded(&unguarded));
+        intersecting += usize::from(!embedded(&unguarded));
 
         let mut embedding = Embedding::default();
-        embedding.follow_with(&mesh, EDGE);
+        embedding.sync_with_edge(&mesh, EDGE);
         assert!(embedding.is_embedded(&mesh));
         assert!(embedding.refine(&mut mesh).unwrap());
         assert!(embedded(&mesh) && embedding.is_embedded(&mesh), "seed {seed}");
         assert_eq!(mesh.check(), Ok(()), "seed {seed}");
         assert_eq!(mesh.vertex_count(), unguarded.vertex_count(), "seed {seed}");
     }
-    assert!(crossed > 2, "only {crossed} cross when refined without a guard");
+    assert!(intersecting > 2, "only {intersecting} intersect themselves when refined without a guard");
 }

@@ -1,5 +1,5 @@
-//! The implicit surface against shapes with a known answer, and its promises: a sound mesh, the same bits every time and
-//! after every restore, clear refusals.
+//! The implicit surface on shapes with known distances, and its guarantees: a valid mesh, the same bits every time and
+//! after every restore, clear errors.
 
 use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
 use crate::common::{Random, euler_of_parts, fingerprint};
@@ -14,7 +14,7 @@ use vesicle::volume::marching_cubes_world;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// The number of points of most scenes.
+/// Number of points in most scenes.
 const MANY: usize = if cfg!(target_arch = "wasm32") { 1000 } else { 3000 };
 
 fn finish(surface: &mut ImplicitSurface) -> StepReport {
@@ -47,13 +47,13 @@ fn sound(mesh: &TriangleMesh) {
     assert!(found.is_healthy() && !mesh.triangles.is_empty(), "{found:?}");
     let normals = mesh.normals.as_ref().unwrap();
     assert_eq!(normals.len(), mesh.positions.len());
-    // Those of the triangles agree with those of the gradient.
+    // Normals of the triangles agree with those of the gradient.
     let wrong = mesh.vertex_normals().iter().zip(normals).filter(|(a, b)| a.dot(**b) < 0.5).count();
     assert!(wrong * 100 <= normals.len(), "{wrong} of {} normals", normals.len());
     assert!(measure(mesh).volume > 0.0);
 }
 
-/// Mean and largest distance of the vertices from the true surface.
+/// Returns the mean and the largest distance of the vertices from the true surface.
 fn errors(shape: Shape, mesh: &TriangleMesh) -> [f64; 2] {
     let all: Vec<f64> = mesh.positions.iter().map(|p| distance(shape, p.as_dvec3()).abs()).collect();
     [all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(0.0, f64::max)]
@@ -66,7 +66,7 @@ fn error(result: Result<impl Sized, MethodError>) -> MethodError {
     }
 }
 
-/// The name of what an error is about.
+/// Returns the parameter that an error names.
 fn refused(result: Result<impl Sized, MethodError>) -> &'static str {
     match error(result) {
         MethodError::InvalidArgument { parameter, problem } => {
@@ -77,7 +77,8 @@ fn refused(result: Result<impl Sized, MethodError>) -> &'static str {
     }
 }
 
-/// Bounds are for 3,000 points; with fewer, what lies between them is off as the square of their distance.
+/// Asserts topology and errors of a reconstructed shape. Bounds are for 3,000 points; with fewer, errors grow as the
+/// square of the point spacing.
 fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
     let [mean, largest] = [mean, largest].map(|bound| bound * 3000.0 / MANY as f64);
     let surface = finished(noisy(shape, MANY, noise, 7), ImplicitParams::default());
@@ -95,32 +96,32 @@ fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
 }
 
 #[test]
-fn a_ball() {
+fn a_ball_is_reconstructed() {
     comes_out(sphere, &[2], 0.0, 0.003, 0.01);
     comes_out(sphere, &[2], 0.01, 0.008, 0.04);
 }
 
 #[test]
-fn a_torus() {
+fn a_torus_is_reconstructed() {
     comes_out(torus, &[0], 0.0, 0.003, 0.01);
     comes_out(torus, &[0], 0.01, 0.008, 0.04);
 }
 
 #[test]
-fn bodies_grown_together_keep_their_hole() {
+fn blended_shapes_keep_their_hole() {
     comes_out(blend, &[0], 0.0, 0.003, 0.02);
     comes_out(blend, &[0], 0.01, 0.008, 0.06);
 }
 
 #[test]
-fn two_parts_stay_two() {
+fn two_components_stay_separate() {
     comes_out(pair, &[2, 2], 0.0, 0.003, 0.01);
     comes_out(pair, &[2, 2], 0.01, 0.008, 0.04);
 }
 
-/// Directions out are found where a student's few points lie far apart.
+/// Outward directions are found even from few points far apart.
 #[test]
-fn few_points_do() {
+fn few_points_are_enough() {
     let shapes: [(&str, Shape, usize, &[i64]); 3] =
         [("ball", sphere, 60, &[2]), ("torus", torus, 250, &[0]), ("pair", pair, 240, &[2, 2])];
     for (name, shape, fewest, euler) in shapes {
@@ -147,7 +148,7 @@ fn twenty_thousand_noisy_points_of_a_torus() {
 }
 
 #[test]
-fn without_regularization_it_passes_through_the_points() {
+fn without_regularization_the_surface_passes_through_the_points() {
     let points = noisy(blend, 800, 0.0, 3);
     let params = ImplicitParams { lambda_surface: 0.0, tolerance: 1e-8, ..ImplicitParams::default() };
     let surface = finished(points.clone(), params);
@@ -157,13 +158,13 @@ fn without_regularization_it_passes_through_the_points() {
     let range = outside.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
     println!("{most:e} of {range}, {:?}, cell {}", surface.fitness(), surface.cell());
     assert!(most <= 1e-4 * range, "{most} of {range}");
-    // Triangles cut corners, most of all where two bodies meet.
+    // Triangles cut corners, most of all where two balls and the ring blend.
     let fitness = surface.fitness().unwrap();
     assert!(fitness.max < 2.0 * surface.cell() && fitness.mean < 0.1 * surface.cell());
 }
 
 #[test]
-fn more_regularization_makes_noisy_points_smoother() {
+fn more_regularization_smooths_noisy_points() {
     let points = noisy(sphere, 1000, 0.01, 5);
     let mut surface = begun(points, ImplicitParams::default());
     let mut curvatures = Vec::new();
@@ -177,7 +178,7 @@ fn more_regularization_makes_noisy_points_smoother() {
         println!("{lambda_surface}: {found:?}");
         curvatures.push(found.mean_curvature);
     }
-    // With the last the ball has shrunk, and what is left of 1 is that.
+    // With the largest value the ball has shrunk, and the rest of the curvature above 1 is due to that.
     let [free, usual, more, most] = curvatures[..] else { panic!("{curvatures:?}") };
     assert!(free > 1.4 * usual && usual > 1.08 * more && usual > 1.05 * most, "{curvatures:?}");
 }
@@ -206,7 +207,7 @@ fn the_mean_level_passes_nearer_to_the_points() {
 }
 
 #[test]
-fn other_parameters_give_what_a_fresh_surface_has() {
+fn changed_parameters_give_the_result_of_a_new_surface() {
     let points = noisy(torus, 500, 0.005, 2);
     let changes = [
         ImplicitParams { delta: 10.0, tau: 0.01, ..ImplicitParams::default() },
@@ -220,7 +221,7 @@ fn other_parameters_give_what_a_fresh_surface_has() {
     for (k, params) in changes.into_iter().enumerate() {
         surface.set_params(params.clone()).unwrap();
         assert_eq!(*surface.params(), params);
-        // Also when they change again on the way.
+        // Also when they change again during the run.
         (0..3 * k).for_each(|_| drop(surface.step().unwrap()));
         let other = ImplicitParams { delta: 7.0, ..params.clone() };
         surface.set_params(other).unwrap();
@@ -234,7 +235,7 @@ fn other_parameters_give_what_a_fresh_surface_has() {
 }
 
 #[test]
-fn only_what_depends_on_a_parameter_is_done_again() {
+fn only_phases_that_depend_on_a_changed_parameter_run_again() {
     let mut surface = finished(noisy(sphere, 400, 0.0, 4), ImplicitParams::default());
     for change in [
         ImplicitParams { cell: 0.05, ..ImplicitParams::default() },
@@ -256,7 +257,7 @@ fn only_what_depends_on_a_parameter_is_done_again() {
 }
 
 #[test]
-fn a_failure_keeps_the_surface_and_other_parameters_go_on() {
+fn a_failure_keeps_the_surface_and_other_parameters_continue() {
     let points = noisy(sphere, 400, 0.0, 4);
     let mut surface = finished(points, ImplicitParams::default());
     let (before, params) = (surface.surface().clone(), surface.params().clone());
@@ -271,7 +272,7 @@ fn a_failure_keeps_the_surface_and_other_parameters_go_on() {
         assert!(surface.step().unwrap().done);
         assert!(*surface.surface() == before);
     }
-    // Found only when the extraction begins.
+    // Detected only when the extraction begins.
     surface.set_params(ImplicitParams { cell: 1e-9, delta: 6.0, ..params.clone() }).unwrap();
     let failed = (0..10_000).find_map(|_| surface.step().err());
     assert!(matches!(failed, Some(MethodError::InvalidArgument { parameter: "cell", .. })), "{failed:?}");
@@ -282,7 +283,7 @@ fn a_failure_keeps_the_surface_and_other_parameters_go_on() {
 }
 
 #[test]
-fn a_system_that_cannot_be_solved_says_so() {
+fn an_unsolvable_system_is_reported() {
     let mut points = noisy(sphere, 300, 0.0, 4);
     let twins: Vec<Vec3> = points.iter().map(|p| *p + Vec3::new(1e-7, 0.0, -1e-7)).collect();
     points.extend(twins);
@@ -308,7 +309,7 @@ fn a_system_that_cannot_be_solved_says_so() {
 }
 
 #[test]
-fn a_restored_run_goes_on_bit_for_bit() {
+fn a_restored_run_continues_bit_for_bit() {
     let mut random = Random(3);
     let (exact, normals) = surface_points(blend, 500, &mut random);
     let cloud = Cloud {
@@ -325,7 +326,7 @@ fn a_restored_run_goes_on_bit_for_bit() {
     loop {
         let report = running.step().unwrap();
         phases.push(report.phase.clone());
-        // Every slice of the short phases, and some of the long ones.
+        // At every slice of the short phases and some of the long ones.
         let count = phases.iter().filter(|phase| **phase == report.phase).count();
         if count < 4 || count % 16 == 0 {
             let mut resumed = begun();
@@ -339,14 +340,14 @@ fn a_restored_run_goes_on_bit_for_bit() {
             break;
         }
     }
-    // At its end, and while solving, a state once counted slices that its own copy did not.
+    // Regression: at the end, and while solving, a state counted slices that its copy did not.
     let mut resumed = begun();
     resumed.restore(&running.save()).unwrap();
     assert!(resumed.save() == running.save());
     for phase in ["subsample", "constraints", "solve", "extract", "colour"] {
         assert!(phases.iter().any(|found| found == phase), "{phase} of {phases:?}");
     }
-    // While another solution is on its way the last surface stays, and is restored with it.
+    // While another solution is computed the last surface is kept, and restored as well.
     whole.set_params(ImplicitParams { delta: 8.0, ..ImplicitParams::default() }).unwrap();
     (0..3).for_each(|_| drop(whole.step().unwrap()));
     let mut resumed = begun();
@@ -357,7 +358,7 @@ fn a_restored_run_goes_on_bit_for_bit() {
     assert!(resumed.surface() == whole.surface());
 }
 
-/// A ball of 800 points with three outliers beside it, and what to do about them: a bump is added, and a dent.
+/// Returns a ball of 800 points with three outliers beside it, and edits that remove them and add a bump and a dent.
 fn edited() -> (Vec<Vec3>, PointEdits) {
     let mut points = noisy(sphere, 800, 0.0, 4);
     let first = points.len() as u32;
@@ -372,7 +373,7 @@ fn edited() -> (Vec<Vec3>, PointEdits) {
 }
 
 #[test]
-fn points_by_hand_change_the_surface_as_if_they_had_been_there() {
+fn edits_have_the_effect_of_other_input_points() {
     let (points, edits) = edited();
     let params = ImplicitParams { tolerance: 1e-8, ..ImplicitParams::default() };
     let mut fresh = begun(points.clone(), params.clone());
@@ -402,7 +403,7 @@ fn points_by_hand_change_the_surface_as_if_they_had_been_there() {
     assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-6), "{one:?}, {other:?}");
     assert_eq!(surface.constraints()[0].len(), 803);
     assert!(surface.fitness().unwrap().max < 0.1);
-    // And back.
+    // Reverting the edits restores the surface.
     surface.set_edits(PointEdits::default()).unwrap();
     finish(&mut surface);
     let [now, then] = [surface.surface(), &before].map(|mesh| measure(mesh).volume);
@@ -410,7 +411,7 @@ fn points_by_hand_change_the_surface_as_if_they_had_been_there() {
 }
 
 #[test]
-fn many_points_by_hand_are_solved_from_the_start() {
+fn many_added_points_are_solved_from_the_start() {
     let points = noisy(torus, 900, 0.0, 4);
     let (half, rest) = points.split_at(500);
     let mut surface = finished(half.to_vec(), ImplicitParams::default());
@@ -420,13 +421,13 @@ fn many_points_by_hand_are_solved_from_the_start() {
     assert_eq!(surface.constraints()[0].len(), 900);
     let [found, all] = [&surface, &finished(points, ImplicitParams::default())].map(|s| s.fitness().unwrap());
     println!("{found:?}, all at once {all:?}");
-    // Points outside are only made from those given.
+    // Exterior points are only created from the input points.
     assert!(found.mean < 1.3 * all.mean, "{found:?}, all at once {all:?}");
 }
 
-/// A wide block of the matrix whose first row underflows is not 0.
+/// A wide block of the matrix must not be treated as 0 because its first row underflows.
 #[test]
-fn a_clump_beside_a_ball_is_solved_with_a_narrow_gaussian() {
+fn a_dense_cluster_beside_a_ball_is_solved_with_a_narrow_gaussian() {
     let mut points = noisy(sphere, 500, 0.0, 3);
     points.extend(noisy(sphere, 500, 0.0, 4).iter().map(|p| *p * 0.01 + Vec3::Z));
     for sigma in [0.005, 0.02] {
@@ -439,7 +440,7 @@ fn a_clump_beside_a_ball_is_solved_with_a_narrow_gaussian() {
 }
 
 #[test]
-fn far_from_the_origin_points_by_hand_have_room() {
+fn points_can_be_added_far_from_the_origin() {
     let points = noisy(sphere, 3000, 0.0, 3).iter().map(|p| *p + Vec3::X * 120.0).collect();
     let mut surface = finished(points, ImplicitParams::default());
     surface.set_edits(PointEdits { added: vec![Vec3::X * 122.9], ..PointEdits::default() }).unwrap();
@@ -448,11 +449,11 @@ fn far_from_the_origin_points_by_hand_have_room() {
 }
 
 #[test]
-fn impossible_edits_are_named_and_change_nothing() {
+fn invalid_edits_are_refused_by_name_and_change_nothing() {
     let (points, edits) = edited();
     let on_a_point = PointEdits { exterior: vec![Vec3::X, points[7]], ..PointEdits::default() };
     let mut surface = begun(points.clone(), ImplicitParams::default());
-    // Also before anything was chosen.
+    // Also before constraints were selected.
     assert_eq!(refused(surface.set_edits(on_a_point)), "exterior");
     finish(&mut surface);
     surface.set_edits(edits.clone()).unwrap();
@@ -476,9 +477,9 @@ fn impossible_edits_are_named_and_change_nothing() {
     }
 }
 
-/// The system that the edits revise is not saved: it is made again.
+/// The system that edits revise is not saved, but assembled again.
 #[test]
-fn a_restored_run_goes_on_bit_for_bit_through_edits() {
+fn a_restored_run_continues_bit_for_bit_through_edits() {
     let (points, edits) = edited();
     let begun = || begun(points.clone(), ImplicitParams::default());
     let mut running = begun();
@@ -495,7 +496,7 @@ fn a_restored_run_goes_on_bit_for_bit_through_edits() {
                 whole.restore(&resumed.save()).unwrap();
                 assert!(resumed.surface() == running.surface() && resumed.edits() == running.edits());
                 if done {
-                    // With the system made again for the one, and kept for the other.
+                    // With the system assembled again in one, and kept in the other.
                     running.set_edits(edits.clone()).unwrap();
                     resumed.set_edits(edits.clone()).unwrap();
                     let mut copy = begun();
@@ -514,7 +515,7 @@ fn a_restored_run_goes_on_bit_for_bit_through_edits() {
 }
 
 #[test]
-fn states_that_are_none_change_nothing() {
+fn invalid_states_are_refused_and_change_nothing() {
     let points = noisy(sphere, 200, 0.0, 4);
     let mut surface = finished(points.clone(), ImplicitParams::default());
     let (state, before) = (surface.save(), surface.surface().clone());
@@ -535,7 +536,7 @@ fn states_that_are_none_change_nothing() {
 }
 
 #[test]
-fn sampled_as_a_volume_it_is_the_same_shape() {
+fn a_sampled_volume_has_the_same_shape() {
     let surface = finished(noisy(torus, 800, 0.0, 8), ImplicitParams::default());
     let volume = surface.to_volume([70, 70, 40]).unwrap();
     let sampled = marching_cubes_world(&volume, 0.0, 0).unwrap();
@@ -558,7 +559,7 @@ fn fitness_of_a_ball() {
     assert!((found.mean_curvature - 1.0).abs() < 0.3);
     assert!(found.mean <= found.rms && found.rms <= found.max);
     assert!((found.mean - off).abs() < 0.002);
-    // Points that are left out count, too.
+    // Removed outliers count as well.
     let mut points = noisy(sphere, 600, 0.0, 1);
     points.push(Vec3::new(0.0, 0.0, 3.0));
     let options = ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() };
@@ -569,7 +570,7 @@ fn fitness_of_a_ball() {
 }
 
 #[test]
-fn values_and_slopes_of_the_function() {
+fn values_and_gradients_of_the_function() {
     let surface = finished(noisy(sphere, 500, 0.0, 1), ImplicitParams::default());
     assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] > 0.0);
     assert!(surface.evaluate(&[Vec3::new(1.2, 0.0, 0.0)]).unwrap()[0] < 0.0);
@@ -586,7 +587,7 @@ fn values_and_slopes_of_the_function() {
 }
 
 #[test]
-fn colours_of_points_come_through() {
+fn colours_of_points_are_interpolated() {
     let points = noisy(sphere, 600, 0.0, 1);
     let color = |p: Vec3| if p.z > 0.0 { Vec3::X } else { Vec3::Y };
     let cloud = Cloud { colors: Some(points.iter().map(|&p| color(p)).collect()), ..of_points(points) };
@@ -601,7 +602,7 @@ fn colours_of_points_come_through() {
     assert_eq!(finished(noisy(sphere, 50, 0.0, 1), ImplicitParams::default()).surface().colors, None);
 }
 
-/// Cameras around the z axis, five away, that look at the origin; each with a picture of one colour.
+/// Returns cameras around the z axis at a distance of five, facing the origin, each with an image of one colour.
 fn cameras(count: u8, size: u32) -> Vec<Camera> {
     let camera = |k: u8| {
         let (x, y) = ([1.0, -1.0, 0.0, 0.0][usize::from(k % 4)], [0.0, 0.0, 1.0, -1.0][usize::from(k % 4)]);
@@ -621,7 +622,7 @@ fn cameras(count: u8, size: u32) -> Vec<Camera> {
 }
 
 #[test]
-fn cameras_tell_what_is_outside_and_colour_it() {
+fn cameras_determine_exterior_points_and_colours() {
     let options = ImplicitOptions { cameras: cameras(4, 100), ..ImplicitOptions::default() };
     let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.003, 6)), options).unwrap();
     finish(&mut surface);
@@ -630,7 +631,7 @@ fn cameras_tell_what_is_outside_and_colour_it() {
     assert!(surface.constraints()[1].iter().all(|p| torus(p.as_dvec3()) > 0.0));
     let colors = surface.surface().colors.clone().unwrap();
     assert!(colors.iter().all(|c| (c.x - 200.0 / 255.0).abs() < 0.01 && (c.z - 20.0 / 255.0).abs() < 0.01));
-    // Other photographs, later.
+    // With other photographs, set later.
     let before = surface.version();
     surface.colorize(&cameras(1, 60)).unwrap();
     assert!(surface.version() > before);
@@ -639,7 +640,7 @@ fn cameras_tell_what_is_outside_and_colour_it() {
 }
 
 #[test]
-fn exterior_points_may_be_given() {
+fn given_exterior_points_are_used() {
     let outside = [Vec3::X * 1.5, Vec3::ZERO, Vec3::new(0.0, 0.0, 0.9)];
     let options = ImplicitOptions { exterior: Some(outside.to_vec()), ..ImplicitOptions::default() };
     let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.0, 6)), options.clone()).unwrap();
@@ -651,7 +652,7 @@ fn exterior_points_may_be_given() {
         assert!(found.iter().any(|q| q.distance(p) < 1e-5));
         assert!(surface.evaluate(&[p]).unwrap()[0] < 0.0);
     }
-    // One on the surface.
+    // An exterior point on the surface is refused.
     let mut points = noisy(torus, 100, 0.0, 6);
     points.push(outside[0]);
     let mut surface = ImplicitSurface::new(of_points(points), options).unwrap();
@@ -660,7 +661,7 @@ fn exterior_points_may_be_given() {
 }
 
 #[test]
-fn any_scale_gives_the_same_shape() {
+fn scaled_and_shifted_points_give_the_same_shape() {
     let points = noisy(torus, 800, 0.0, 6);
     let usual = finished(points.clone(), ImplicitParams::default());
     let expected = measure(usual.surface());
@@ -687,7 +688,7 @@ fn any_scale_gives_the_same_shape() {
     }
 }
 
-/// As map coordinates are: single precision has few digits left for the shape.
+/// Like map coordinates, where single precision has few digits left for the shape.
 #[test]
 fn far_from_the_origin_cells_are_coarser() {
     for shift in [100.0_f32, 450.0] {
@@ -702,7 +703,7 @@ fn far_from_the_origin_cells_are_coarser() {
 }
 
 #[test]
-fn bad_points_and_options_are_named() {
+fn invalid_points_and_options_are_refused_by_name() {
     let points = noisy(sphere, 50, 0.0, 4);
     let options = ImplicitOptions::default;
     let new = |cloud: Cloud, options: ImplicitOptions| ImplicitSurface::new(cloud, options);
@@ -717,7 +718,7 @@ fn bad_points_and_options_are_named() {
     assert_eq!(refused(new(of_points(points.clone()), options()).unwrap().set_edits(outside)), "exterior");
     let exterior = ImplicitOptions { exterior: Some(crowd), ..options() };
     assert_eq!(refused(new(of_points(points.clone()), exterior)), "exterior");
-    // With a point added where one is outside.
+    // With an added point at the position of an exterior one.
     let exterior = ImplicitOptions { exterior: Some(vec![Vec3::X * 1.2]), ..options() };
     let mut placed = new(of_points(points.clone()), exterior).unwrap();
     finish(&mut placed);
@@ -752,7 +753,7 @@ fn bad_points_and_options_are_named() {
 }
 
 #[test]
-fn bad_parameters_are_named() {
+fn invalid_parameters_are_refused_by_name() {
     let usual = ImplicitParams::default;
     let all = [
         ("delta", ImplicitParams { delta: 0.0, ..usual() }),
@@ -786,7 +787,7 @@ fn bad_parameters_are_named() {
 }
 
 #[test]
-fn what_is_asked_too_early_is_refused() {
+fn results_requested_too_early_are_refused() {
     let mut surface = begun(noisy(sphere, 50, 0.0, 4), ImplicitParams::default());
     assert_eq!(refused(surface.evaluate(&[Vec3::ZERO])), "evaluate");
     assert_eq!(refused(surface.gradient(&[Vec3::ZERO])), "gradient");
@@ -809,10 +810,10 @@ fn equal_points_are_merged_and_counted() {
     assert_eq!(once.fitness().unwrap().max, twice.fitness().unwrap().max);
 }
 
-/// A ball by degrees of longitude and latitude: at each pole are many points that differ by rounding. Those were refused as
-/// exterior points on the surface, or hung the solver, by where the ball was.
+/// Regression: a ball sampled by longitude and latitude has many points at its poles that differ by rounding. Depending
+/// on the ball's position, they were refused as exterior points on the surface, or the solver did not end.
 #[test]
-fn points_that_differ_by_rounding_alone() {
+fn points_that_differ_by_rounding_are_solved() {
     for shift in [Vec3::ZERO, Vec3::new(0.3, 0.1, 0.7)] {
         let place = |i: u32| {
             let (turn, height) = ((i % 24) as f32 / 24.0, (i / 24) as f32 / 12.0);
@@ -824,7 +825,7 @@ fn points_that_differ_by_rounding_alone() {
         sound(surface.surface());
         assert_eq!(euler_of_parts(surface.surface()), [2]);
     }
-    // Apart in their own units, together in the box.
+    // Distinct in the input's units, equal in the normalised box.
     let mut points = noisy(sphere, 100, 0.0, 4);
     points.iter_mut().for_each(|p| *p += Vec3::X);
     points.extend([Vec3::ZERO, Vec3::X * 1e-20]);
@@ -832,9 +833,9 @@ fn points_that_differ_by_rounding_alone() {
     assert_eq!(surface.duplicates(), 1);
 }
 
-/// Its bits natively, in wasm, and through the package: the fingerprint that the package's tests have, too.
+/// The bits are the same natively, in wasm and through the package, whose tests compare with the same hash.
 #[test]
-fn the_same_bits_everywhere() {
+fn bits_are_the_same_on_every_platform() {
     let (mut state, mut points) = (1_u32, Vec::new());
     let mut unit = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -854,11 +855,11 @@ fn the_same_bits_everywhere() {
     assert_eq!(format!("{:016x}", fingerprint(&surface.surface().positions)), BUMPS_BITS);
 }
 
-/// After a change of the core that is meant, take what the test finds, here and in `tests/js/bumps.ts`.
+/// After an intended change of the core, copy the value that the test finds here and to `tests/js/bumps.ts`.
 const BUMPS_BITS: &str = "78aedacfbadc8109";
 
 #[test]
-fn previews_grow_while_the_surface_is_followed() {
+fn previews_grow_during_extraction() {
     let mut surface = begun(noisy(sphere, 300, 0.0, 4), ImplicitParams::default());
     let mut seen = 0;
     while !surface.step().unwrap().done {

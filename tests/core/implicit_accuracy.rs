@@ -1,16 +1,16 @@
-//! The implicit surface, given no normals, against screened Poisson surface reconstruction, given the true ones: topology
-//! and mean distance to shapes that are known.
+//! The implicit surface, without normals, compared with screened Poisson surface reconstruction, given the true
+//! normals: topology and mean distance on known shapes.
 //!
-//! The figures of the other were recorded with pymeshlab 2025.7.post1 (MeshLab's library, which has M. Kazhdan's code) by
+//! Poisson's figures were recorded with pymeshlab 2025.7.post1 (MeshLab's library, which contains M. Kazhdan's code) by
 //!
 //! ```sh
 //! cargo test --release --test core implicit_accuracy -- --ignored  # writes the points of the tests, with normals
 //! python scripts/poisson_reference.py target/tmp/accuracy      # prints the table
 //! ```
 //!
-//! that is `generate_surface_reconstruction_screened_poisson(depth=<depth>, threads=1)` on each, all else as it comes.
-//! Noise is the standard deviation along each axis. The ball, the torus and the pair fill a box of side 2; the blend's box
-//! is 1.8 wide, so that there the same noise is a tenth more.
+//! that is `generate_surface_reconstruction_screened_poisson(depth=<depth>, threads=1)` on each, with defaults
+//! otherwise. Noise is the standard deviation along each axis. The ball, the torus and the pair fill a box of side 2;
+//! the blend's box is 1.8 wide, so that the same noise is relatively a tenth more.
 
 use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
 use crate::common::{Random, euler_of_parts};
@@ -21,16 +21,17 @@ use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, Implici
 
 const POINTS: usize = 3000;
 const SEEDS: [u64; 3] = [1, 2, 3];
-/// What is asked for, as a share of screened Poisson's error at the depth that suits the case best.
+/// Largest accepted error, relative to screened Poisson's error at the best depth of each case.
 const BAR: f64 = 1.1;
 
-/// A shape, what its parts are, and how far screened Poisson is from it.
+/// A known shape and screened Poisson's errors on it.
 struct Known {
     name: &'static str,
     shape: Shape,
-    /// χ of each part.
+    /// Euler characteristic of each component.
     euler: &'static [i64],
-    /// Its mean error in the mean of the seeds, for each noise: at depth 8, and at the best depth of 5 to 9.
+    /// Mean error of screened Poisson, averaged over the seeds, for each noise: at depth 8, and at the best depth of 5
+    /// to 9.
     poisson: [[f64; 2]; 3],
 }
 
@@ -45,11 +46,11 @@ const ALL: [Known; 4] = [
     Known { name: "pair", shape: pair, euler: &[2, 2], poisson:  [[0.000505, 0.000504], [0.002715, 0.002601], [0.004916, 0.003252]] },
 ];
 
-/// One setting for noise up to 0.01, found by trying: less first-order and more third-order smoothness than by default suit
-/// shapes without edges. With λ 0.001 the noise of the ball shows (1.13 of Poisson's error), with 0.002 the blend without
-/// noise is rounded off (1.19). The default δ, τ and λ with the mean level have 0.8 without noise and 1.6 with it, at most.
-/// The mean level takes back what λ shrinks. The cell saves time: with that of the default, which is finer, the errors
-/// without noise are up to a third less, and those with noise the same.
+/// Returns one setting for noise up to 0.01, found by experiment: less first-order and more third-order smoothness than
+/// the defaults suit shapes without edges. With λ 0.001 the noise of the ball shows (1.13 of Poisson's error), with
+/// 0.002 the blend without noise is rounded off (1.19). The default δ, τ and λ with the mean level have 0.8 without
+/// noise and 1.6 with it, at most. The mean level compensates the shrinkage by λ. The cell saves time: with that of the
+/// default, which is finer, the errors without noise are up to a third less, and those with noise the same.
 fn usual() -> ImplicitParams {
     ImplicitParams {
         delta: 2.0,
@@ -61,7 +62,8 @@ fn usual() -> ImplicitParams {
     }
 }
 
-/// For noise of 0.02, where the setting above gives the pair a third part. Without noise this one rounds off the blend.
+/// Returns the setting for noise of 0.02, for which the one above gives the pair a third component. Without noise this
+/// one rounds off the blend.
 fn smoother() -> ImplicitParams {
     ImplicitParams { tau: 0.2, lambda_surface: 0.003, cell: 0.03, ..usual() }
 }
@@ -74,7 +76,7 @@ fn reconstructed(known: &Known, noise: f64, seed: u64, params: ImplicitParams) -
     surface.surface().clone()
 }
 
-/// Mean distance to the shape: that of the centre of each triangle, weighted by area.
+/// Returns the mean distance to the shape: that of each triangle's centre, weighted by area.
 fn mean_error(shape: Shape, mesh: &TriangleMesh) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for triangle in &mesh.triangles {
@@ -108,17 +110,17 @@ fn as_good_as_poisson(noise: usize, params: &ImplicitParams) {
 }
 
 #[test]
-fn without_noise() {
+fn without_noise_it_is_as_accurate_as_poisson() {
     as_good_as_poisson(0, &usual());
 }
 
 #[test]
-fn with_noise() {
+fn with_noise_it_is_as_accurate_as_poisson() {
     as_good_as_poisson(1, &usual());
 }
 
 #[test]
-fn with_twice_the_noise() {
+fn with_twice_the_noise_it_is_as_accurate_as_poisson() {
     as_good_as_poisson(2, &smoother());
 }
 

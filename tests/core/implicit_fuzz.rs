@@ -1,6 +1,6 @@
-//! The implicit surface of random points, options and parameters: a sound mesh or a clear refusal, whatever they are.
+//! The implicit surface with random points, options and parameters: a valid mesh or a clear error.
 //!
-//! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
+//! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
 use crate::common::points::{direction, normal};
 use crate::common::{Named, Random, seeds};
@@ -13,13 +13,13 @@ use vesicle::methods::implicit::{
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Where the usual seeds end; in wasm, which is slower to report, fewer do.
+/// Number of seeds; fewer in wasm, which reports more slowly.
 const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 20 } else { 80 };
 
-/// No run needs as many slices.
+/// Upper bound of a run's slices.
 const MOST_STEPS: usize = 20_000;
 
-/// Points on one of several things, in a box of side 2 or so.
+/// Returns points on one of several shapes, in a box of side 2 or so.
 fn body(random: &mut Random, count: usize) -> Vec<DVec3> {
     let kind = random.below(9);
     let jitter = [0.0, 1e-6, 1e-3, 0.02, 0.2][random.below(5)];
@@ -34,7 +34,7 @@ fn body(random: &mut Random, count: usize) -> Vec<DVec3> {
             3 => DVec3::new(at(random), at(random), 0.0),
             4 => DVec3::new(at(random), 0.0, 0.0),
             5 => direction(random) * [1.0, 0.5][i % 2],
-            // A ball with all its poles.
+            // A ball sampled by longitude and latitude, with many points at its poles.
             6 => {
                 let (turn, height) = ((i % 12) as f32 / 12.0, (i / 12 % 9) as f32 / 8.0);
                 let [around, up] = [turn * std::f32::consts::TAU, height * std::f32::consts::PI];
@@ -84,7 +84,7 @@ fn cloud(random: &mut Random) -> Cloud {
     }
 }
 
-/// One of a ring of cameras that look at the origin along y.
+/// Returns a camera at a random position in the plane y = −5 that looks along y.
 fn camera(random: &mut Random) -> Camera {
     let (x, z) = (random.within(-2.0, 2.0), random.within(-2.0, 2.0));
     let rows = [100.0, 32.0, 0.0, 100.0 * x + 160.0, 0.0, 32.0, 100.0, 100.0 * z + 160.0, 0.0, 1.0, 0.0, 5.0];
@@ -137,7 +137,7 @@ fn options(random: &mut Random, cloud: &Cloud) -> ImplicitOptions {
     }
 }
 
-/// What a run came to.
+/// Counts of outcomes over all runs.
 #[derive(Default)]
 struct Tally {
     surfaces: usize,
@@ -158,7 +158,8 @@ fn check(surface: &ImplicitSurface, report_euler: i32, seed: u64) {
     assert!(colors.iter().all(|c| c.is_finite()), "seed {seed}");
 }
 
-/// One run, with parameters changed on the way. Failures are those that the types promise, and leave the surface.
+/// Runs the surface once, with parameter changes in between. Failures are those that the types allow, and keep the
+/// surface.
 fn run(seed: u64, tally: &mut Tally) {
     let mut random = Random(seed);
     let cloud = cloud(&mut random);
@@ -209,7 +210,7 @@ fn run(seed: u64, tally: &mut Tally) {
     panic!("seed {seed}: no end");
 }
 
-/// Points by hand, near others or anywhere, and some of the first taken away; or all edits taken back.
+/// Returns random edits: points added near others or anywhere, and some of the first removed; or no edits.
 fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointEdits {
     let [known, _] = surface.constraints();
     let mut places = |most: usize| -> Vec<Vec3> {
@@ -245,7 +246,7 @@ fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> R
 }
 
 #[test]
-fn any_points_give_a_sound_surface_or_a_refusal() {
+fn every_run_gives_a_valid_surface_or_an_error() {
     let mut tally = Tally::default();
     for seed in seeds(SEEDS) {
         let named = Named::new(seed);

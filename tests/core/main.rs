@@ -1,4 +1,4 @@
-//! The core against known answers, natively and in wasm: one program, which is linked once.
+//! Tests of the core against known results, natively and in wasm. One binary, which is linked once.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,7 +11,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-// Reads the sources.
+// Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]
 mod architecture;
 mod decimate;

@@ -1,24 +1,25 @@
-//! Shapes of random topology, found from outside by parting and from within by merging: each part with its χ.
+//! Shapes of random topology, found from outside by splitting and from inside by merging: each component has the right
+//! Euler characteristic.
 //!
-//! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
+//! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
 use crate::common::scenes;
 use crate::common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
-use vesicle::mesh::count_crossings;
+use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Seeding, Start};
 use vesicle::volume::Volume;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Where the usual seeds end.
+/// Number of seeds.
 const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 4 } else { 25 };
 
-/// Iterations after which everything is where it belongs, from any start.
+/// Iterations within which every run converges, from any start.
 const MOST: u32 = 400;
 
-/// Balls on a lattice of 3 × 2 × 2, some of them joined to their neighbours by bars. Nothing is thinner than 8 voxels, and
-/// what is not joined is 6 apart or more.
+/// Balls on a lattice of 3 × 2 × 2, some of them joined to their neighbours by bars. Everything is at least 8 voxels
+/// thick, and unconnected parts are at least 6 voxels apart.
 struct Frame {
     balls: Vec<Vec3>,
     bars: Vec<[usize; 2]>,
@@ -27,7 +28,7 @@ struct Frame {
 
 const LATTICE: [usize; 3] = [3, 2, 2];
 const MARGIN: f32 = 11.0;
-/// Radius of a bar.
+/// Radius of a bar, in voxels.
 const BAR: f32 = 4.0;
 const SPACING: f32 = 22.0;
 
@@ -60,13 +61,13 @@ impl Frame {
         balls.chain(self.bars.iter().map(to_bar)).fold(f32::INFINITY, f32::min)
     }
 
-    /// Intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
+    /// Returns a volume whose intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
     fn volume(&self) -> Volume {
         let dims = LATTICE.map(|n| (2.0 * MARGIN + SPACING * (n - 1) as f32) as usize);
         scenes::volume(dims, |p| (0.5 - 0.25 * self.distance(p)).clamp(0.0, 1.0))
     }
 
-    /// For each ball the first one that is joined to it, over any number of bars.
+    /// Returns, for each ball, the first ball of its connected component.
     fn parts(&self) -> Vec<usize> {
         let mut part: Vec<usize> = (0..self.balls.len()).collect();
         for _ in 0..self.balls.len() {
@@ -78,7 +79,7 @@ impl Frame {
         part
     }
 
-    /// χ = 2 (balls − bars) of each part, lowest first.
+    /// Returns χ = 2 (balls − bars) of each component, in ascending order.
     fn euler(&self) -> Vec<i64> {
         let part = self.parts();
         let one = |k: usize| {
@@ -91,8 +92,9 @@ impl Frame {
         euler
     }
 
-    /// A start that everything is found from: all around; the contour of the coarsest level; a seed in each part, which grows through its bars and meets
-    /// itself behind the holes; or seeds in all balls and bars, which meet each other.
+    /// Returns a start from which all components are found: an enclosing surface; the contour of the coarsest level; a
+    /// seed in each component, which grows through its bars and meets itself behind the holes; or seeds in all balls
+    /// and bars, which merge.
     fn start(&self, random: &mut Random) -> Start {
         let part = self.parts();
         let balls = (0..part.len()).map(|k| self.balls[k]);
@@ -111,7 +113,7 @@ fn are_neighbours(a: [usize; 3], b: [usize; 3]) -> bool {
     (0..3).map(|k| a[k].abs_diff(b[k])).sum::<usize>() == 1
 }
 
-/// Returns how many parts merged or parted on the way.
+/// Runs the model on the frame of a seed and asserts its topology. Returns the numbers of merges and splits.
 fn run(seed: u64) -> [u32; 2] {
     let mut random = Random(seed);
     let frame = Frame::random(&mut random);
@@ -140,7 +142,7 @@ fn run(seed: u64) -> [u32; 2] {
         let report = model.step().unwrap();
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}: {report:?}");
         let triangles = model.mesh().to_triangles();
-        assert_eq!(count_crossings(&triangles), 0, "{what}: {report:?}");
+        assert_eq!(count_self_intersections(&triangles), 0, "{what}: {report:?}");
         let misplaced = misplaced_parts(&triangles);
         assert!(misplaced.is_empty(), "{what}: {misplaced:?}, {report:?}");
         changes[0] += report.events.axial;
@@ -154,17 +156,17 @@ fn run(seed: u64) -> [u32; 2] {
     changes
 }
 
-/// Regression: with `seeding: On` and balls that merge on a coarse level, parts of the finer level were seeded beside the surface, joined it
-/// by several tubes each, and left handles.
+/// Regression: with `seeding: On` and balls that merge on a coarse level, components of the finer level were seeded
+/// beside the surface, joined it by several tubes each, and left handles.
 #[test]
-fn what_a_coarse_level_leaves_out_makes_no_handles() {
+fn seeding_after_merges_on_a_coarse_level_leaves_no_handles() {
     for seed in [10117, 10574, 10696, 10704, 11538, 12352, 12652] {
         run(seed);
     }
 }
 
 #[test]
-fn every_part_of_a_random_shape_is_found_with_its_holes() {
+fn random_shapes_have_the_right_components_and_holes() {
     let mut all = [0, 0];
     for seed in seeds(SEEDS) {
         let named = Named::new(seed);

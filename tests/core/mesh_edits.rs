@@ -13,7 +13,7 @@ fn tetrahedron() -> Mesh {
     Mesh::from_triangles(&TriangleMesh { positions, triangles, ..Default::default() }).unwrap()
 }
 
-/// A torus of `n` × `m` vertices; `n` = 3 gives rings of three edges to cut.
+/// Returns a torus of `n` × `m` vertices; 3 as `n` or `m` gives rings of three edges that can be cut.
 fn torus(n: u32, m: u32) -> Mesh {
     Mesh::from_triangles(&torus_around(Vec3::ZERO, [n, m], [3.0, 1.0])).unwrap()
 }
@@ -27,7 +27,7 @@ fn v(i: u32) -> VertexId {
 }
 
 #[test]
-fn shapes_are_sound() {
+fn initial_meshes_are_valid() {
     for (mesh, euler) in
         [(tetrahedron(), 2), (torus(7, 5), 0), (sphere(), 2), (Mesh::icosahedron(Vec3::ONE, 2.0), 2)]
     {
@@ -62,7 +62,7 @@ fn flip_twice_restores_the_edges() {
     let mut mesh = sphere();
     let before: Vec<_> = mesh.edges().collect();
     let (a, b) = before[10];
-    let across = mesh.opposite(a, b).unwrap();
+    let across = mesh.opposite_vertices(a, b).unwrap();
     mesh.flip(a, b).unwrap();
     assert!(!mesh.ring(a).contains(b) && mesh.ring(across.left).contains(across.right));
     assert_eq!(mesh.check(), Ok(()));
@@ -77,7 +77,7 @@ fn flip_twice_restores_the_edges() {
 }
 
 #[test]
-fn refusals_leave_the_mesh_as_it_was() {
+fn refused_edits_leave_the_mesh_unchanged() {
     let mut mesh = tetrahedron();
     let before = mesh.clone();
     assert_eq!(
@@ -94,7 +94,7 @@ fn refusals_leave_the_mesh_as_it_was() {
 
     let mut ring = torus(3, 8);
     let before = ring.clone();
-    assert!(matches!(ring.collapse(v(0), v(8), Vec3::ZERO), Err(EditError::NeckInTheWay(o)) if o == v(16)));
+    assert!(matches!(ring.collapse(v(0), v(8), Vec3::ZERO), Err(EditError::LinkCondition(o)) if o == v(16)));
     assert_eq!(ring.remove_tetrahedron(v(0)), Err(EditError::NotATetrahedron(v(0))));
     assert_eq!(ring, before);
 }
@@ -113,7 +113,7 @@ fn cutting_a_torus_gives_a_sphere() {
 }
 
 #[test]
-fn cutting_a_neck_parts_a_sphere() {
+fn cutting_a_neck_splits_a_sphere() {
     let mut mesh = torus(8, 3);
     mesh.cut(v(0), v(1), v(2)).unwrap();
     mesh.cut(v(12), v(13), v(14)).unwrap();
@@ -122,7 +122,7 @@ fn cutting_a_neck_parts_a_sphere() {
 }
 
 #[test]
-fn joining_parts_takes_two_from_chi() {
+fn joining_components_subtracts_two_from_the_euler_characteristic() {
     for (a, b) in [(sphere(), sphere()), (tetrahedron(), sphere()), (tetrahedron(), tetrahedron())] {
         let mut mesh = a;
         let other = VertexId::from_index(mesh.slots());
@@ -135,9 +135,9 @@ fn joining_parts_takes_two_from_chi() {
     }
 }
 
-/// Squares of such places do not fit `f32`: no tube was the shortest, and both discs stayed open.
+/// Regression: the squares of such positions overflow `f32`, so no tube was the shortest, and both discs stayed open.
 #[test]
-fn parts_far_out_are_joined_like_others() {
+fn components_far_from_the_origin_are_joined_alike() {
     let scaled = |scale: f32| {
         let mut mesh = sphere();
         let other = VertexId::from_index(mesh.slots());
@@ -152,7 +152,7 @@ fn parts_far_out_are_joined_like_others() {
 
 #[test]
 fn joining_vertices_with_common_neighbours_stays_simplicial() {
-    // Both ends of a double pyramid share every neighbour.
+    // The two tips of a double pyramid have all neighbours in common.
     let mut mesh = torus(8, 3);
     let ring = mesh.ring(v(0)).as_slice().to_vec();
     let far = *mesh.ring(ring[0]).as_slice().iter().find(|&&w| w != v(0) && !ring.contains(&w)).unwrap();
@@ -161,7 +161,7 @@ fn joining_vertices_with_common_neighbours_stays_simplicial() {
 }
 
 #[test]
-fn refinement_triples_the_triangles_and_keeps_chi() {
+fn refinement_triples_the_triangles_and_keeps_the_euler_characteristic() {
     for mut mesh in [tetrahedron(), torus(7, 5), sphere()] {
         let (triangles, edge, euler) = (mesh.triangle_count(), mesh.longest_edge(), mesh.euler());
         mesh.refine().unwrap();
@@ -189,7 +189,7 @@ fn reordering_keeps_shape_and_attributes() {
 }
 
 #[test]
-fn open_and_broken_triangle_lists_are_refused_with_words() {
+fn open_and_invalid_triangle_lists_are_refused_with_a_reason() {
     let four = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     let refusal = |positions: &Vec<Vec3>, triangles: Vec<[u32; 3]>| {
         let mesh = TriangleMesh { positions: positions.clone(), triangles, ..Default::default() };
@@ -199,13 +199,13 @@ fn open_and_broken_triangle_lists_are_refused_with_words() {
     assert!(refusal(&four, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 2, 3]]).contains("orientation"));
     assert!(refusal(&four, vec![[0, 1, 9]]).contains("index 9"));
     assert!(refusal(&four, vec![]).contains("no triangle"));
-    assert!(refusal(&four, vec![[0, 0, 1]]).contains("same corner"));
+    assert!(refusal(&four, vec![[0, 0, 1]]).contains("two equal corners"));
     assert!(refusal(&four, vec![[0, 1, 2], [0, 2, 1]]).contains("fewer than three"));
     let bad = vec![Vec3::NAN, Vec3::X, Vec3::Y, Vec3::Z];
     assert!(refusal(&bad, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).contains("finite"));
 }
 
-/// Removed twice, the slots of a component were free twice, and two vertices later shared one.
+/// Regression: the slots of a component that was removed twice were free twice, and two vertices later shared one.
 #[test]
 fn a_component_is_removed_once() {
     let mut mesh = tetrahedron();
@@ -217,7 +217,7 @@ fn a_component_is_removed_once() {
     assert!(mesh == without && mesh.check() == Ok(()));
 }
 
-/// One random edit on a random place, refused or done.
+/// Tries one random edit at a random vertex; returns the change of the Euler characteristic, or the refusal.
 fn random_edit(mesh: &mut Mesh, random: &mut Random, live: &[VertexId]) -> Result<i64, EditError> {
     let u = live[random.below(live.len())];
     let ring = mesh.ring(u).as_slice().to_vec();
@@ -230,7 +230,7 @@ fn random_edit(mesh: &mut Mesh, random: &mut Random, live: &[VertexId]) -> Resul
         25 => mesh.join(u, live[random.below(live.len())], 0.5 + 0.4 * random.unit()).map(|_| -2),
         26..28 => mesh.remove_tetrahedron(u).map(|()| -2),
         _ => {
-            let opposite = mesh.opposite(u, w)?;
+            let opposite = mesh.opposite_vertices(u, w)?;
             let third = |o: &VertexId| *o != opposite.left && *o != opposite.right;
             let common = mesh.common_neighbours(u, w);
             let o = *common.iter().find(|o| third(o)).ok_or(EditError::IsTriangle)?;
@@ -239,7 +239,8 @@ fn random_edit(mesh: &mut Mesh, random: &mut Random, live: &[VertexId]) -> Resul
     }
 }
 
-/// Edits until `edits` are done; the attribute, a copy of the positions moved by midpoints only, must follow.
+/// Makes random edits until `edits` have succeeded, and returns the number of refusals. The attribute, a copy of the
+/// positions, must follow all edits.
 fn run_random_edits(start: fn() -> Mesh, seed: u64, edits: usize) -> usize {
     let mut random = Random(seed);
     let (mut mesh, mut key) = followed(start());
@@ -268,7 +269,7 @@ fn run_random_edits(start: fn() -> Mesh, seed: u64, edits: usize) -> usize {
     refused
 }
 
-/// The mesh with its positions once more as an attribute.
+/// Returns the mesh with a copy of its positions as an attribute.
 fn followed(mut mesh: Mesh) -> (Mesh, VectorKey) {
     let key = mesh.add_vector();
     let positions = mesh.positions().to_vec();
@@ -276,7 +277,7 @@ fn followed(mut mesh: Mesh) -> (Mesh, VectorKey) {
     (mesh, key)
 }
 
-/// 100,000 edits in all; a seed that fails prints itself.
+/// 100,000 edits in all; a failing seed is named.
 #[test]
 fn random_edits_keep_every_invariant() {
     let starts: [fn() -> Mesh; 5] =
@@ -286,20 +287,20 @@ fn random_edits_keep_every_invariant() {
     assert!(refused > 1_000, "only {refused} edits were refused: refusals are not tested");
 }
 
-/// What a mesh is, without its versions.
+/// Returns the serialised mesh, which leaves out its versions.
 fn contents(mesh: &Mesh) -> Vec<u8> {
     postcard::to_allocvec(mesh).unwrap()
 }
 
 type Placed = [(VertexId, [u32; 3]); 3];
 
-/// The triangles of a mesh: names and places of their corners.
+/// Returns the triangles of a mesh as ids and positions of their vertices.
 fn placed_triangles(mesh: &Mesh) -> BTreeSet<Placed> {
     let corner = |v: VertexId| (v, mesh.position(v).to_array().map(f32::to_bits));
     mesh.triangles().map(|names| names.map(corner)).collect()
 }
 
-/// Several random edits and moves, recorded. Returns whether they are then taken back.
+/// Records several random edits and moves, then commits them or rolls them back. Returns whether they were rolled back.
 fn run_recorded_edits(mesh: &mut Mesh, random: &mut Random, what: &str) -> bool {
     let before = mesh.clone();
     mesh.begin();
@@ -316,7 +317,7 @@ fn run_recorded_edits(mesh: &mut Mesh, random: &mut Random, what: &str) -> bool 
     let changed: BTreeSet<[VertexId; 3]> = mesh.changed_triangles().into_iter().collect();
     let expected = new.difference(&old).map(|corners| corners.map(|(v, _)| v)).collect();
     assert_eq!(changed, expected, "{what}");
-    let touched: BTreeSet<VertexId> = mesh.touched().collect();
+    let touched: BTreeSet<VertexId> = mesh.touched_vertices().collect();
     let is_known = |v: VertexId| v.index() < before.slots() && before.is_live(v);
     let same = |v: VertexId| before.ring(v) == mesh.ring(v) && before.position(v) == mesh.position(v);
     let untouched = mesh.vertices().filter(|v| !touched.contains(v));
@@ -334,7 +335,7 @@ fn run_recorded_edits(mesh: &mut Mesh, random: &mut Random, what: &str) -> bool 
 }
 
 #[test]
-fn recorded_edits_are_known_and_can_be_taken_back() {
+fn recorded_edits_are_reported_and_can_be_rolled_back() {
     let starts: [fn() -> Mesh; 4] = [tetrahedron, sphere, || torus(3, 7), || torus(9, 3)];
     for seed in 0..8 {
         let mut random = Random(seed);

@@ -39,7 +39,7 @@ fn real_files_are_closed() {
 }
 
 #[test]
-fn real_files_have_their_texture_coordinates() {
+fn real_files_have_texture_coordinates() {
     let spot = parse_mesh(SPOT).unwrap();
     assert!(spot.corner_uvs.is_some() && spot.uvs.is_none(), "spot has seams");
     assert_eq!(spot.split_at_seams().positions.len(), 3225);
@@ -49,13 +49,13 @@ fn real_files_have_their_texture_coordinates() {
 }
 
 #[test]
-fn compression_is_refused_by_name() {
+fn required_compression_is_refused_by_name() {
     let error = parse_mesh(DRACO).unwrap_err();
     assert!(matches!(error, FormatError::Unsupported { format: "GLB", .. }), "{error}");
     assert!(error.to_string().contains("KHR_draco_mesh_compression"), "{error}");
 }
 
-/// The file with some of its text exchanged, blanks keeping its length.
+/// Returns the file with one piece of text replaced, padded with blanks to the same length.
 fn patched(file: &[u8], from: &str, to: &str) -> Vec<u8> {
     let at = file.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
     let mut file = file.to_vec();
@@ -64,9 +64,9 @@ fn patched(file: &[u8], from: &str, to: &str) -> Vec<u8> {
 }
 
 #[test]
-fn compression_that_is_not_demanded_is_refused_where_nothing_else_is_there() {
+fn optional_compression_is_refused_if_there_is_no_uncompressed_data() {
     let draco = patched(DRACO, r#","extensionsRequired":["KHR_draco_mesh_compression"]"#, "");
-    // By the parts of the name: they are no longer in the list of what is demanded.
+    // Refused when the primitives are read, since the list of required extensions is gone.
     let error = parse_mesh(&draco).unwrap_err().to_string();
     assert!(error.starts_with("GLB: primitives: KHR_draco_mesh_compression is not supported"), "{error}");
 
@@ -98,7 +98,7 @@ fn compression_that_is_not_demanded_is_refused_where_nothing_else_is_there() {
     }
 }
 
-/// The mesh with triangles and vertices as numbered by first use, without the extras that `keep` leaves out.
+/// Returns the mesh with triangles and vertices numbered by first use, and with the selected attributes only.
 fn only(mesh: &TriangleMesh, normals: bool, uvs: bool, colors: bool) -> TriangleMesh {
     let mut mesh = mesh.welded();
     mesh.normals = mesh.normals.filter(|_| normals);
@@ -109,7 +109,7 @@ fn only(mesh: &TriangleMesh, normals: bool, uvs: bool, colors: bool) -> Triangle
 }
 
 #[test]
-fn what_is_written_reads_back_the_same() {
+fn written_meshes_read_back_the_same() {
     for mesh in [octahedron(), octahedron_with_seam()] {
         for (format, normals, uvs, colors) in [
             (MeshFormat::Glb, true, true, true),
@@ -129,9 +129,9 @@ fn what_is_written_reads_back_the_same() {
 }
 
 #[test]
-fn real_meshes_survive_every_format() {
+fn real_meshes_are_preserved_by_every_format() {
     for bytes in [KNOT, FUZE, SPOT] {
-        // Without a texture, whose coordinates OBJ and PLY count from its other edge.
+        // Without a texture, since OBJ and PLY count its coordinates from the opposite edge.
         let mesh = TriangleMesh { texture: None, ..parse_mesh(bytes).unwrap() };
         for format in [MeshFormat::Glb, MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl] {
             let found = parse_mesh(&write_mesh(&mesh, format).unwrap()).unwrap();
@@ -145,7 +145,7 @@ fn real_meshes_survive_every_format() {
 }
 
 #[test]
-fn odd_numbers_survive() {
+fn unusual_numbers_are_preserved() {
     let odd = [1e-45, -3.4e38, 0.1, 1.0 / 3.0, 123_456_790.0, -0.0, 5e-324_f64 as f32];
     let positions: Vec<Vec3> = odd
         .iter()
@@ -160,7 +160,7 @@ fn odd_numbers_survive() {
 }
 
 #[test]
-fn another_reader_takes_our_glb() {
+fn an_independent_reader_accepts_written_glb() {
     for mesh in [octahedron(), octahedron_with_seam(), parse_mesh(KNOT).unwrap(), TriangleMesh::default()] {
         let bytes = write_mesh(&mesh, MeshFormat::Glb).unwrap();
         let file = gltf::Gltf::from_slice(&bytes).unwrap();
@@ -186,7 +186,7 @@ fn another_reader_takes_our_glb() {
 }
 
 #[test]
-fn vtp_holds_the_arrays() {
+fn vtp_contains_the_arrays() {
     let mesh = octahedron();
     let text = String::from_utf8(write_mesh(&mesh, MeshFormat::Vtp).unwrap()).unwrap();
     assert!(text.contains("NumberOfPoints=\"6\"") && text.contains("NumberOfPolys=\"8\""));
@@ -216,7 +216,7 @@ fn from_base64(text: &str) -> Vec<u8> {
 }
 
 #[test]
-fn mz3_holds_the_arrays() {
+fn mz3_contains_the_arrays() {
     let mesh = octahedron();
     let bytes = write_mesh(&mesh, MeshFormat::Mz3).unwrap();
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -228,7 +228,7 @@ fn mz3_holds_the_arrays() {
 }
 
 #[test]
-fn a_mesh_that_is_not_valid_is_not_written() {
+fn an_invalid_mesh_is_not_written() {
     let mut mesh = octahedron();
     mesh.triangles[1][2] = 6;
     for format in MeshFormat::ALL {
@@ -240,7 +240,7 @@ fn a_mesh_that_is_not_valid_is_not_written() {
     }
 }
 
-/// A cube of quads as text PLY with things that are to be passed over.
+/// A cube of quads as text PLY, with elements and properties that readers must skip.
 const CUBE_PLY: &str = "ply\r\nformat ascii 1.0\r\ncomment caf\u{e9}\r\nelement strange 2\r\nproperty list uint8 short odd\r\n\
 element nothing 4000000000\r\nelement vertex 8\r\nproperty double x\r\nproperty double quality\r\nproperty int y\r\nproperty float z\r\n\
 property uchar red\r\nproperty uchar green\r\nproperty uchar blue\r\nelement face 6\r\nproperty uchar flags\r\n\
@@ -256,7 +256,7 @@ fn assert_cube(mesh: &TriangleMesh) {
 }
 
 #[test]
-fn ply_text_with_quads_and_strangers() {
+fn ply_text_with_quads_and_unknown_elements() {
     let mesh = parse_mesh(CUBE_PLY.as_bytes()).unwrap();
     assert_cube(&mesh);
     assert_eq!(mesh.colors.unwrap()[0], Vec3::new(1.0, 0.0, 0.2));
@@ -290,7 +290,7 @@ fn ply_of_both_byte_orders() {
 }
 
 #[test]
-fn obj_of_every_spelling() {
+fn obj_in_every_notation() {
     let text = "# a cube\nmtllib none.mtl\no caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\n\
                 v 1.0e0 1 +1 # last\nvt 0 0\nvt 1\nvn 0 0 1\ng side\ns off\nf 1 3 4 2\nf 5/1 6/2 8/1 7/2\nf 1//1 2//1 \\\n6//1 5//1\n\
                 f -6/-1/-1 -2/1/1 -1/2/1 -5/1/1\rf 1 5 7 3\r\nf 2 4 8 6\nl 1 2\n";
@@ -321,13 +321,13 @@ fn stl_text() {
 }
 
 #[test]
-fn binary_stl_that_calls_itself_solid() {
+fn binary_stl_that_begins_with_solid() {
     let mut bytes = write_mesh(&octahedron(), MeshFormat::Stl).unwrap();
     bytes[..6].copy_from_slice(b"solid ");
     assert_eq!(describe(&parse_mesh(&bytes).unwrap()), (6, 8, 1, 0));
 }
 
-/// A tetrahedron of bytes, its vertices four bytes apart, and a strip of four triangles over it.
+/// A tetrahedron with byte coordinates, its vertices four bytes apart, and a strip of four triangles over it.
 const STRIP: [u8; 22] = [0, 0, 0, 9, 127, 0, 0, 9, 0, 127, 0, 9, 0, 0, 127, 9, 0, 2, 1, 3, 0, 2];
 
 fn strip_document(nodes: &str) -> String {
@@ -342,7 +342,7 @@ fn strip_document(nodes: &str) -> String {
 }
 
 #[test]
-fn glb_with_strips_quantised_and_mirrored_nodes() {
+fn glb_with_strips_and_quantised_or_mirrored_nodes() {
     let nodes = r#"{"children":[1,2],"translation":[0,0,10]},{"mesh":0,"scale":[2,2,2]},
         {"mesh":0,"matrix":[-1,0,0,0, 0,1,0,0, 0,0,1,0, -5,0,0,1]}"#;
     let mesh = parse_mesh(&glb(&strip_document(nodes), &STRIP)).unwrap();
@@ -355,7 +355,7 @@ fn glb_with_strips_quantised_and_mirrored_nodes() {
 }
 
 #[test]
-fn glb_that_contradicts_itself() {
+fn glb_with_contradictions_is_refused() {
     let good = strip_document(r#"{"mesh":0}"#);
     assert!(parse_mesh(&glb(&good, &STRIP)).is_ok());
     let loop_of_nodes = strip_document(r#"{"mesh":0},{"children":[2]},{"children":[1,0]}"#);
@@ -387,7 +387,7 @@ fn glb_that_contradicts_itself() {
 }
 
 #[test]
-fn a_mesh_repeated_without_end_is_refused() {
+fn a_mesh_instanced_too_often_is_refused() {
     let nodes = vec![r#"{"mesh":0}"#; 500].join(",");
     let many = r#"{"mode":4,"attributes":{"POSITION":0},"indices":1},"#.repeat(1000);
     let json = strip_document(&nodes).replace(r#""primitives":["#, &format!(r#""primitives":[{many}"#));
@@ -396,14 +396,14 @@ fn a_mesh_repeated_without_end_is_refused() {
 }
 
 #[test]
-fn bytes_of_no_mesh() {
+fn bytes_that_are_no_mesh_are_refused() {
     for (bytes, message) in [
         (&b""[..], "mesh file: content"),
         (b"hello, world\n", "text without vertices"),
         (b"\x1f\x8b\x08\0\0", "gzip"),
         (b"{\"asset\":{}}", "JSON"),
         (b"<?xml version=\"1.0\"?>", "XML"),
-        (b"\0\x01\x02", "without a known mark"),
+        (b"\0\x01\x02", "unknown binary format"),
         (&[1; 200], "STL: triangles: needs"),
         (&[0; 200], "STL: triangle count"),
         (b"ply\n", "PLY: header: has no end_header"),
@@ -411,7 +411,7 @@ fn bytes_of_no_mesh() {
         (b"ply\nformat ascii 2.0\nend_header\n", "PLY: format: ascii 2.0"),
         (b"ply\nformat ascii 1.0\nend_header\n", "PLY: faces"),
         (b"ply\nformat ascii 1.0\nproperty float x\n", "PLY: property"),
-        (b"ply\nformat ascii 1.0\nelement vertex -1\n", "PLY: element vertex: count -1"),
+        (b"ply\nformat ascii 1.0\nelement vertex -1\n", "PLY: element vertex: count must be"),
         (
             b"ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n1 2\n",
             "PLY: element vertex: needs",
@@ -419,9 +419,9 @@ fn bytes_of_no_mesh() {
         (b"v 1 2 3\n", "OBJ: faces"),
         (b"v 1 2\nf 1 1 1\n", "OBJ: line 1"),
         (b"v 1 2 x\n", "OBJ: line 1"),
-        (b"v 1 2 3\nv 1 2 4\nv 1 2 5\nf 1 2 4\n", "OBJ: line 4: a face names v 4"),
+        (b"v 1 2 3\nv 1 2 4\nv 1 2 5\nf 1 2 4\n", "OBJ: line 4: v index 4 is out of range"),
         (b"v 1 2 3\nf 0 0 0\n", "OBJ: line 2"),
-        (b"v 1 2 3\nf 1 1\n", "OBJ: line 2: a face has 2 corners"),
+        (b"v 1 2 3\nf 1 1\n", "OBJ: line 2: a face must have at least three corners, got 2"),
         (b"v nan 2 3\nv 1 2 4\nv 1 3 5\nf 1 2 3\n", "OBJ: positions: vertex 0"),
         (b"glTF\x01\0\0\0", "GLB: version: 1"),
         (b"glTF\x02\0\0\0\x04\0\0\0", "GLB: JSON chunk: is missing"),
@@ -434,12 +434,12 @@ fn bytes_of_no_mesh() {
 }
 
 #[test]
-fn ply_bodies_that_contradict_the_header() {
+fn ply_bodies_that_contradict_the_header_are_refused() {
     for (from, to, field) in [
-        ("0 4 0 2 3 1", "0 4 0 2 3 8", "face 0: names vertex 8"),
+        ("0 4 0 2 3 1", "0 4 0 2 3 8", "face 0: vertex index 8"),
         ("0 4 0 2 3 1", "0 4 0 2 3 -1", "face 0"),
         ("0 4 0 2 3 1", "0 4 0 2 3 1.5", "face 0"),
-        ("0 4 0 2 3 1", "0 2 0 2", "face 0: has 2 corners"),
+        ("0 4 0 2 3 1", "0 2 0 2", "face 0: must have at least three corners, got 2"),
         ("0 4 0 2 3 1", "0 4000 0 2 3 1", "vertex_index: a list of 4000"),
         ("0 4 0 2 3 1", "0 x 0 2 3 1", "vertex_index: \"x\""),
         ("0 4 1 3 7 5\n", "", "flags"),
@@ -454,7 +454,7 @@ fn ply_bodies_that_contradict_the_header() {
     }
 }
 
-/// Every format there is, small.
+/// Returns a small file of every format.
 fn samples() -> Vec<Vec<u8>> {
     let written = [MeshFormat::Glb, MeshFormat::Ply, MeshFormat::Stl, MeshFormat::Obj]
         .map(|format| write_mesh(&octahedron_with_seam(), format).unwrap());
@@ -469,13 +469,13 @@ fn samples() -> Vec<Vec<u8>> {
     all
 }
 
-/// Whatever comes out is a valid mesh or an error; a panic names what went in.
+/// Asserts that parsing gives a valid mesh or an error; a panic names the input.
 fn survives(bytes: &[u8], what: &str) {
     let outcome = std::panic::catch_unwind(|| parse_mesh(bytes));
     match outcome {
         Ok(Ok(mesh)) => {
             assert_eq!(mesh.validate(), Ok(()), "{what}");
-            // A small file names no large mesh.
+            // The mesh is no larger than the file.
             assert!(mesh.positions.len() <= bytes.len() && mesh.triangles.len() <= bytes.len(), "{what}");
         }
         Ok(Err(error)) => assert!(!error.to_string().is_empty()),
@@ -484,7 +484,7 @@ fn survives(bytes: &[u8], what: &str) {
 }
 
 #[test]
-fn files_cut_short() {
+fn truncated_files_give_a_mesh_or_an_error() {
     for (n, sample) in samples().iter().enumerate() {
         for length in 0..sample.len() {
             survives(&sample[..length], &format!("sample {n} cut to {length}"));
@@ -499,7 +499,7 @@ fn files_cut_short() {
 }
 
 #[test]
-fn files_with_flipped_bytes() {
+fn files_with_changed_bytes_give_a_mesh_or_an_error() {
     for (n, sample) in samples().iter().enumerate() {
         for seed in 0..4000_u64 {
             let mut state = seed.wrapping_mul(2862933555777941757).wrapping_add(n as u64 + 1);
@@ -510,7 +510,7 @@ fn files_with_flipped_bytes() {
             let mut bytes = sample.clone();
             for _ in 0..1 + next(3) {
                 let at = next(bytes.len());
-                // Digits in text lead further in than noise.
+                // Digits in text get further into the parser than random bytes.
                 bytes[at] = if next(2) == 0 { b'0' + next(10) as u8 } else { next(256) as u8 };
             }
             survives(&bytes, &format!("sample {n}, seed {seed}"));

@@ -1,4 +1,4 @@
-//! The multiresolution model against what is known: spheres, rigid motion, necks, contacts, and bad input.
+//! The multiresolution model on known cases: spheres, rigid motion, necks, contacts, and invalid input.
 
 use crate::common::fingerprint;
 use crate::common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
@@ -12,7 +12,7 @@ use vesicle::spatial::surface_distance;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// A coarse skin, so that every frame can be looked at.
+/// Returns parameters of a coarse surface, which is fast enough to check every frame.
 fn coarse(edge: f64) -> MultiresParams {
     MultiresParams { edge_min: 0.65 * edge, edge_max: 1.45 * edge, ..Default::default() }
 }
@@ -22,7 +22,7 @@ fn lamp(ellipsoids: &[ControlEllipsoid], params: MultiresParams) -> Multiresolut
     MultiresolutionModel::new(options).unwrap()
 }
 
-/// A ball with bumps all over.
+/// Returns a ball with bumps all over.
 fn bumpy(edge: f32) -> TriangleMesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles();
     for p in &mut mesh.positions {
@@ -45,22 +45,22 @@ fn bumpy_model(params: MultiresParams) -> MultiresolutionModel {
 }
 
 #[test]
-fn a_skin_over_one_ball_is_that_ball() {
+fn the_surface_over_one_ball_is_that_ball() {
     for energy in [Energy::Membrane, Energy::ThinPlate] {
         let mut model = lamp(&[ball(1.0, 2.0, 3.0, 2.0)], MultiresParams { energy, ..coarse(0.3) });
         settle(&mut model, 20);
         assert_held(&model);
         for v in model.base_mesh().vertices() {
             let radius = model.base_mesh().position(v).distance(Vec3::new(1.0, 2.0, 3.0));
-            // A plate lies on the ball less closely than a film.
+            // A thin plate follows the ball less closely than a membrane.
             assert!((radius - 2.0).abs() < if energy == Energy::Membrane { 0.01 } else { 0.05 }, "{radius}");
         }
     }
 }
 
-/// The soap film between two balls is thinner in the middle than the balls, and nowhere inside them.
+/// The membrane between two balls is thinner in the middle than the balls, and nowhere inside them.
 #[test]
-fn a_skin_over_two_balls_has_a_neck() {
+fn the_surface_over_two_balls_has_a_neck() {
     let mut model = lamp(&[ball(-1.0, 0.0, 0.0, 1.0), ball(1.0, 0.0, 0.0, 1.0)], coarse(0.12));
     let report = settle(&mut model, 20);
     assert_held(&model);
@@ -86,9 +86,10 @@ fn edges_are_in_bounds_after_every_frame() {
     }
 }
 
-/// Overlapping, nested, crossing and parting ones, turned and resized: none is ever left by the skin, or entered.
+/// The ellipsoids overlap, are nested, intersect, separate, rotate and change size; none leaves the surface or is
+/// penetrated by it.
 #[test]
-fn every_ellipsoid_stays_covered_and_is_never_entered() {
+fn every_ellipsoid_stays_covered_and_is_never_penetrated() {
     let thin = ellipsoid([0.0, 0.0, 0.0], [1.2, 0.4, 0.6]);
     for topology in [Topology::Never, Topology::Split, Topology::SplitAndJoin] {
         let start = [ball(-0.6, 0.0, 0.0, 0.8), thin, ball(-0.6, 0.1, 0.0, 0.4)];
@@ -97,7 +98,7 @@ fn every_ellipsoid_stays_covered_and_is_never_entered() {
             let t = f64::from(k) / 11.0;
             let crossing =
                 turned(&ControlEllipsoid { center: [1.4 * t - 0.2, 0.3 * t, 0.0], ..thin }, 2.5 * t);
-            // From inside of the first through the second, and out beyond it.
+            // Moves from the inside of the first ellipsoid through the second and out beyond it.
             let nested = ball(-0.6 + 2.0 * t, 0.1, 0.2 * t, 0.4 + 0.1 * t);
             model.set_ellipsoids(&[ball(-0.6, 0.0, 0.0, 0.8 - 0.2 * t), crossing, nested]).unwrap();
             let report = model.step().unwrap();
@@ -108,7 +109,7 @@ fn every_ellipsoid_stays_covered_and_is_never_entered() {
 }
 
 #[test]
-fn a_neck_parts_and_the_parts_meet_again() {
+fn a_neck_splits_and_the_components_join_again() {
     let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
     let mut model = lamp(&apart(-0.2), MultiresParams { topology: Topology::SplitAndJoin, ..coarse(0.14) });
     let mut components = vec![];
@@ -131,7 +132,7 @@ fn a_neck_parts_and_the_parts_meet_again() {
 }
 
 #[test]
-fn parts_that_may_not_join_press_on_each_other() {
+fn components_that_must_not_join_press_on_each_other() {
     let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
     let mut model = lamp(&apart(0.3), coarse(0.16));
     settle(&mut model, 10);
@@ -144,7 +145,7 @@ fn parts_that_may_not_join_press_on_each_other() {
 }
 
 #[test]
-fn without_topology_a_thread_stays() {
+fn without_topology_changes_a_thread_remains() {
     let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
     let mut model = lamp(&apart(-0.2), MultiresParams { topology: Topology::Never, ..coarse(0.16) });
     for k in 0..9 {
@@ -156,7 +157,7 @@ fn without_topology_a_thread_stays() {
 }
 
 #[test]
-fn rigid_motion_moves_the_detail_exactly_with_it() {
+fn the_detail_follows_a_rigid_motion_exactly() {
     let mut model = bumpy_model(coarse(0.12));
     settle(&mut model, 20);
     let before = model.mesh().to_triangles();
@@ -181,13 +182,13 @@ fn rigid_motion_moves_the_detail_exactly_with_it() {
 }
 
 #[test]
-fn the_detail_is_that_of_the_surface_and_stays_so_when_pulled() {
+fn the_detail_reproduces_the_surface_and_keeps_it_under_deformation() {
     let mut model = bumpy_model(MultiresParams { supersample: 1, ..coarse(0.1) });
     let detail = bumpy(0.06);
     let report = model.step().unwrap();
     assert_sound(&model, &report);
     let distance = surface_distance(&model.mesh().to_triangles(), &detail).unwrap();
-    // The chord of an edge that is no longer than the longest over bumps of curvature 4.
+    // The sagitta of the longest edge over bumps of curvature 4.
     assert!(distance.mean < 0.5 * 4.0 * 0.145 * 0.145 / 8.0, "{}", distance.mean);
     for k in 1..=6 {
         model
@@ -208,7 +209,7 @@ fn the_detail_is_that_of_the_surface_and_stays_so_when_pulled() {
 }
 
 #[test]
-fn the_map_keeps_areas_and_does_not_fold_before_a_pinch() {
+fn the_base_correspondence_keeps_areas_and_does_not_fold() {
     let globe = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles();
     let mut model = MultiresolutionModel::new(MultiresOptions {
         base: Some(globe),
@@ -227,14 +228,14 @@ fn the_map_keeps_areas_and_does_not_fold_before_a_pinch() {
         areas.sort_by(f64::total_cmp);
         let [low, high] = [areas[areas.len() / 20], areas[areas.len() - 1 - areas.len() / 20]];
         assert!(low > 0.4 && high < 2.2, "{low} {high} at {x}");
-        // The link lies on the base.
+        // Corresponding points lie on the base.
         let on_base = |p: &Vec3| (f64::from(p.length()) - 1.0).abs() < 0.01;
         assert!(model.link_mesh().positions.iter().all(on_base));
     }
 }
 
 #[test]
-fn a_state_goes_on_bit_for_bit() {
+fn a_restored_run_continues_bit_for_bit() {
     let params = MultiresParams { topology: Topology::SplitAndJoin, ..coarse(0.14) };
     let mut model = bumpy_model(params.clone());
     let goal = [ball(0.0, 0.0, 0.0, 0.995), ball(1.6, 0.4, 0.0, 0.6)];
@@ -260,7 +261,7 @@ fn a_state_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn ellipsoids_come_and_go() {
+fn ellipsoids_are_added_and_removed() {
     let mut model = lamp(&[ball(0.0, 0.0, 0.0, 1.0)], coarse(0.16));
     let volume = |model: &MultiresolutionModel| measure(&model.base_mesh().to_triangles()).volume;
     let before = volume(&model);
@@ -274,9 +275,9 @@ fn ellipsoids_come_and_go() {
     assert!((volume(&model) / before - 1.0).abs() < 0.02);
 }
 
-/// One that grew outside would push the skin away, and tear its map.
+/// An ellipsoid that grew outside the surface would push it away and tear its base correspondence.
 #[test]
-fn one_that_is_new_outside_comes_out_of_its_neighbour() {
+fn a_new_ellipsoid_outside_grows_out_of_its_neighbour() {
     let old = [ball(0.0, 0.0, 0.0, 1.0), ball(-0.8, 0.0, 0.0, 0.7)];
     let mut model = lamp(&old, coarse(0.16));
     settle(&mut model, 20);
@@ -289,9 +290,9 @@ fn one_that_is_new_outside_comes_out_of_its_neighbour() {
     assert!(measure(&model.base_mesh().to_triangles()).volume > before + 0.5);
 }
 
-/// Frames on the way may only freshen the skin up; what stands was solved for.
+/// Frames in between may only relax the surface; the final one is solved for.
 #[test]
-fn many_small_moves_end_as_one_place() {
+fn many_small_moves_end_like_one_large_move() {
     let at = |way: f64| [ball(-0.7, 0.0, 0.0, 0.8), ball(0.5 + way, 0.2 * way, 0.0, 0.7)];
     let mut dragged = lamp(&at(0.0), coarse(0.1));
     settle(&mut dragged, 20);
@@ -306,12 +307,12 @@ fn many_small_moves_end_as_one_place() {
     settle(&mut placed, 20);
     let [dragged, placed] = [dragged, placed].map(|model| model.base_mesh().to_triangles());
     let apart = surface_distance(&dragged, &placed).unwrap().hausdorff;
-    // At rest either is within an edge of where it would go.
+    // When converged, each is within an edge length of the exact solution.
     assert!(apart < 0.15, "{apart}");
 }
 
 #[test]
-fn edges_forty_times_as_long_are_come_by_frame_by_frame() {
+fn edges_grow_to_forty_times_their_length_within_a_few_frames() {
     let mut model = lamp(&[ball(0.0, 0.0, 0.0, 20.0)], coarse(0.5));
     model.set_params(coarse(20.0)).unwrap();
     for _ in 0..8 {
@@ -322,7 +323,7 @@ fn edges_forty_times_as_long_are_come_by_frame_by_frame() {
 }
 
 #[test]
-fn parameters_are_live() {
+fn parameters_apply_to_the_running_model() {
     let mut model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.2));
     settle(&mut model, 20);
     let vertices = model.base_mesh().vertex_count();
@@ -335,7 +336,7 @@ fn parameters_are_live() {
 }
 
 #[test]
-fn super_sampling_shows_at_once_and_moves_nothing() {
+fn supersampling_applies_at_once_and_moves_nothing() {
     let mut model = bumpy_model(coarse(0.12));
     settle(&mut model, 20);
     let (base, vertices) = (model.base_mesh().clone(), model.mesh().vertex_count());
@@ -354,9 +355,9 @@ fn levels_go_from_coarse_to_fine() {
     assert!(levels.windows(2).all(|pair| pair[1].triangles.len() > 2 * pair[0].triangles.len()));
 }
 
-/// A base made of the detail: with its detail back it is the surface that was given.
+/// The base is computed from the detail; base and detail together reproduce the given surface.
 #[test]
-fn a_base_is_made_where_none_is_given() {
+fn a_missing_base_is_computed_from_the_detail() {
     let detail = bumpy(0.06);
     let model = MultiresolutionModel::new(MultiresOptions {
         detail: Some(detail.clone()),
@@ -367,7 +368,7 @@ fn a_base_is_made_where_none_is_given() {
     .unwrap();
     let distance = surface_distance(&model.mesh().to_triangles(), &detail).unwrap();
     assert!(distance.mean < 0.01, "{}", distance.mean);
-    // Its base has lost the bumps.
+    // The base has lost the bumps.
     let base = model.base_mesh().to_triangles();
     let radii: Vec<f32> = base.positions.iter().map(|p| p.length()).collect();
     let [low, high] = [f32::min, f32::max].map(|pick| radii.iter().copied().reduce(pick).unwrap());
@@ -379,7 +380,7 @@ fn refusal(options: MultiresOptions) -> MethodError {
 }
 
 #[test]
-fn bad_input_is_named() {
+fn invalid_input_is_refused_by_name() {
     let good = || MultiresOptions {
         detail: Some(bumpy(0.2)),
         ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.9)],
@@ -431,9 +432,9 @@ fn bad_input_is_named() {
     assert!(matches!(error, MethodError::TooManyVertices { .. }), "{error}");
 }
 
-/// Grown a million times with edges as they are, the skin would need more vertices than there is memory for.
+/// Scaled a million times with the same edge lengths, the surface would need more vertices than fit into memory.
 #[test]
-fn a_skin_that_gets_too_large_is_refused_and_stays() {
+fn a_surface_that_gets_too_large_is_refused_and_kept() {
     let mut model = lamp(&[ball(0.0, 0.0, 0.0, 1.0)], coarse(0.2));
     model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1e5)]).unwrap();
     let mut frames = 0;
@@ -451,9 +452,9 @@ fn a_skin_that_gets_too_large_is_refused_and_stays() {
     assert_eq!(model.base_mesh().check(), Ok(()));
 }
 
-/// The same as `tests/js/lamp.ts` makes in Node and in the browser.
+/// The same as `tests/js/lamp.ts` computes in Node and in the browser.
 #[test]
-fn bits_are_the_same_everywhere() {
+fn bits_are_the_same_on_every_platform() {
     let params = MultiresParams {
         edge_min: 0.125,
         edge_max: 0.28125,
@@ -469,5 +470,5 @@ fn bits_are_the_same_everywhere() {
     assert_eq!(format!("{:016x}", fingerprint(&model.surface().positions)), LAMP_BITS);
 }
 
-/// After a change of the core that is meant, take what the test finds, here and in `tests/js/lamp.ts`.
+/// After an intended change of the core, copy the value that the test finds here and to `tests/js/lamp.ts`.
 const LAMP_BITS: &str = "82280a25d547c21c";

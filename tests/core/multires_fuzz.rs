@@ -1,6 +1,7 @@
-//! Skins over random ellipsoids on random ways, with random parameters: closed, without crossings, after every frame.
+//! Surfaces over random ellipsoids with random motion and parameters: closed, and free of self-intersections after
+//! every frame.
 //!
-//! `FUZZ_SEEDS=<first>..<last>` chooses other seeds; a seed that fails is said.
+//! `FUZZ_SEEDS=<first>..<last>` runs other seeds; a failing seed is printed.
 
 use crate::common::skins::assert_sound;
 use crate::common::{Named, Random, seeds};
@@ -42,7 +43,7 @@ fn random_params(random: &mut Random) -> MultiresParams {
     }
 }
 
-/// A ball with random bumps, some of them high.
+/// Returns a ball with random bumps, some of them high.
 fn random_detail(random: &mut Random) -> vesicle::mesh::TriangleMesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.2, 0.15).unwrap().to_triangles();
     let (waves, height) = (direction(random) * random.within(1.0, 6.0), random.within(0.0, 0.35));
@@ -62,7 +63,7 @@ fn begun(random: &mut Random) -> Option<(MultiresolutionModel, usize)> {
     let options = MultiresOptions { detail, ellipsoids, params: random_params(random), base: None };
     match MultiresolutionModel::new(options) {
         Ok(model) => Some((model, count)),
-        // Some are outside of the bumps, or no base can be made.
+        // Some ellipsoids are outside the bumps, or no base can be computed.
         Err(MethodError::InvalidArgument { parameter: "ellipsoids" | "detail", .. }) => None,
         Err(error) => panic!("{error}"),
     }
@@ -78,7 +79,7 @@ fn run(seed: u64) {
             _ => {}
         }
         let goals: Vec<_> = (0..count).map(|_| random_ellipsoid(random, 1.8)).collect();
-        // Refused where a tip is too sharp for the edges.
+        // Refused if a tip is too sharp for the edge lengths.
         _ = model.set_ellipsoids(&goals);
         for _ in 0..1 + random.below(3) {
             let report = model.step().unwrap();
@@ -89,17 +90,17 @@ fn run(seed: u64) {
 }
 
 #[test]
-fn random_skins_stay_sound() {
+fn random_surfaces_stay_valid() {
     for seed in seeds(12) {
         let _named = Named::new(seed);
         run(seed);
     }
 }
 
-/// Found by chance: the first skin was solved for without a look at whether it crosses itself; an ellipsoid that grew
-/// outside pushed the skin off all others.
+/// Regression: the first surface was solved for without a test for self-intersections; an ellipsoid that grew outside
+/// pushed the surface off all others.
 #[test]
-fn seeds_that_were_wrong_once() {
+fn seeds_that_failed_once() {
     for seed in [118, 1282] {
         let _named = Named::new(seed);
         run(seed);

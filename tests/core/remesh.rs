@@ -1,23 +1,23 @@
-//! Remeshing: triangles alike, the same topology and shape, and nothing crosses.
+//! Remeshing: even triangles, the same topology and shape, and no self-intersections.
 
 use crate::common::shapes;
 use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
-use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::{EdgeBounds, remesh};
 use vesicle::spatial::surface_distance;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Bounds about a length, a little more than twice as far apart as they have to be.
+/// Returns bounds around a target length, whose ratio is a little more than the minimum of 2.
 fn about(aim: f32) -> EdgeBounds {
     EdgeBounds { min: aim / 1.5, max: aim * 1.5 }
 }
 
-/// The mesh remeshed, after all promises were checked.
+/// Returns the remeshed mesh, after checking all guarantees.
 fn remeshed(mesh: &TriangleMesh, bounds: EdgeBounds) -> TriangleMesh {
-    assert_eq!(count_crossings(mesh), 0, "a crossing in the test's own mesh");
+    assert_eq!(count_self_intersections(mesh), 0, "a crossing in the test's own mesh");
     let mut dynamic = Mesh::from_triangles(mesh).unwrap();
     remesh(&mut dynamic, bounds).unwrap();
     assert_eq!(dynamic.check(), Ok(()));
@@ -28,7 +28,7 @@ fn remeshed(mesh: &TriangleMesh, bounds: EdgeBounds) -> TriangleMesh {
     result
 }
 
-/// The share of edges out of bounds.
+/// Returns the fraction of edges out of bounds.
 fn outside(mesh: &TriangleMesh, bounds: EdgeBounds) -> f64 {
     let at = |v: u32| mesh.positions[v as usize];
     let edges = || mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
@@ -36,7 +36,7 @@ fn outside(mesh: &TriangleMesh, bounds: EdgeBounds) -> f64 {
     edges().filter(is_out).count() as f64 / edges().count() as f64
 }
 
-/// The smallest angle of each triangle, in degrees, in order.
+/// Returns the smallest angle of each triangle, in degrees, in ascending order.
 fn sharpest_angles(mesh: &TriangleMesh) -> Vec<f64> {
     let angle = |[a, b, c]: [Vec3; 3]| {
         let [a, b, c] = [a, b, c].map(DVec3::from);
@@ -50,7 +50,7 @@ fn sharpest_angles(mesh: &TriangleMesh) -> Vec<f64> {
     angles
 }
 
-/// How far the two are from each other, in the aim.
+/// Returns the Hausdorff distance of two meshes, relative to the target edge length.
 fn distance(a: &TriangleMesh, b: &TriangleMesh, aim: f32) -> f64 {
     surface_distance(a, b).unwrap().hausdorff / f64::from(aim)
 }
@@ -64,7 +64,7 @@ fn assorted_shapes_at_three_sizes() {
             let bounds = about(mean * factor);
             let result = remeshed(&mesh, bounds);
             let far = distance(&result, &mesh, mean * factor);
-            // The corners of a slab much thinner than the edges may go, and tips of roughness.
+            // The corners of a slab much thinner than the edges may be lost, and the tips of a rough surface.
             let is_hard = ["thin slab", "noisy ball"].contains(&name);
             assert!(far < if is_hard { 0.8 } else { 0.5 }, "{name}, {factor}: {far}");
             sharpest.push(sharpest_angles(&result)[0]);
@@ -76,8 +76,8 @@ fn assorted_shapes_at_three_sizes() {
 }
 
 #[test]
-fn a_torus_gets_even() {
-    // Of triangles six times as long as wide.
+fn a_torus_gets_even_triangles() {
+    // Its triangles are six times as long as wide.
     let torus = torus_around(Vec3::ZERO, [300, 12], [3.0, 1.0]);
     for aim in [0.1, 0.2, 0.5] {
         let result = remeshed(&torus, about(aim));
@@ -89,7 +89,7 @@ fn a_torus_gets_even() {
 }
 
 #[test]
-fn the_edges_of_a_cube_stay() {
+fn the_edges_of_a_cube_are_kept() {
     for (n, aim) in [(1, 0.1), (1, 0.3), (16, 0.05), (16, 0.2)] {
         let cube = shapes::cuboid([n; 3], Vec3::ONE);
         let result = remeshed(&cube, about(aim));
@@ -101,7 +101,7 @@ fn the_edges_of_a_cube_stay() {
 }
 
 #[test]
-fn wide_bounds_leave_what_is_within() {
+fn edges_within_wide_bounds_are_kept() {
     let ball = shapes::ellipsoid(0.1, Vec3::ONE);
     let mean = measure(&ball).edge_mean;
     let result = remeshed(&ball, EdgeBounds { min: 0.01, max: 1.0 });
@@ -109,9 +109,9 @@ fn wide_bounds_leave_what_is_within() {
     assert!((measure(&result).edge_mean / mean - 1.0).abs() < 0.1);
 }
 
-/// Random tori, ellipsoids and boxes, two beside each other as near as may be, and random bounds.
+/// Random tori, ellipsoids and boxes, two of each with a tiny gap between them, and random bounds.
 #[test]
-fn random_shapes_and_bounds() {
+fn random_shapes_and_bounds_give_valid_meshes() {
     for seed in seeds(12) {
         let named = Named::new(seed);
         let mut random = Random(seed);
@@ -137,7 +137,7 @@ fn random_shapes_and_bounds() {
 }
 
 #[test]
-fn what_crosses_does_not_stop_it() {
+fn self_intersecting_meshes_are_remeshed() {
     let ball = shapes::ellipsoid(0.1, Vec3::ONE);
     let mut other = ball.clone();
     other.positions.iter_mut().for_each(|p| p.x += 0.7);
@@ -148,9 +148,9 @@ fn what_crosses_does_not_stop_it() {
     assert!(mesh.triangle_count() < before / 2);
 }
 
-/// Flat, tiny, huge and nearly endless ones: the work ends, the invariants hold.
+/// Flat, tiny, huge and elongated meshes: remeshing terminates, and the invariants hold.
 #[test]
-fn hostile_meshes() {
+fn degenerate_meshes_stay_valid() {
     for size in HOSTILE_SCALES {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.positions_mut().iter_mut().for_each(|p| *p *= size);
@@ -165,9 +165,9 @@ fn hostile_meshes() {
     assert_eq!((nothing.vertex_count(), nothing.check()), (0, Ok(())));
 }
 
-/// The unit does not matter, powers of two least of all.
+/// The unit of length does not matter; for powers of two not even to the last bit.
 #[test]
-fn the_same_in_other_units() {
+fn the_result_is_the_same_in_other_units() {
     let torus = torus_around(Vec3::ZERO, [60, 20], [3.0, 1.0]);
     let run = |unit: f32| {
         let mut mesh = Mesh::from_triangles(&torus).unwrap();
@@ -181,7 +181,7 @@ fn the_same_in_other_units() {
 }
 
 #[test]
-fn bounds_that_are_refused() {
+fn invalid_bounds_are_refused() {
     let before = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
     for (min, max) in [
         (0.0, 1.0),
@@ -203,7 +203,7 @@ fn bounds_that_are_refused() {
 }
 
 #[test]
-fn more_than_fits_is_refused_before_it_is_made() {
+fn a_result_that_exceeds_memory_is_refused_in_advance() {
     let mut needle = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
     needle.positions_mut().iter_mut().for_each(|p| *p *= Vec3::new(1.0, 0.0, 0.0));
     for before in [Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap(), needle] {
@@ -217,7 +217,7 @@ fn more_than_fits_is_refused_before_it_is_made() {
 }
 
 #[test]
-fn the_same_every_time() {
+fn remeshing_is_deterministic() {
     let run = || {
         let mut mesh = Mesh::from_triangles(&shapes::noisy_ball()).unwrap();
         remesh(&mut mesh, about(2.0)).unwrap();
@@ -226,7 +226,7 @@ fn the_same_every_time() {
     assert_eq!(run(), run());
 }
 
-/// Vertices are on the surface as it was.
+/// Vertices lie on the original surface.
 #[test]
 fn vertices_stay_on_the_surface() {
     let cube = shapes::cuboid([4; 3], Vec3::ONE);

@@ -1,31 +1,32 @@
-//! The scenes of the paper, whole: what each must come to, and no crossing on the way. A line a scene is printed.
+//! The paper's complete scenes: the result of each, and no self-intersections at any iteration. Prints a line for each
+//! scene.
 //!
-//! By default those that take seconds. `VESICLE_SCENES=all` runs all (some minutes): `npm run scenes`.
+//! By default only scenes that take seconds run. `VESICLE_SCENES=all` runs all (some minutes): `npm run scenes`.
 
 use crate::common::scenes;
 use crate::common::{Random, euler_of_parts, fingerprint};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
-use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
+use vesicle::mesh::{Measures, Mesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Whether long scenes are to be run, too.
+/// Returns whether long scenes are run, too.
 fn all() -> bool {
     std::env::var("VESICLE_SCENES").is_ok_and(|which| which == "all")
 }
 
-/// What a scene came to.
+/// The result of a scene.
 struct Outcome {
     measures: Measures,
-    /// χ of each component, lowest first.
+    /// Euler characteristic of each component, in ascending order.
     euler: Vec<i64>,
 }
 
-/// Runs a model to rest. After every iteration the mesh is sound, χ is as predicted, no two triangles cross, and the
-/// volume of the whole is positive.
+/// Runs a model until it converges. Asserts after every iteration that the mesh is valid, χ is as predicted, no
+/// triangles intersect, and the total volume is positive.
 fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (DeformableModel, Outcome) {
     let mut model = DeformableModel::new(volume, options).unwrap();
     let iterations = loop {
@@ -34,7 +35,7 @@ fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (
         assert_eq!(model.mesh().check(), Ok(()), "{what}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}");
         let triangles = model.mesh().to_triangles();
-        assert_eq!(count_crossings(&triangles), 0, "{what}");
+        assert_eq!(count_self_intersections(&triangles), 0, "{what}");
         assert!(measure(&triangles).volume > 0.0, "{what}");
         if report.done {
             break report.iteration;
@@ -57,14 +58,14 @@ fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> Option<De
     Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::as_published(volume) })
 }
 
-/// Mean distance of the vertices from the surface of which `distance` is the distance.
+/// Returns the mean distance of the vertices from the true surface with the given distance function.
 fn mean_distance(model: &DeformableModel, distance: impl Fn(Vec3) -> f32) -> f32 {
     let surface = model.surface();
     surface.positions.iter().map(|&p| distance(p).abs()).sum::<f32>() / surface.positions.len() as f32
 }
 
-/// Figure 7: from spheres of twelve radii around the two rings, which reach 28.5 voxels from the centre. The paper needed
-/// 90 iterations.
+/// Figure 7: starts from spheres of twelve radii around the two rings, which extend 28.5 voxels from the centre. The
+/// paper needed 90 iterations.
 #[test]
 fn chain_from_twelve_radii() {
     let volume = scenes::chain();
@@ -83,9 +84,9 @@ fn chain_from_twelve_radii() {
     }
 }
 
-/// At an edge of a voxel the rings are found to a tenth of a voxel.
+/// With edges of one voxel the rings are accurate to a tenth of a voxel.
 #[test]
-fn the_chain_is_true() {
+fn the_chain_is_accurate() {
     let volume = scenes::chain();
     let options = DeformableOptions {
         start: Start::Enclosing,
@@ -99,8 +100,8 @@ fn the_chain_is_true() {
     assert!(off <= 0.1);
 }
 
-/// Figure 14, depth 3: holes three voxels wide. Depth 4, holes of one voxel, is beyond what two vertices may be apart
-/// without contact.
+/// Figure 14, depth 3: holes three voxels wide. The holes of depth 4, one voxel wide, are narrower than the contact
+/// distance of two vertices.
 #[test]
 fn menger_sponge_of_depth_three() {
     if !all() {
@@ -117,9 +118,9 @@ fn menger_sponge_of_depth_three() {
     assert_eq!(outcome.euler, [-2816]);
 }
 
-/// A tree of vessels: each branch parts in two, thinner ones.
+/// A tree of vessels: each branch splits into two thinner ones.
 #[test]
-fn a_vessel_tree_is_one_tree() {
+fn a_vessel_tree_is_one_component() {
     let tree = scenes::VesselTree::new();
     let volume = tree.volume();
     let options = DeformableOptions {
@@ -136,7 +137,7 @@ fn a_vessel_tree_is_one_tree() {
     assert!(less.abs() < 0.02 && off <= 0.1);
 }
 
-/// A ball in noise: marching cubes find thousands of specks and handles.
+/// Returns a ball in noise, for which marching cubes give thousands of small components and handles.
 fn noisy_ball() -> Volume {
     let mut random = Random(7);
     let noise: Vec<f32> = (0..48 * 48 * 48).map(|_| random.unit() - 0.5).collect();
@@ -147,7 +148,7 @@ fn noisy_ball() -> Volume {
 }
 
 #[test]
-fn rigidity_cleans_marching_cubes_of_noise() {
+fn rigidity_removes_noise_from_marching_cubes() {
     let volume = noisy_ball();
     let found = measure(&marching_cubes_world(&volume, 0.5, 0).unwrap());
     println!("noisy ball: marching cubes give {} components, χ {}", found.components, found.euler);
@@ -161,9 +162,9 @@ fn rigidity_cleans_marching_cubes_of_noise() {
     assert_eq!(outcome.euler.len(), 1);
 }
 
-/// Nothing holds the surface together here; it must stay sound, whether it rests or not.
+/// Nothing regularises the surface here; it must stay valid whether it converges or not.
 #[test]
-fn marching_cubes_of_noise_without_rigidity_stay_sound() {
+fn marching_cubes_of_noise_without_rigidity_stay_valid() {
     let volume = noisy_ball();
     let options = DeformableOptions {
         start: Start::MarchingCubes(0.5),
@@ -175,14 +176,14 @@ fn marching_cubes_of_noise_without_rigidity_stay_sound() {
     for step in 0..steps {
         model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "step {step}");
-        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "step {step}");
+        assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "step {step}");
     }
     println!("noisy ball, no rigidity: {steps} iterations, {} vertices", model.mesh().vertex_count());
 }
 
-/// The model goes on from a state saved in the middle of a merge as if nothing had been.
+/// A model restored from a state saved in the middle of a merge continues with the same bits.
 #[test]
-fn a_state_saved_in_a_merge_goes_on_bit_for_bit() {
+fn a_run_restored_during_a_merge_continues_bit_for_bit() {
     let volume = scenes::chain();
     let options = || DeformableOptions {
         start: Start::Bubbles(11),
@@ -210,8 +211,8 @@ fn a_state_saved_in_a_merge_goes_on_bit_for_bit() {
     assert!(merges > 3, "{merges} iterations with a merge");
 }
 
-/// Runs a model to rest and prints the seconds by part and level, as the paper's table 1. Returns the measures and the
-/// seconds.
+/// Runs a model until it converges and prints the seconds by part and level, as in the paper's table 1. Returns the
+/// measures and the seconds.
 fn timed(name: &str, volume: &Volume, levels: usize, iso: f64) -> (Measures, f64) {
     let options = DeformableOptions {
         start: Start::Enclosing,
@@ -240,7 +241,7 @@ fn timed(name: &str, volume: &Volume, levels: usize, iso: f64) -> (Measures, f64
         println!("  level {level}  {part:<10} {:>7.2} s", 0.001 * time);
     }
     let surface = model.surface();
-    assert_eq!(count_crossings(&surface), 0);
+    assert_eq!(count_self_intersections(&surface), 0);
     let found = measure(&surface);
     println!(
         "  {} vertices, χ {}, area {:.0}, volume {:.0}",
@@ -249,7 +250,8 @@ fn timed(name: &str, volume: &Volume, levels: usize, iso: f64) -> (Measures, f64
     (found, seconds)
 }
 
-/// Direct against coarse to fine: area within 1 %, volume within 0.3 %. Returns χ of both.
+/// Compares a direct run with coarse to fine: area within 1 %, volume within 0.3 %. Returns the Euler characteristics
+/// of both.
 fn compare(name: &str, volume: &Volume, levels: usize, iso: f64) -> [i64; 2] {
     let (direct, long) = timed(name, volume, 0, iso);
     let (found, short) = timed(name, volume, levels, iso);
@@ -265,17 +267,17 @@ fn compare(name: &str, volume: &Volume, levels: usize, iso: f64) -> [i64; 2] {
 }
 
 #[test]
-fn a_head_direct_and_coarse_to_fine() {
+fn a_head_phantom_direct_and_coarse_to_fine() {
     if all() {
         let [direct, coarse_to_fine] = compare("head phantom", &scenes::head_phantom(), 2, 0.5);
         assert_eq!(direct, coarse_to_fine);
     }
 }
 
-/// The skin of the head of the Visible Human, which the app has as an example.
+/// The skin of the Visible Human's head, one of the app's examples.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
-fn a_tomography_direct_and_coarse_to_fine() {
+fn a_head_ct_direct_and_coarse_to_fine() {
     if all() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head-full.nii.gz");
         let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
@@ -283,16 +285,16 @@ fn a_tomography_direct_and_coarse_to_fine() {
     }
 }
 
-/// Nothing in the core asks for the time; this test does.
+/// Returns milliseconds since the first call. The core reads no clock, so the test supplies one.
 #[allow(clippy::disallowed_methods, reason = "the table is of times")]
 fn milliseconds() -> f64 {
     static BEGAN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     BEGAN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64() * 1e3
 }
 
-/// The same bits after 200 steps natively and in wasm; the package is held to the same number.
+/// The same bits after 200 steps natively and in wasm; the package's tests compare with the same hash.
 #[test]
-fn two_hundred_steps_end_in_the_same_bits_everywhere() {
+fn bits_after_two_hundred_steps_are_the_same_on_every_platform() {
     let volume = scenes::menger(2);
     let options = DeformableOptions {
         start: Start::Enclosing,
@@ -308,9 +310,9 @@ fn two_hundred_steps_end_in_the_same_bits_everywhere() {
     assert_eq!(format!("{found:016x}"), "b68397c8ac5b3b1f");
 }
 
-/// The same at the default settings, coarse to fine, to the end.
+/// The same at the default settings, coarse to fine, until it converges.
 #[test]
-fn the_defaults_end_in_the_same_bits_everywhere() {
+fn bits_at_the_defaults_are_the_same_on_every_platform() {
     let volume = scenes::menger(2);
     let params = DeformableParams { iso: 0.4, ..DeformableParams::for_volume(&volume) };
     let options = DeformableOptions { levels: 2, params: Some(params), ..Default::default() };

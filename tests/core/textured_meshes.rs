@@ -1,4 +1,4 @@
-//! Pictures on meshes, in files and through what is done to meshes; and meshes one after the other as an animation.
+//! Textures of meshes, in files and after mesh operations; and animations of several meshes.
 
 use crate::common::files;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 const SPOT: &[u8] = include_bytes!("../data/meshes/spot.glb");
 const FUZE: &[u8] = include_bytes!("../data/meshes/fuze.obj");
 
-/// Bytes that begin as a picture of each kind does.
+/// Bytes that begin like an image of each format.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n12345";
 const JPEG: &[u8] = b"\xff\xd8\xff\xe0123";
 const WEBP: &[u8] = b"RIFF\x0c\0\0\0WEBPVP8 12";
@@ -21,7 +21,7 @@ fn picture(bytes: &[u8]) -> Arc<Texture> {
     Arc::new(Texture::new(bytes.to_vec()).unwrap())
 }
 
-/// A tetrahedron moved along x, with texture coordinates that have a seam.
+/// Returns a tetrahedron moved along x, with texture coordinates that have a seam.
 fn tetrahedron(shift: f32, texture: Option<Arc<Texture>>) -> TriangleMesh {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
@@ -44,7 +44,7 @@ fn assert_near(found: &TriangleMesh, expected: &TriangleMesh) {
 }
 
 #[test]
-fn a_real_file_brings_its_picture_along() {
+fn a_real_file_includes_its_texture() {
     let spot = parse_mesh(SPOT).unwrap();
     let texture = spot.texture.clone().unwrap();
     assert_eq!((texture.kind(), texture.bytes().len()), (ImageKind::Png, 80212));
@@ -54,7 +54,7 @@ fn a_real_file_brings_its_picture_along() {
 }
 
 #[test]
-fn another_reader_finds_the_picture() {
+fn an_independent_reader_finds_the_texture() {
     for bytes in [PNG, JPEG] {
         let mesh = tetrahedron(0.0, Some(picture(bytes)));
         let file = gltf::Gltf::from_slice(&write_mesh(&mesh, MeshFormat::Glb).unwrap()).unwrap();
@@ -74,7 +74,7 @@ fn another_reader_finds_the_picture() {
 }
 
 #[test]
-fn every_kind_of_picture_reads_back() {
+fn every_image_format_reads_back() {
     for bytes in [PNG, JPEG, WEBP] {
         let mesh = tetrahedron(0.0, Some(picture(bytes)));
         let file = write_mesh(&mesh, MeshFormat::Glb).unwrap();
@@ -89,7 +89,7 @@ fn every_kind_of_picture_reads_back() {
 }
 
 #[test]
-fn the_picture_follows_the_mesh_and_edits_drop_it() {
+fn the_texture_is_kept_with_the_mesh_and_dropped_by_edits() {
     let mesh = tetrahedron(0.0, Some(picture(PNG)));
     let parts = mesh.components();
     let moved = mesh.transformed(&DAffine3::from_scale(DVec3::NEG_ONE));
@@ -103,12 +103,12 @@ fn the_picture_follows_the_mesh_and_edits_drop_it() {
 }
 
 #[test]
-fn a_picture_for_a_file_that_has_it_beside_it() {
+fn an_image_can_be_given_for_a_file_without_it() {
     let (texture, raw) = (picture(JPEG), parse_mesh(FUZE).unwrap());
     let mesh = parse_textured_mesh(FUZE, texture.clone()).unwrap();
     let v = |mesh: &TriangleMesh| mesh.corner_uvs.as_ref().unwrap()[7][1].y;
     assert_eq!(v(&mesh), 1.0 - v(&raw));
-    // Written with its picture known, v is counted from below again.
+    // Written with a known texture, v is counted from below again.
     for format in [MeshFormat::Obj, MeshFormat::Ply] {
         let file = write_mesh(&mesh, format).unwrap();
         assert_near(&parse_mesh(&file).unwrap(), &raw);
@@ -125,7 +125,8 @@ fn a_picture_for_a_file_that_has_it_beside_it() {
     assert!(matches!(error, FormatError::Invalid { format: "STL", .. }), "{error}");
 }
 
-/// A GLB of one triangle with two sets of coordinates, (0, 0), (1, 0), (0, 1) and the same from (5, 5), and a picture.
+/// Returns a GLB of one triangle with an image and two sets of texture coordinates: (0, 0), (1, 0), (0, 1), and the
+/// same from (5, 5) on.
 fn glb(material: &str, image: &str) -> Vec<u8> {
     let mut binary = Vec::new();
     let mut push = |numbers: &[f32]| numbers.iter().for_each(|x| binary.extend(x.to_le_bytes()));
@@ -152,7 +153,7 @@ fn glb(material: &str, image: &str) -> Vec<u8> {
 const IN_VIEW: &str = r#"{"bufferView":3}"#;
 
 #[test]
-fn coordinates_go_by_the_set_and_the_place_of_the_texture() {
+fn texture_coordinates_follow_set_and_transform() {
     let with = |extension: &str| {
         format!(r#"{{"index":0,"extensions":{{"KHR_texture_transform":{{{extension}}}}}}}"#)
     };
@@ -161,7 +162,7 @@ fn coordinates_go_by_the_set_and_the_place_of_the_texture() {
         (r#"{"index":0,"texCoord":1}"#.into(), [[5.0, 5.0], [6.0, 5.0], [5.0, 6.0]]),
         (with(r#""texCoord":1"#), [[5.0, 5.0], [6.0, 5.0], [5.0, 6.0]]),
         (with(r#""offset":[3,4],"scale":[2,-1]"#), [[3.0, 4.0], [5.0, 4.0], [3.0, 3.0]]),
-        // The first example of the extension: the lower left quarter of the picture, turned.
+        // The first example of the extension: the lower left quarter of the image, rotated.
         (
             with(r#""offset":[0,1],"rotation":1.57079632679,"scale":[0.5,0.5]"#),
             [[0.0, 1.0], [0.0, 0.5], [0.5, 1.0]],
@@ -176,11 +177,11 @@ fn coordinates_go_by_the_set_and_the_place_of_the_texture() {
 }
 
 #[test]
-fn pictures_from_elsewhere_and_of_no_kind() {
+fn external_invalid_and_inline_images() {
     let inline = r#"{"uri":"data:image/jpeg;base64,/9j/4DEyMw=="}"#;
     let of = |material: &str, image: &str| parse_mesh(&glb(material, image)).map(|mesh| mesh.texture);
     assert_eq!(of(r#"{"index":0}"#, inline).unwrap(), Some(picture(JPEG)));
-    // A file beside it, a kind that is not known, and a texture of another extension: the mesh comes alone.
+    // An external file, an unknown format, and a texture of another extension: the mesh is read without a texture.
     for (material, image) in [
         (r#"{"index":0}"#, r#"{"uri":"a.png"}"#),
         (r#"{"index":0}"#, r#"{"bufferView":1}"#),
@@ -208,7 +209,8 @@ fn pictures_from_elsewhere_and_of_no_kind() {
     }
 }
 
-/// For each mesh of an animated GLB, when its size changes and to what; each change must hold until the next.
+/// Returns, for each mesh of an animated GLB, the times at which its scale changes and the new scale; steps without
+/// interpolation.
 fn tracks(file: &gltf::Gltf, blob: &[u8]) -> Vec<Vec<(f32, f32)>> {
     let animation = file.animations().next().unwrap();
     let mut tracks = vec![Vec::new(); file.nodes().count()];
@@ -259,7 +261,7 @@ fn an_animation_shows_one_mesh_at_a_time() {
 }
 
 #[test]
-fn an_animation_at_rest_is_its_first_frame() {
+fn the_first_frame_of_an_animation_is_its_static_pose() {
     let frames = [tetrahedron(0.0, None), tetrahedron(2.0, None), tetrahedron(5.0, None)];
     let seen = parse_mesh(&write_animation(&frames, 0.1).unwrap()).unwrap();
     assert_near(&seen, &frames[0].welded());
@@ -269,7 +271,7 @@ fn an_animation_at_rest_is_its_first_frame() {
 }
 
 #[test]
-fn what_is_no_animation() {
+fn invalid_animations_are_refused() {
     let frame = tetrahedron(0.0, None);
     let mut broken = frame.clone();
     broken.triangles[0][0] = 9;

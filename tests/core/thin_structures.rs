@@ -1,9 +1,9 @@
-//! Walls, gaps, strands and hollows that one δ everywhere would lose, at the default settings: right components and χ, and at most
-//! 0.15 voxels off in the mean.
+//! Walls, gaps, strands and hollows that a uniform δ would lose, at the default settings: right components and Euler
+//! characteristics, and a mean error of at most 0.15 voxels.
 
 use crate::common::{Random, euler_of_parts, scenes};
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
-use vesicle::mesh::{TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
     Coverage, DeformableModel, DeformableOptions, DeformableParams, Missing, Seeding, Start,
 };
@@ -11,10 +11,11 @@ use vesicle::volume::{Volume, Voxels, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// The mean error that is accepted, in voxels.
+/// Largest accepted mean error, in voxels.
 const MEAN_ERROR: f64 = 0.15;
 
-/// An object by its signed distance, negative inside. Each voxel has the share of a voxel that is inside, as a scanner would have it.
+/// Returns the image of an object with a signed distance function, negative inside. Each voxel is the fraction of it
+/// that is inside, as a scanner would measure it.
 fn image(dims: [usize; 3], distance: impl Fn(Vec3) -> f32) -> Volume {
     scenes::volume(dims, |p| {
         let mut inside = 0;
@@ -26,14 +27,15 @@ fn image(dims: [usize; 3], distance: impl Fn(Vec3) -> f32) -> Volume {
     })
 }
 
-/// A run at the default settings from a number of levels; sound, and free of self-intersections at every iteration.
+/// Runs the model at the default settings; asserts after every iteration that the mesh is valid and free of
+/// self-intersections.
 fn run(volume: &Volume, options: DeformableOptions) -> (TriangleMesh, Coverage) {
     let mut model = DeformableModel::new(volume, options).unwrap();
     for iteration in 0..1000 {
         let report = model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "iteration {iteration}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "iteration {iteration}");
-        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "iteration {iteration}");
+        assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "iteration {iteration}");
         if report.done {
             return (model.surface(), model.coverage().unwrap());
         }
@@ -41,12 +43,12 @@ fn run(volume: &Volume, options: DeformableOptions) -> (TriangleMesh, Coverage) 
     panic!("not at rest after 1000 iterations");
 }
 
-/// Where sampling theory forbids it: a voxel's share of what is thinner than its diagonal may stay below one half, so the contour of the
-/// image itself has holes.
+/// Objects below the sampling limit: voxels can be less than half full where an object is thinner than their diagonal,
+/// so the contour of the image itself has holes.
 const BELOW_SAMPLING: [&str; 2] = ["shell 1", "ring of radius 0.8"];
 
-/// The object has these components, by their χ, direct and coarse to fine, and the mean error is small: 0.15 voxels, or what the contour
-/// of the image has.
+/// Asserts that the object's components are found, direct and coarse to fine, with the given Euler characteristics, and
+/// that the mean error is at most 0.15 voxels or that of the image's contour.
 fn is_found(what: &str, dims: [usize; 3], euler: &[i64], distance: impl Fn(Vec3) -> f32) {
     let volume = image(dims, &distance);
     let error = |surface: &TriangleMesh| {
@@ -73,7 +75,7 @@ fn is_found(what: &str, dims: [usize; 3], euler: &[i64], distance: impl Fn(Vec3)
     }
 }
 
-/// Distance to a box from its middle and half its size.
+/// Returns the signed distance to a box with the given centre and half of its size.
 fn to_box(p: Vec3, middle: Vec3, half: Vec3) -> f32 {
     let q = (p - middle).abs() - half;
     q.max(Vec3::ZERO).length() + q.max_element().min(0.0)
@@ -92,7 +94,7 @@ fn plates_of_one_voxel_and_more() {
 fn curved_plates_of_one_voxel_and_more() {
     let middle = Vec3::new(15.4, 15.2, 15.3);
     for thickness in [1.0, 1.5, 2.0, 3.0] {
-        // A closed shell: the outer surface and the inner one.
+        // A closed shell: an outer and an inner surface.
         let shell = |p: Vec3| (p.distance(middle) - 11.0).abs() - 0.5 * thickness;
         is_found(&format!("shell {thickness}"), [31; 3], &[2, 2], shell);
     }
@@ -139,9 +141,9 @@ fn two_sheets_side_by_side() {
     }
 }
 
-/// What the paper's method leaves out is told, and where.
+/// Coverage reports the parts that the paper's method leaves out, and their positions.
 #[test]
-fn coverage_tells_what_is_missing() {
+fn coverage_reports_missing_parts() {
     let middle = Vec3::splat(15.3);
     let apart = Vec3::new(28.0, 15.0, 15.0);
     let distance = |p: Vec3| (p.distance(middle) - 7.0).abs() - 2.0;
@@ -155,7 +157,7 @@ fn coverage_tells_what_is_missing() {
     let kinds: Vec<Missing> = before.uncovered.iter().map(|part| part.kind).collect();
     assert_eq!(kinds, [Missing::Matter], "{before:?}");
     assert!(before.uncovered[0].position.as_vec3().distance(apart) < 4.0, "{before:?}");
-    // On demand it is seeded.
+    // They are seeded on demand.
     assert_eq!(model.seed().unwrap().events.seeds, 1);
     while !model.step().unwrap().done {}
     assert!(model.coverage().unwrap().recall > 0.99);
@@ -172,9 +174,9 @@ fn coverage_tells_what_is_missing() {
     assert!(coverage.recall > 0.99 && coverage.precision > 0.99, "{coverage:?}");
 }
 
-/// Surveying in slices gives the same as at once.
+/// Measuring coverage in slices gives the same result as at once.
 #[test]
-fn coverage_in_slices_is_coverage() {
+fn coverage_in_slices_is_the_same() {
     let volume = image([24; 3], |p| p.distance(Vec3::splat(11.4)) - 7.0);
     let model = DeformableModel::new(&volume, DeformableOptions::default()).unwrap();
     let mut survey = model.survey_coverage().unwrap();
@@ -186,7 +188,7 @@ fn coverage_in_slices_is_coverage() {
     assert_eq!(survey.finish(), model.coverage().unwrap());
 }
 
-/// Specks of noise are left out, parts of 64 voxels and more are not.
+/// Components that enclose fewer voxels than `smallest_part` are left out, larger ones are not.
 #[test]
 fn parts_that_are_too_small_are_left_out() {
     let balls = [
@@ -205,10 +207,10 @@ fn parts_that_are_too_small_are_left_out() {
     assert_eq!([20.0, 64.0, 300.0].map(parts), [3, 2, 1]);
 }
 
-/// Positions come out in world space in single precision: sheets pressed on each other must not cross there, either. Before,
-/// sheets nearer than rounding did.
+/// Positions are returned in world space in single precision. Regression: sheets nearer than rounding intersected
+/// there.
 #[test]
-fn nothing_crosses_in_world_space() {
+fn nothing_intersects_in_world_space() {
     let dims = [18, 17, 16];
     let mut random = Random(9);
     let noise: Vec<f32> = (0..dims.iter().product()).map(|_| random.unit()).collect();
@@ -222,12 +224,12 @@ fn nothing_crosses_in_world_space() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     for iteration in 0..25 {
         let report = model.step().unwrap();
-        assert_eq!(count_crossings(&model.surface()), 0, "iteration {iteration}");
+        assert_eq!(count_self_intersections(&model.surface()), 0, "iteration {iteration}");
         assert!(report.vertices > 800);
     }
 }
 
-/// A voxel that is a thousand times as bright as the object makes it faint, and leaves its surface where it is.
+/// A voxel a thousand times as bright as the object does not move its surface, although it dominates the range.
 #[test]
 fn one_bright_voxel_does_not_move_the_surface() {
     let ball = |bright: f32| {
@@ -248,9 +250,9 @@ fn one_bright_voxel_does_not_move_the_surface() {
     }
 }
 
-/// A slit a tenth of a voxel wide inside of a block, below the iso value by little: both of its sides are there at the end.
+/// A slit a tenth of a voxel wide inside a block, slightly below the iso value: both of its sides are found.
 #[test]
-fn slits_much_thinner_than_a_voxel_stay() {
+fn slits_much_thinner_than_a_voxel_are_kept() {
     let middle = Vec3::new(14.3, 14.2, 10.0);
     let volume = scenes::volume([30, 30, 21], |p| {
         let in_slit = (p.z - middle.z).abs() < 0.5 && (p - middle).truncate().abs().max_element() < 8.0;
@@ -263,12 +265,13 @@ fn slits_much_thinner_than_a_voxel_stay() {
     assert!(coverage.recall > 0.995, "{coverage:?}");
 }
 
-/// On the way down, a component that a coarse level shows in part is taken anew; one that it shows whole stays, refined.
+/// On a level change, a component that the coarse level has only in part is seeded again; one that it has completely is
+/// kept and refined.
 #[test]
-fn what_a_level_leaves_out_is_renewed() {
+fn components_incomplete_on_a_coarse_level_are_seeded_again() {
     let (plate, ball) = (Vec3::new(16.3, 15.8, 8.2), Vec3::new(16.0, 16.0, 29.0));
     let volume = image([34, 33, 42], |p| {
-        // A thin plate on a thick rod, and a ball that any level shows.
+        // A thin plate on a thick rod, and a ball that is complete on every level.
         let rod = scenes::to_segment(p, plate - Vec3::X * 9.0, plate + Vec3::X * 9.0) - 3.5;
         to_box(p, plate, Vec3::new(12.0, 12.0, 0.6)).min(rod).min(p.distance(ball) - 8.0)
     });
@@ -283,7 +286,7 @@ fn what_a_level_leaves_out_is_renewed() {
             break;
         }
     }
-    // The plate, on each of two levels at most; never the ball.
+    // The plate, on at most each of two levels; never the ball.
     assert!((1..=2).contains(&seeds), "{seeds}");
     let (surface, coverage) = run(&volume, options);
     assert_eq!(euler_of_parts(&surface), [2, 2]);

@@ -1,8 +1,8 @@
-//! A surface followed through a beating heart with known truth.
+//! A surface tracked through a beating heart with known geometry.
 
 use crate::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
-use vesicle::mesh::{MeshError, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
@@ -10,7 +10,7 @@ use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Between the step to the muscle and that from muscle to lung.
+/// Edge threshold, between the step from blood to muscle and that from muscle to lung.
 const THRESHOLD: f64 = 70.0;
 
 fn options(cine: &Cine, volume: Volume) -> TrackingOptions {
@@ -23,7 +23,7 @@ fn options(cine: &Cine, volume: Volume) -> TrackingOptions {
     }
 }
 
-/// A part of a beat.
+/// Returns options for a part of a beat, which is not cyclic.
 fn open_ended(cine: &Cine) -> TrackingOptions {
     let mut options = options(cine, cine.volume());
     options.params.cyclic = false;
@@ -39,7 +39,7 @@ fn tracked(options: TrackingOptions) -> SurfaceTracker {
     tracker
 }
 
-/// Error against the truth in every frame.
+/// Returns the mean distance from the truth in every frame.
 fn errors(cine: &Cine, meshes: &[TriangleMesh]) -> Vec<f64> {
     let one = |(frame, mesh): (usize, &TriangleMesh)| {
         surface_distance(mesh, &cine.truth(frame as f64, 0.8)).unwrap().mean
@@ -48,13 +48,13 @@ fn errors(cine: &Cine, meshes: &[TriangleMesh]) -> Vec<f64> {
 }
 
 #[test]
-fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() {
+fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
     let cine = Cine::small();
     let tracker = tracked(options(&cine, cine.volume()));
     assert_eq!(tracker.meshes().len(), cine.frames);
     for (frame, mesh) in tracker.meshes().iter().enumerate() {
         let found = measure(mesh);
-        assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+        assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let truth = measure(&cine.truth(frame as f64, 0.8));
         assert!((found.volume / truth.volume - 1.0).abs() < 0.1, "{frame} {} {}", found.volume, truth.volume);
     }
@@ -63,11 +63,11 @@ fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() 
     assert_eq!(tracker.volumes().len(), cine.frames);
 }
 
-/// Of the surfaces of all frames, natively and in wasm.
+/// Hash of the surfaces of all frames, natively and in wasm.
 const BITS: &str = "67096554a08217e6";
 
 #[test]
-fn the_same_bits_everywhere() {
+fn bits_are_the_same_on_every_platform() {
     let cine = Cine::small().first(3);
     let tracker = tracked(open_ended(&cine));
     let positions: Vec<Vec3> = tracker.meshes().iter().flat_map(|mesh| mesh.positions.clone()).collect();
@@ -75,7 +75,7 @@ fn the_same_bits_everywhere() {
 }
 
 #[test]
-fn the_points_lie_on_the_boundary_between_frames_and_in_the_world() {
+fn boundary_points_lie_on_the_boundary_in_world_space_and_between_frames() {
     let cine = Cine { noise: 0.0, ..Cine::small() };
     let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
     tracker.step().unwrap();
@@ -92,7 +92,7 @@ fn the_points_lie_on_the_boundary_between_frames_and_in_the_world() {
 }
 
 #[test]
-fn a_mesh_of_ones_own_is_followed_and_the_component_is_chosen() {
+fn a_given_mesh_is_tracked_and_the_component_is_chosen() {
     let cine = Cine::small().first(3);
     let start = cine.truth(0.0, 2.0);
     let given = tracked(TrackingOptions { start: Some(start), ..open_ended(&cine) });
@@ -104,7 +104,7 @@ fn a_mesh_of_ones_own_is_followed_and_the_component_is_chosen() {
 }
 
 #[test]
-fn crevices_behind_papillary_muscles_close_and_open_without_sheets_or_folds() {
+fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     let fine = DVec3::splat(1.4);
     let cine =
         Cine { papillary: true, dims: [52; 3], spacing: fine, frames: 12, size: 30.0, ..Cine::small() };
@@ -112,7 +112,7 @@ fn crevices_behind_papillary_muscles_close_and_open_without_sheets_or_folds() {
     let mut retracted = 0;
     for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
-        assert_eq!((found.components, count_crossings(mesh)), (1, 0), "{frame}");
+        assert_eq!((found.components, count_self_intersections(mesh)), (1, 0), "{frame}");
         let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
         assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.05, "{frame} {area} {volume}");
         assert!(facts.folded * 100 < facts.triangles, "{frame} {facts:?}");
@@ -122,8 +122,8 @@ fn crevices_behind_papillary_muscles_close_and_open_without_sheets_or_folds() {
 }
 
 #[test]
-fn crevices_that_open_faster_than_the_boundary_pulls_are_grown_into() {
-    // Thick slices, and a beat in eight frames: it closes and opens by several voxels from one to the next.
+fn gaps_that_open_faster_than_the_boundary_attracts_are_filled() {
+    // Thick slices, and a beat in eight frames: gaps close and open by several voxels from one frame to the next.
     let cine = Cine { dims: [48, 48, 23], beats: 3.0, ..Cine::full() }.first(6);
     let volume = cine.volume().enrich_slices(None, Enrichment::Flow).unwrap();
     let tracker = tracked(TrackingOptions { volume, ..open_ended(&cine) });
@@ -133,7 +133,7 @@ fn crevices_that_open_faster_than_the_boundary_pulls_are_grown_into() {
     }
 }
 
-/// A tube that beats, along the third axis through the whole of a volume; its signal falls to a third along the way.
+/// Returns a pulsating tube along the third axis through the whole volume, whose signal falls to a third along it.
 fn tube(mirrored: bool) -> Volume {
     let mut random = crate::common::Random(5);
     let mut values = Vec::new();
@@ -160,7 +160,7 @@ fn tube(mirrored: bool) -> Volume {
 }
 
 #[test]
-fn the_box_closes_what_goes_on_beyond_it_also_in_mirrored_volumes() {
+fn the_box_closes_surfaces_that_continue_beyond_it_also_in_mirrored_volumes() {
     for mirrored in [false, true] {
         for bounds in [None, Some(Bounds::Voxels([[1, 1, 6], [26, 26, 25]]))] {
             let params = TrackingParams { threshold: 30.0, cyclic: true, ..TrackingParams::default() };
@@ -171,11 +171,15 @@ fn the_box_closes_what_goes_on_beyond_it_also_in_mirrored_volumes() {
                 start: None,
                 params,
             });
-            // To the outer faces of the voxels at the ends.
+            // Up to the outer faces of the voxels at the ends.
             let ends = if bounds.is_some() { [5.5, 25.5] } else { [-0.5, 29.5] };
             for (frame, mesh) in tracker.meshes().iter().enumerate() {
                 let found = measure(mesh);
-                assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+                assert_eq!(
+                    (found.euler, found.components, count_self_intersections(mesh)),
+                    (2, 1, 0),
+                    "{frame}"
+                );
                 let radius = 7.0 + libm::cos(frame as f64 * std::f64::consts::TAU / 6.0);
                 let truth = std::f64::consts::PI * radius * radius * (ends[1] - ends[0]) * 3.375;
                 assert!((found.volume / truth - 1.0).abs() < 0.06, "{frame} {} {truth}", found.volume);
@@ -188,15 +192,15 @@ fn the_box_closes_what_goes_on_beyond_it_also_in_mirrored_volumes() {
 }
 
 #[test]
-fn a_side_of_the_box_that_no_wall_goes_through_closes_the_surface_as_well() {
+fn a_side_of_the_box_inside_the_cavity_closes_the_surface() {
     let cine = Cine::small().first(3);
     let volume = cine.volume();
-    // Half of the cavity, cut where it is widest and narrower than it is.
+    // Half of the cavity, cut where it is widest, and narrower than it.
     let bounds = Some(Bounds::Voxels([[18, 14, 10], [35, 21, 20]]));
     let tracker = tracked(TrackingOptions { bounds, volume, ..open_ended(&cine) });
     for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let found = measure(mesh);
-        assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+        assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let x = mesh.positions.iter().map(|p| p.x).fold(f32::MAX, f32::min);
         assert!((x - 35.0).abs() < 1.2, "{frame} {x}");
         assert!(facts.without_boundary < facts.triangles / 20, "{frame} {facts:?}");
@@ -204,7 +208,7 @@ fn a_side_of_the_box_that_no_wall_goes_through_closes_the_surface_as_well() {
 }
 
 #[test]
-fn extreme_lengths_of_frames_and_short_cycles_are_tracked() {
+fn extreme_time_scales_and_short_cycles_are_tracked() {
     for (frames, time_scale, window_frames) in [(2, 1e-9, 2), (3, 1e-9, 2), (3, 1e9, 0), (5, 0.0, 4)] {
         let cine = Cine::small().first(frames);
         for cyclic in [false, true] {
@@ -221,7 +225,7 @@ fn extreme_lengths_of_frames_and_short_cycles_are_tracked() {
 }
 
 #[test]
-fn a_cycle_closes_and_volumes_come_with_the_frames() {
+fn a_cycle_closes_and_every_frame_has_its_volume() {
     let cine = Cine::small();
     let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
     let mut progress = 0.0;
@@ -242,7 +246,7 @@ fn a_cycle_closes_and_volumes_come_with_the_frames() {
 }
 
 #[test]
-fn a_saved_run_goes_on_with_the_same_bits() {
+fn a_restored_run_continues_bit_for_bit() {
     let cine = Cine::small().first(4);
     let volume = cine.volume();
     let new = || {
@@ -282,14 +286,14 @@ fn a_saved_run_goes_on_with_the_same_bits() {
 }
 
 #[test]
-fn parameters_of_the_boundary_begin_again_and_the_others_go_on() {
+fn boundary_parameters_restart_tracking_and_others_do_not() {
     let cine = Cine::small().first(3);
     let mut tracker = SurfaceTracker::new(open_ended(&cine)).unwrap();
     (0..4).for_each(|_| drop(tracker.step().unwrap()));
     let params = TrackingParams { damping: 0.8, radius: 5.5, ..tracker.params().clone() };
     tracker.set_params(params).unwrap();
     assert_eq!(tracker.meshes().len(), 1);
-    // A state has no more of the parameters before than the run itself.
+    // Like the run itself, a state does not keep the former parameters.
     let mut resumed = tracker.clone();
     resumed.restore(&tracker.save()).unwrap();
     resumed.step().unwrap();
@@ -311,7 +315,7 @@ fn parameters_of_the_boundary_begin_again_and_the_others_go_on() {
 }
 
 #[test]
-fn what_cannot_be_tracked_is_refused_by_name() {
+fn invalid_input_is_refused_by_name() {
     let cine = Cine::small().first(2);
     let volume = cine.volume();
     let good = || options(&cine, volume.clone());
@@ -348,7 +352,7 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     for voxels in [[[0; 3], [36; 3]], [[9; 3], [8; 3]], [[0; 3], [3, 3, 30]]] {
         assert_eq!(refused(TrackingOptions { bounds: Some(Bounds::Voxels(voxels)), ..good() }).0, "voxels");
     }
-    // A start is none where there is no boundary to follow.
+    // A given start does not help if no step reaches the threshold.
     let mut without = good();
     (without.start, without.params.threshold) = (Some(cine.truth(0.0, 2.0)), 240.0);
     assert_eq!(refused(without).0, "threshold");
@@ -389,7 +393,7 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     fine.positions.iter_mut().for_each(|p| *p *= 1e-6);
     let (parameter, problem) = refused(TrackingOptions { start: Some(fine), ..good() });
     assert!(parameter == "start" && problem.contains("a tenth of a voxel"), "{problem}");
-    // Two rings, one through the other.
+    // Two interlocked rings.
     let middle = Vec3::splat(35.0);
     let mut crossing = crate::common::torus_around(middle, [24, 12], [3.0, 1.0]);
     let other = crate::common::torus_around(middle + Vec3::X, [24, 12], [3.0, 1.0]);

@@ -1,18 +1,18 @@
-//! Random sequences, parameters and boxes, tracked: closed, without crossings and of one piece after every frame, or refused
-//! by name.
+//! Tracking of random sequences with random parameters and boxes: after every frame the surface is closed, connected
+//! and free of self-intersections, or the input is refused by name.
 //!
-//! `FUZZ_SEEDS=<first>..<last>` chooses other seeds; a seed that fails is said.
+//! `FUZZ_SEEDS=<first>..<last>` runs other seeds; a failing seed is printed.
 
 use crate::common::{Named, Random, seeds};
 use vesicle::math::{DAffine3, DVec3};
-use vesicle::mesh::{count_crossings, measure};
+use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Blobs that move, grow and vanish, in noise; with voxels that are no numbers now and then.
+/// Returns blobs that move, grow and vanish, in noise; some have voxels that are not numbers.
 fn random_volume(random: &mut Random) -> Volume {
     let mut size = || 4 + random.below(10);
     let [nx, ny] = [size(), size()];
@@ -83,7 +83,7 @@ fn random_options(random: &mut Random) -> TrackingOptions {
     TrackingOptions { volume, bounds, component, start: None, params: random_params(random) }
 }
 
-/// The frames that were tracked; none where that is refused.
+/// Tracks a sequence and returns the number of frames, or the error that refuses it.
 fn track(options: TrackingOptions) -> Result<usize, MethodError> {
     let mut tracker = SurfaceTracker::new(options)?;
     while !tracker.is_done() {
@@ -92,7 +92,7 @@ fn track(options: TrackingOptions) -> Result<usize, MethodError> {
         assert!(tracker.mesh().check().is_ok());
         if let Some(mesh) = tracker.meshes().get(frames) {
             let found = measure(mesh);
-            assert_eq!((found.components, count_crossings(mesh)), (1, 0));
+            assert_eq!((found.components, count_self_intersections(mesh)), (1, 0));
             assert!(mesh.positions.iter().all(|p| p.is_finite()));
         }
     }
@@ -100,7 +100,7 @@ fn track(options: TrackingOptions) -> Result<usize, MethodError> {
 }
 
 #[test]
-fn whatever_is_tracked_stays_a_surface_of_one_piece() {
+fn every_tracked_frame_is_one_closed_surface() {
     let all = seeds(20);
     let (mut tracked, whole) = (0, all == (0..20));
     for seed in all {

@@ -1,5 +1,5 @@
-// Every method of every class under arguments that nobody should pass, and after its object is freed: a VesicleError, an
-// answer, or what the argument itself throws; never a crash of the instance, and nothing broken afterwards.
+// Calls every method of every class with invalid arguments, and after its object is freed. Each call must return, throw
+// a VesicleError, or throw what the argument itself throws; the instance must neither crash nor be damaged.
 import { execFileSync } from 'node:child_process';
 import { fileURLToPath } from 'node:url';
 import { afterAll, beforeAll, expect, test } from 'vitest';
@@ -10,7 +10,7 @@ const { DeformableModel, ImplicitSurface, Mesh, MultiresolutionModel, SurfaceTra
 
 const root = fileURLToPath(new URL('../..', import.meta.url));
 
-/** What a trap in an argument throws: it comes through as it is. */
+/** The error thrown by the getters of hostile arguments, which callers must receive unchanged. */
 class Trap extends Error {}
 
 const trap = () => {
@@ -20,7 +20,7 @@ const trap = () => {
 const detached = new Float32Array(12);
 structuredClone(detached.buffer, { transfer: [detached.buffer] });
 
-// Newer than the types of the language that these tests are compiled with.
+// More recent than the library types that these tests are compiled with.
 const Resizable = ArrayBuffer as unknown as new (
   length: number,
   options: { maxByteLength: number },
@@ -70,7 +70,7 @@ const HOSTILE: [string, unknown][] = [
   ['an aborted signal', AbortSignal.abort()],
 ];
 
-/** Options with every name that some method knows, each with the same value. */
+/** All option names of all methods; hostile options have the same value for each. */
 const NAMES = [
   ...[
     'volume',
@@ -143,7 +143,7 @@ const BALL = [{ center: [0, 0, 0] as vesicle.Vec3, axes: AXES }];
 
 const points = () => mesh.arrays().positions.slice();
 
-/** One small object of each class. */
+/** Makes a small object of each class. */
 const MAKERS: Record<string, () => { free(): void }> = {
   Volume: () => volume.binned([1, 1, 1]),
   Mesh: () => mesh.clone(),
@@ -154,7 +154,7 @@ const MAKERS: Record<string, () => { free(): void }> = {
     new MultiresolutionModel({ base: mesh, ellipsoids: BALL, params: { edgeMin: 2, edgeMax: 5 } }),
 };
 
-/** Its methods and fields, those of what it inherits included; `free` aside. */
+/** Returns the names of an object's methods and fields, including inherited ones, except `free`. */
 function members(object: object): { methods: string[]; fields: string[] } {
   const [methods, fields]: [string[], string[]] = [[], []];
   for (let p = Object.getPrototypeOf(object); p !== Object.prototype; p = Object.getPrototypeOf(p)) {
@@ -167,7 +167,7 @@ function members(object: object): { methods: string[]; fields: string[] } {
   return { methods, fields };
 }
 
-/** What came of it: `answer`, or the error. Objects that it gives are freed. */
+/** Returns `answer` if a call returns, or the error that it throws. Frees returned objects. */
 async function outcome(work: () => unknown): Promise<unknown> {
   try {
     const answer = await work();
@@ -183,7 +183,7 @@ const isForeseen = (came: unknown) => came === 'answer' || came instanceof Vesic
 // biome-ignore lint/suspicious/noExplicitAny: what a caller without types may do
 const loose = (object: unknown): any => object;
 
-describeEach('%s: no argument breaks it', async (make) => {
+describeEach('%s: invalid arguments do no harm', async (make) => {
   const bad: string[] = [];
   for (const name of members(make()).methods) {
     for (const [what, value] of HOSTILE) {
@@ -201,12 +201,12 @@ describeEach('%s: no argument breaks it', async (make) => {
   expect(mesh.check()).toMatchObject(HEALTHY);
 });
 
-describeEach('%s: freed, it says so', async (make) => {
+describeEach('%s: a freed object reports that it is freed', async (make) => {
   const object = make();
   object.free();
   const { methods, fields } = members(object);
   for (const name of fields) {
-    // A mesh of a model is a view of what the model has at the time.
+    // The mesh of a model is a view, so only reading from it fails.
     const read = () => (/mesh/i.test(name) ? loose(object)[name].vertexCount : loose(object)[name]);
     expect(await outcome(read), name).toMatchObject({ code: 'freed' });
   }
@@ -214,7 +214,7 @@ describeEach('%s: freed, it says so', async (make) => {
   object.free();
 });
 
-test('no argument of a constructor, a static method or a function breaks anything', async () => {
+test('invalid arguments of constructors, static methods and functions do no harm', async () => {
   const bad: string[] = [];
   const functions = { animationGlb: vesicle.animationGlb, paramSpecs: vesicle.paramSpecs, version: vesicle.version };
   for (const [name, work] of Object.entries(functions)) {
@@ -247,8 +247,8 @@ function describeEach(title: string, work: (make: () => { free(): void }) => Pro
   });
 }
 
-test('with memory nearly full, work is refused or lost by name, and goes on when there is room', () => {
-  // In a process of its own, which takes all 4 GiB that wasm has.
+test('with memory nearly full, calls fail with a named error and succeed again once memory is freed', () => {
+  // Runs in a separate process, which uses all 4 GiB that wasm can have.
   const script = `
     const vesicle = await import('./pkg/index.js');
     await vesicle.default();

@@ -1,4 +1,4 @@
-// Surfaces that follow a mesh, with the libraries' own classes.
+// Displays meshes with the adapters, in the classes of the real libraries.
 import vtkDataArray from '@kitware/vtk.js/Common/Core/DataArray.js';
 import vtkPolyData from '@kitware/vtk.js/Common/DataModel/PolyData.js';
 import { NVMesh } from '@niivue/niivue';
@@ -10,7 +10,7 @@ import { VtkSurface } from '../../pkg/adapters/vtk.js';
 import { DeformableModel, Mesh, type MeshArrays, Volume } from '../../pkg/index.js';
 import { failure, PAPER, rejection, wrong } from './helpers.js';
 
-/** A surface of somebody else's, that says itself when it has changed. */
+/** A mesh source that is not one of the library's classes, with version counters of its own. */
 class Plain implements MeshSource {
   topologyVersion = 1;
   geometryVersion = 1;
@@ -20,14 +20,14 @@ class Plain implements MeshSource {
     return this.made;
   }
 
-  /** All vertices so much further along x. */
+  /** Moves all vertices along x. */
   move(by: number): void {
     const positions = this.made.positions.map((value, i) => (i % 3 === 0 ? value + by : value));
     this.made = { ...this.made, positions };
     this.geometryVersion++;
   }
 
-  /** Another surface. */
+  /** Replaces the surface by another one. */
   become(made: MeshArrays): void {
     this.made = made;
     this.topologyVersion++;
@@ -42,7 +42,7 @@ beforeEach(() => {
   source = new Plain(sphere(1));
 });
 
-/** Six times the volume within triangles; above 0 where their outside is outside. */
+/** Returns six times the enclosed volume; positive if triangles face outwards. */
 function signedVolume(positions: ArrayLike<number>, indices: ArrayLike<number>): number {
   const corner = (i: number) => new THREE.Vector3().fromArray(positions as number[], 3 * (indices[i] ?? 0));
   let sum = 0;
@@ -50,7 +50,7 @@ function signedVolume(positions: ArrayLike<number>, indices: ArrayLike<number>):
   return sum;
 }
 
-/** A bright ball in a mirrored LPS volume: its surface must not come out inside out. */
+/** Returns a model of a bright ball in a mirrored LPS volume, whose triangles must still face outwards. */
 function mirrored(): DeformableModel {
   const data = new Uint8Array(16 ** 3).map((_, i) => {
     const [x, y, z] = [i % 16, Math.floor(i / 16) % 16, Math.floor(i / 256)];
@@ -76,7 +76,7 @@ const values = (object: THREE.Mesh, name: string) => object.geometry.getAttribut
 const index = (object: THREE.Mesh) => object.geometry.index as THREE.BufferAttribute;
 const inUse = (object: THREE.Mesh) => [...index(object).array].slice(0, object.geometry.drawRange.count);
 
-test('three: vertices, normals and triangles are those of the mesh', () => {
+test('three: vertices, normals and triangles equal those of the mesh', () => {
   const { object, surface } = scene();
   expect(surface.update(source)).toBe(true);
   const { positions, normals, indices } = source.arrays();
@@ -86,7 +86,7 @@ test('three: vertices, normals and triangles are those of the mesh', () => {
   expect(object.geometry.drawRange.start).toBe(0);
 });
 
-test('three: nothing is uploaded where nothing changed', () => {
+test('three: nothing is uploaded if nothing changed', () => {
   const { object, surface } = scene();
   surface.update(source);
   const before = [values(object, 'position').version, values(object, 'normal').version, index(object).version];
@@ -94,7 +94,7 @@ test('three: nothing is uploaded where nothing changed', () => {
   expect([values(object, 'position').version, values(object, 'normal').version, index(object).version]).toEqual(before);
 });
 
-test('three: triangles are uploaded only where they changed', () => {
+test('three: triangles are uploaded only if they changed', () => {
   const { object, surface } = scene();
   surface.update(source);
   const [moved, turned] = [values(object, 'position').version, index(object).version];
@@ -109,7 +109,7 @@ test('three: triangles are uploaded only where they changed', () => {
   expect(inUse(object)).toEqual([...source.arrays().indices]);
 });
 
-test('three: only what is in use is uploaded, and bounds what is drawn', () => {
+test('three: only the used part of a buffer is uploaded, and bounds are those of the displayed vertices', () => {
   const { object, surface } = scene();
   surface.update(new Plain(sphere(0.5)));
   source.move(10);
@@ -127,7 +127,7 @@ test('three: only what is in use is uploaded, and bounds what is drawn', () => {
   }
 });
 
-test('three: what outgrows its buffers gets others, and the old ones are disposed of', () => {
+test('three: a mesh that outgrows its buffers gets new ones, and the old ones are disposed of', () => {
   const { object, surface } = scene();
   surface.update(source);
   const first = object.geometry;
@@ -144,7 +144,7 @@ test('three: what outgrows its buffers gets others, and the old ones are dispose
   expect(values(object, 'position').array.length).toBeGreaterThan(1.4 * source.arrays().positions.length);
 });
 
-test('three: colours come and go', () => {
+test('three: colours can be added and removed', () => {
   const { object, surface } = scene();
   surface.update(source);
   expect(object.geometry.getAttribute('color')).toBeUndefined();
@@ -158,7 +158,7 @@ test('three: colours come and go', () => {
   expect(object.geometry.getAttribute('color')).toBeUndefined();
 });
 
-test('three: the mesh of a model, with its outside outside, and turned into the other space', () => {
+test('three: the mesh of a model faces outwards, also when converted to another space', () => {
   const model = mirrored();
   const { object, surface } = scene();
   const turned = new THREE.Mesh();
@@ -184,14 +184,14 @@ test('three: the mesh of a model, with its outside outside, and turned into the 
   expect(topologies.size).toBeGreaterThan(10);
 });
 
-test('three: a mesh that lends its own arrays keeps them', () => {
+test('three: the arrays of a mesh source are not modified', () => {
   const { positions } = source.arrays();
   const before = [...positions];
   new ThreeSurface(THREE, new THREE.Mesh(), { space: 'LPS', worldSpace: 'RAS' }).update(source);
   expect([...positions]).toEqual(before);
 });
 
-test('three: disposed, and used again', () => {
+test('three: a disposed surface can be used again', () => {
   const { object, surface } = scene();
   surface.update(source);
   let disposed = 0;
@@ -202,14 +202,14 @@ test('three: disposed, and used again', () => {
   expect(surface.update(source)).toBe(true);
 });
 
-test('three: what is refused', () => {
+test('three: invalid arguments are refused', () => {
   expect(failure(() => new ThreeSurface(wrong({ ...THREE, Box3: undefined }), new THREE.Mesh())).message).toMatch(
     /Box3/,
   );
   expect(failure(() => new ThreeSurface(THREE, wrong(new THREE.Group()))).message).toMatch(/THREE\.Mesh/);
   const { surface } = scene();
   for (const nothing of [undefined, {}, { arrays: () => source.arrays() }]) {
-    expect(failure(() => surface.update(wrong(nothing))).message).toMatch(/a Mesh is needed/);
+    expect(failure(() => surface.update(wrong(nothing))).message).toMatch(/must be a Mesh/);
   }
   const spaces = { space: wrong('LAS') };
   expect(failure(() => new ThreeSurface(THREE, new THREE.Mesh(), spaces)).message).toMatch(/'RAS', 'LPS'/);
@@ -219,11 +219,11 @@ test('three: what is refused', () => {
 
 const vtk = { vtkPolyData: wrong(vtkPolyData), vtkDataArray: wrong(vtkDataArray) };
 
-/** Triangles of a vtkPolyData, without the numbers of their corners. */
+/** Returns the vertex indices of a vtkPolyData's triangles, without the counts between them. */
 const triangles = (polyData: { getPolys(): unknown }) =>
   [...wrong(polyData).getPolys().getData()].filter((_, i) => i % 4 > 0);
 
-test('vtk.js: points, normals and polygons are those of the mesh', () => {
+test('vtk.js: points, normals and polygons equal those of the mesh', () => {
   const surface = new VtkSurface(vtk);
   expect(surface.update(source)).toBe(true);
   const polyData = wrong(surface.polyData);
@@ -236,7 +236,7 @@ test('vtk.js: points, normals and polygons are those of the mesh', () => {
   expect(polyData.getBounds()).toEqual([1, 5, 0, 4, -1, 3].map((at) => expect.closeTo(at, 1)));
 });
 
-test('vtk.js: nothing is touched where nothing changed, and polygons only where they did', () => {
+test('vtk.js: nothing is updated if nothing changed, and polygons only if they changed', () => {
   const surface = new VtkSurface(vtk);
   surface.update(source);
   const polyData = wrong(surface.polyData);
@@ -257,7 +257,7 @@ test('vtk.js: nothing is touched where nothing changed, and polygons only where 
   expect(triangles(polyData)).toEqual([...source.arrays().indices]);
 });
 
-test('vtk.js: what it was given stays as it was', () => {
+test('vtk.js: arrays passed to it are not modified afterwards', () => {
   const model = mirrored();
   const surface = new VtkSurface(vtk);
   model.step();
@@ -274,18 +274,18 @@ test('vtk.js: what it was given stays as it was', () => {
   expect(signedVolume(now, triangles(surface.polyData) as number[])).toBeGreaterThan(0);
 });
 
-test('vtk.js: disposed, and what is refused', () => {
+test('vtk.js: dispose, and invalid arguments', () => {
   const surface = new VtkSurface(vtk);
   surface.update(source);
   surface.dispose();
   expect(wrong(surface.polyData).isDeleted()).toBe(true);
   expect(failure(() => new VtkSurface(wrong({ vtkPolyData }))).message).toMatch(/vtkDataArray/);
-  expect(failure(() => new VtkSurface(vtk).update(wrong(null))).message).toMatch(/a Mesh is needed/);
+  expect(failure(() => new VtkSurface(vtk).update(wrong(null))).message).toMatch(/must be a Mesh/);
 });
 
 // ── NiiVue 0.69
 
-/** A WebGL context that keeps what is uploaded last to each buffer, as bytes. */
+/** Returns a fake WebGL context that records the last upload to each buffer, as bytes. */
 function recordingGl() {
   const uploads = new Map<unknown, Uint8Array<ArrayBuffer>>();
   const bound = new Map<unknown, unknown>();
@@ -314,7 +314,7 @@ function recordingGl() {
   return { gl, uploads };
 }
 
-/** As much of NiiVue 0.69 as there is without a canvas; its meshes are its own. */
+/** Returns the parts of NiiVue 0.69 that work without a canvas; its meshes are real. */
 function niivue() {
   const { gl, uploads } = recordingGl();
   const meshes: object[] = [];
@@ -324,7 +324,7 @@ function niivue() {
   return { nv, gl: wrong(gl), surface, uploads };
 }
 
-/** Uploaded records by what they mean. */
+/** Decodes uploaded vertex records. */
 function records(bytes: Uint8Array = new Uint8Array()) {
   const floats = new Float32Array(bytes.buffer);
   const signed = new Int8Array(bytes.buffer);
@@ -338,7 +338,7 @@ function records(bytes: Uint8Array = new Uint8Array()) {
   };
 }
 
-test('NiiVue 0.69: packed records are those that its own updateMesh makes', async () => {
+test('NiiVue 0.69: packed records equal those of its own updateMesh', async () => {
   const { gl, surface, uploads } = niivue();
   expect(await surface.update(source)).toBe(true);
   source.become(sphere(0.6));
@@ -358,7 +358,7 @@ test('NiiVue 0.69: packed records are those that its own updateMesh makes', asyn
   expect(counts).toEqual([mesh.indexCount, mesh.vertexCount]);
 });
 
-test('NiiVue 0.69: nothing is uploaded where nothing changed, and triangles only where they did', async () => {
+test('NiiVue 0.69: nothing is uploaded if nothing changed, and triangles only if they changed', async () => {
   const { surface, uploads } = niivue();
   await surface.update(source);
   uploads.clear();
@@ -371,7 +371,7 @@ test('NiiVue 0.69: nothing is uploaded where nothing changed, and triangles only
   expect(uploads.has(mesh.indexBuffer)).toBe(false);
 });
 
-test('NiiVue 0.69: bounds follow, and layers go with the vertices they were for', async () => {
+test('NiiVue 0.69: bounds are updated, and layers are dropped with the vertices they belong to', async () => {
   const { surface } = niivue();
   await surface.update(source);
   const mesh = wrong(surface.mesh);
@@ -397,7 +397,7 @@ test('NiiVue 0.69: records of another length are left to its own updateMesh', as
   expect(uploads.get(mesh.vertexBuffer)?.length).toBe((28 * source.arrays().positions.length) / 3);
 });
 
-test('NiiVue 0.69: colours of the mesh, and a mesh of an LPS volume', async () => {
+test('NiiVue 0.69: colours of the mesh, and the mesh of an LPS volume', async () => {
   const { gl, nv, uploads } = niivue();
   const surface = new NiivueSurface(wrong({ ...nv, gl }), { NVMesh: wrong(NVMesh), space: 'LPS' });
   const made = source.arrays();
@@ -412,7 +412,7 @@ test('NiiVue 0.69: colours of the mesh, and a mesh of an LPS volume', async () =
   expect(signedVolume(positions, made.indices)).toBeGreaterThan(0);
 });
 
-test('NiiVue 0.69: taken out and put in again', async () => {
+test('NiiVue 0.69: a surface can be removed and added again', async () => {
   const { nv, surface } = niivue();
   await surface.update(source);
   expect(nv.meshes).toEqual([surface.mesh]);
@@ -425,7 +425,7 @@ test('NiiVue 0.69: taken out and put in again', async () => {
 
 // ── NiiVue 1.0
 
-/** As much of NiiVue 1.0 as is called; what it does with it is tested in a browser. */
+/** Returns the parts of NiiVue 1.0 that the adapter calls; their effect is tested in a browser. */
 function next(view: object) {
   const calls: string[] = [];
   const meshes: object[] = [];
@@ -438,7 +438,7 @@ function next(view: object) {
   return { nv, calls, noted, surface: new NiivueSurface(wrong(nv)) };
 }
 
-test('NiiVue 1.0: its meshes alone are made anew, where it has a way to', async () => {
+test('NiiVue 1.0: only meshes are rebuilt, if it has a method for that', async () => {
   const view: Record<string, unknown> = {};
   const { calls, noted, surface } = next(view);
   await surface.update(source);
@@ -458,7 +458,7 @@ test('NiiVue 1.0: its meshes alone are made anew, where it has a way to', async 
   expect([...mesh.extentsMin, ...mesh.extentsMax]).toEqual([2, 0, -1, 6, 4, 3].map((at) => expect.closeTo(at, 1)));
 });
 
-test('NiiVue 1.0: its buffers are filled where their records are those that are known', async () => {
+test('NiiVue 1.0: buffers are filled directly if their record layout is known', async () => {
   const { gl, uploads } = recordingGl();
   const meshResources = new Map();
   let rebuilt = 0;
@@ -487,7 +487,7 @@ test('NiiVue 1.0: its buffers are filled where their records are those that are 
   expect(buffers.indexCount).toBe(indices.length);
 });
 
-test('NiiVue 1.0: taken out', async () => {
+test('NiiVue 1.0: a surface can be removed', async () => {
   const { nv, surface } = next({});
   nv.meshes.push({});
   await surface.update(source);
@@ -495,9 +495,9 @@ test('NiiVue 1.0: taken out', async () => {
   expect(nv.meshes).toEqual([{}]);
 });
 
-test('NiiVue: what is refused', async () => {
-  expect(failure(() => new NiivueSurface(wrong(undefined))).message).toMatch(/a Niivue is needed/);
-  expect(failure(() => new NiivueSurface(wrong({ ...niivue().nv, gl: null }))).message).toMatch(/attach it first/);
+test('NiiVue: invalid arguments are refused', async () => {
+  expect(failure(() => new NiivueSurface(wrong(undefined))).message).toMatch(/must be a Niivue/);
+  expect(failure(() => new NiivueSurface(wrong({ ...niivue().nv, gl: null }))).message).toMatch(/attach one first/);
   expect(failure(() => new NiivueSurface(wrong(niivue().nv))).message).toMatch(/import \{ Niivue, NVMesh \}/);
-  expect((await rejection(niivue().surface.update(wrong({})))).message).toMatch(/a Mesh is needed/);
+  expect((await rejection(niivue().surface.update(wrong({})))).message).toMatch(/must be a Mesh/);
 });

@@ -1,4 +1,4 @@
-// Volumes out of other libraries, in the libraries themselves: what they find at a world point, a Volume finds there.
+// Converts volumes of other libraries, with the libraries themselves: intensities at world points must agree.
 import { readFile } from 'node:fs/promises';
 import vtkDataArray from '@kitware/vtk.js/Common/Core/DataArray.js';
 import vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData.js';
@@ -20,7 +20,7 @@ const COUNT = SIZE[0] * SIZE[1] * SIZE[2];
 const SPACING: Vec3 = [1.5, 0.75, 2.5];
 const ORIGIN: Vec3 = [12, -34, 56];
 
-/** Unit vectors along x, y and z of an oblique grid: turned about z, then about x. */
+/** Unit vectors along x, y and z of an oblique grid: rotated about z, then about x. */
 const OBLIQUE: Vec3[] = [
   [0.8, 0.6 * 0.96, 0.6 * 0.28],
   [-0.6, 0.8 * 0.96, 0.8 * 0.28],
@@ -32,7 +32,7 @@ const GRIDS: [string, Vec3[]][] = [
   ['mirrored', MIRRORED],
 ];
 
-/** Voxels without any symmetry. */
+/** Returns voxels without any symmetry. */
 const voxels = (frames = 1) => Int16Array.from({ length: COUNT * frames }, (_, i) => ((i * 7919) % 211) - 60);
 
 const columns = (directions: Vec3[]) =>
@@ -40,7 +40,7 @@ const columns = (directions: Vec3[]) =>
 
 const affine = (directions: Vec3[]) => [...columns(directions).flatMap((column) => [...column, 0]), ...ORIGIN, 1];
 
-/** Every voxel's index. */
+/** Yields the index of every voxel. */
 function* indices(size: readonly number[] = SIZE): Generator<Vec3> {
   const [x = 0, y = 0, z = 0] = size;
   for (let k = 0; k < z; k++) for (let j = 0; j < y; j++) for (let i = 0; i < x; i++) yield [i, j, k];
@@ -52,7 +52,7 @@ interface Host {
   value: (index: Vec3, frame: number) => number;
 }
 
-/** What the host has at the world point of each voxel is what the volume has there. */
+/** Asserts that the volume has the host's value at the host's world point of every voxel. */
 function agree(init: VolumeInit, { size, world, value }: Host): Volume {
   const volume = new Volume(init);
   for (let frame = 0; frame < volume.frames; frame++) {
@@ -66,7 +66,7 @@ function agree(init: VolumeInit, { size, world, value }: Host): Volume {
   return volume;
 }
 
-test.each(['three', 'niivue', 'vtk'])('%s: neither the host nor the module is imported', async (name) => {
+test.each(['three', 'niivue', 'vtk'])('%s: imports neither the host nor the module', async (name) => {
   const imports = async (file: string) => {
     const code = await readFile(new URL(`../../pkg/adapters/${file}`, import.meta.url), 'utf8');
     return [...code.matchAll(/^(?:import|export) .*?from '(.*)';$/gm)].map(([, from]) => from);
@@ -84,7 +84,7 @@ function nrrd(fields: string[], data: Uint8Array): Uint8Array {
 
 const vector = (values: readonly number[]) => `(${values.join(',')})`;
 
-/** An NRRD file of the grid; `more` after the fields that it always has. */
+/** Returns an NRRD file of the grid, with additional header fields. */
 const scan = (space: string, directions: Vec3[], more: string[] = ['endian: little']) =>
   nrrd(
     [
@@ -100,7 +100,7 @@ const loaded = (bytes: Uint8Array) => new NRRDLoader().parse(wrong(bytes.slice()
 const SPACES = ['right-anterior-superior', 'left-posterior-superior', 'left-anterior-superior', 'RAS', 'LPS', 'LAS'];
 
 test.each(SPACES.flatMap((space) => GRIDS.map(([name, grid]) => [space, name, grid] as const)))(
-  'three: %s, %s, is where the file says',
+  'three: %s, %s, is placed as the file says',
   (space, _, grid) => {
     const bytes = scan(space, grid);
     const three = loaded(bytes);
@@ -116,7 +116,7 @@ test.each(SPACES.flatMap((space) => GRIDS.map(([name, grid]) => [space, name, gr
   },
 );
 
-/** A point through a column-major matrix. */
+/** Transforms a point by a column-major matrix. */
 const place = (matrix: ArrayLike<number>, [i, j, k]: Vec3): Vec3 =>
   [0, 1, 2].map((row) => {
     const [x = 0, y = 0, z = 0, at = 0] = [0, 4, 8, 12].map((first) => matrix[first + row] ?? 0);
@@ -154,7 +154,7 @@ test.each([
   }
 });
 
-test('three: in the world of its slices an oblique grid is turned as its matrix says', () => {
+test('three: in the world of its slices an oblique grid is rotated as by its matrix', () => {
   const three = loaded(scan('right-anterior-superior', OBLIQUE));
   const middle = SIZE.map((count) => (count - 1) / 2);
   agree(volumeFromThree(three, { world: 'slices' }), {
@@ -164,7 +164,7 @@ test('three: in the world of its slices an oblique grid is turned as its matrix 
   });
 });
 
-test('three: frames after another', () => {
+test('three: frames', () => {
   const fields = (kinds: string) => [
     ...['type: short', 'dimension: 4', 'space: left-posterior-superior', `sizes: ${SIZE.join(' ')} 2`],
     `space directions: ${columns(OBLIQUE).map(vector).join(' ')} none`,
@@ -175,29 +175,29 @@ test('three: frames after another', () => {
   expect(volume.frames).toBe(2);
   expect([...volume.intensities(1)]).toEqual([...voxels(2).subarray(COUNT)]);
   const colours = loaded(nrrd(fields('RGB-color domain domain domain'), new Uint8Array(voxels(2).buffer)));
-  expect(failure(() => volumeFromThree(colours)).message).toMatch(/one number a voxel/);
+  expect(failure(() => volumeFromThree(colours)).message).toMatch(/one number per voxel/);
 });
 
-test('three: what is refused', () => {
+test('three: invalid arguments are refused', () => {
   expect(failure(() => volumeFromThree(wrong(undefined))).message).toMatch(/NRRDLoader/);
   expect(failure(() => volumeFromThree(wrong({ data: voxels() }))).message).toMatch(/xLength/);
   const big = loaded(scan('RAS', OBLIQUE, ['endian: big']));
   expect(failure(() => volumeFromThree(big)).message).toMatch(/Volume\.parse/);
   expect(failure(() => volumeFromThree(big, wrong({ world: 'somewhere' }))).code).toBe('invalid-argument');
   const few = Object.assign(loaded(scan('RAS', OBLIQUE)), { xLength: 4 });
-  expect(failure(() => volumeFromThree(few)).message).toMatch(/4 x 6 x 5/);
+  expect(failure(() => volumeFromThree(few)).message).toMatch(/4 × 6 × 5/);
 });
 
 // ── NiiVue
 
-/** The bytes of a NIfTI file of two frames, with slope and intercept. */
+/** Returns a NIfTI file of two frames, with slope and intercept. */
 const nifti = (directions: Vec3[]) =>
   new Volume({
     ...{ data: voxels(2), dims: [...SIZE, 2], affine: affine(directions) },
     ...{ slope: 0.5, intercept: 10, frameSeconds: 0.25 },
   }).toNifti();
 
-test.each(GRIDS)('NiiVue 0.69: %s, the same at every voxel', async (_, grid) => {
+test.each(GRIDS)('NiiVue 0.69: %s, the same value at every voxel', async (_, grid) => {
   const image = await wrong(NVImage).new(nifti(grid).slice().buffer, 'scan.nii');
   const size = image.dimsRAS?.slice(1) ?? [];
   const volume = agree(volumeFromNiivue(image), {
@@ -210,7 +210,7 @@ test.each(GRIDS)('NiiVue 0.69: %s, the same at every voxel', async (_, grid) => 
   expect(volume.space).toBe('RAS');
 });
 
-test.each(GRIDS)('NiiVue 0.69: an LPS file, %s, is where the file says, in RAS', async (_, grid) => {
+test.each(GRIDS)('NiiVue 0.69: an LPS file, %s, is placed as the file says, in RAS', async (_, grid) => {
   const bytes = scan('left-posterior-superior', grid);
   const image = await wrong(NVImage).new(bytes.slice().buffer, 'scan.nrrd');
   const file = Volume.parse(bytes);
@@ -223,11 +223,11 @@ test.each(GRIDS)('NiiVue 0.69: an LPS file, %s, is where the file says, in RAS',
   });
 });
 
-/** NiiVue has its matrices in rows. */
+/** Converts a matrix stored by rows, as in NiiVue, to columns. */
 const transposed = (rows: ArrayLike<number>) =>
   Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)] ?? 0);
 
-test.each(GRIDS)('NiiVue 1.0: %s, the same at every voxel', async (_, grid) => {
+test.each(GRIDS)('NiiVue 1.0: %s, the same value at every voxel', async (_, grid) => {
   const nv = new NiiVue();
   await nv.loadVolumes([{ url: new File([nifti(grid).slice()], 'scan.nii') }]);
   const [image] = nv.volumes;
@@ -242,7 +242,7 @@ test.each(GRIDS)('NiiVue 1.0: %s, the same at every voxel', async (_, grid) => {
   }
 });
 
-/** A volume as NiiVue has it. */
+/** Returns a volume with the fields that NiiVue gives it. */
 const niivue = (more: object, img: unknown = voxels()) => ({
   img,
   hdr: {
@@ -258,26 +258,29 @@ const niivue = (more: object, img: unknown = voxels()) => ({
   },
 });
 
-test('NiiVue: no slope, and times of its units', () => {
+test('NiiVue: no slope, and units of time', () => {
   expect([...new Volume(volumeFromNiivue(niivue({}))).intensities()]).toEqual([...voxels()]);
   const seconds = (xyzt_units: number) => new Volume(volumeFromNiivue(niivue({ xyzt_units }, voxels(3)))).frameSeconds;
   expect([2, 8 + 2, 16 + 2, 24 + 2, 32].map(seconds)).toEqual([2, 2, 2e-3, 2e-6, 0]);
   expect(volumeFromNiivue(niivue({}))).not.toHaveProperty('frameSeconds');
 });
 
-test('NiiVue: what is refused', () => {
+test('NiiVue: invalid arguments are refused', () => {
   for (const nothing of [undefined, {}, { hdr: null }, niivue({}, null)]) {
     expect(failure(() => volumeFromNiivue(wrong(nothing))).message).toMatch(/a loaded volume of NiiVue/);
   }
   const colours = niivue({ datatypeCode: 128 }, new Uint8Array(3 * COUNT));
-  expect(failure(() => volumeFromNiivue(colours)).message).toMatch(/RGB; one number a voxel/);
-  expect(failure(() => volumeFromNiivue(niivue({}, new Uint8Array(COUNT + 1)))).message).toMatch(/7 x 6 x 5/);
+  expect(failure(() => volumeFromNiivue(colours)).message).toMatch(/RGB; only one number per voxel/);
+  expect(failure(() => volumeFromNiivue(niivue({}, new Uint8Array(COUNT + 1)))).message).toMatch(/7 × 6 × 5/);
   expect(failure(() => volumeFromNiivue(niivue({}, [...voxels()]))).message).toMatch(/Uint8Array/);
 });
 
 // ── vtk.js and itk-wasm
 
-/** The image in vtk.js, its extent not from 0. What its types inherit cannot be found from Node's modules. */
+/**
+ * Returns the image in vtk.js, with an extent that does not begin at 0. The types of its base classes cannot be
+ * resolved from Node's modules.
+ */
 function vtkImage(directions: Vec3[], values = voxels(), numberOfComponents = 1) {
   const image = wrong(vtkImageData.newInstance({ spacing: SPACING, origin: ORIGIN }));
   image.setDirection(directions.flat());
@@ -286,7 +289,7 @@ function vtkImage(directions: Vec3[], values = voxels(), numberOfComponents = 1)
   return image;
 }
 
-test.each(GRIDS)('vtk.js: %s, extents not from 0, the same at every voxel', (_, grid) => {
+test.each(GRIDS)('vtk.js: %s, extents that do not begin at 0, the same value at every voxel', (_, grid) => {
   const image = vtkImage(grid);
   const inExtent = ([i, j, k]: Vec3) => [i + 2, j - 3, k + 5];
   const scalars = image.getPointData().getScalars();
@@ -298,15 +301,15 @@ test.each(GRIDS)('vtk.js: %s, extents not from 0, the same at every voxel', (_, 
   expect(new Volume(volumeFromVtk(image, { space: 'RAS' })).space).toBe('RAS');
 });
 
-test('vtk.js: what is refused', () => {
+test('vtk.js: invalid arguments are refused', () => {
   expect(failure(() => volumeFromVtk(wrong({}))).message).toMatch(/a vtkImageData/);
   expect(failure(() => volumeFromVtk(wrong(vtkImageData.newInstance()))).message).toMatch(/no scalars/);
   const colours = vtkImage(OBLIQUE, Int16Array.from({ length: 3 * COUNT }), 3);
-  expect(failure(() => volumeFromVtk(colours)).message).toMatch(/3 numbers a voxel; one/);
+  expect(failure(() => volumeFromVtk(colours)).message).toMatch(/3 numbers per voxel; only one/);
   expect(failure(() => volumeFromVtk(vtkImage(OBLIQUE), wrong({ space: 'LAS' }))).message).toMatch(/RAS/);
 });
 
-/** The image in itk-wasm; in 4D with two frames. */
+/** Returns the image in itk-wasm; in 4D with two frames. */
 function itkImage(directions: Vec3[], dimension = 3): Image {
   const image = new Image(new ImageType(dimension, 'int16', 'Scalar', 1));
   const more = <T>(values: T[], last: T) => [...values, last].slice(0, dimension);
@@ -319,7 +322,7 @@ function itkImage(directions: Vec3[], dimension = 3): Image {
   });
 }
 
-test.each(GRIDS)('itk-wasm: %s, where vtk.js has it', (_, grid) => {
+test.each(GRIDS)('itk-wasm: %s, the same position as in vtk.js', (_, grid) => {
   const image = itkImage(grid);
   const vtk = vtkITKHelper.convertItkToVtkImage(wrong(image));
   const volume = agree(volumeFromItk(image), {
@@ -337,12 +340,14 @@ test('itk-wasm: 4D has frames', () => {
   expect([...volume.intensities(1)]).toEqual([...voxels(2).subarray(COUNT)]);
 });
 
-test('itk-wasm: what is refused', () => {
+test('itk-wasm: invalid arguments are refused', () => {
   expect(failure(() => volumeFromItk(wrong(null))).message).toMatch(/an Image of itk-wasm/);
-  expect(failure(() => volumeFromItk(new Image())).message).toMatch(/2D; a 3D or 4D/);
+  expect(failure(() => volumeFromItk(new Image())).message).toMatch(/3D or 4D image, got 2D/);
   const colours = new Image(new ImageType(3, 'uint8', 'RGB', 3));
-  expect(failure(() => volumeFromItk(colours)).message).toMatch(/3 numbers a voxel, RGB/);
-  expect(failure(() => volumeFromItk(Object.assign(itkImage(OBLIQUE), { data: null }))).message).toMatch(/no voxels/);
+  expect(failure(() => volumeFromItk(colours)).message).toMatch(/3 numbers per voxel, RGB/);
+  expect(failure(() => volumeFromItk(Object.assign(itkImage(OBLIQUE), { data: null }))).message).toMatch(
+    /unsupported voxel type/,
+  );
   const wide = Object.assign(itkImage(OBLIQUE), { data: new BigInt64Array(COUNT) });
-  expect(failure(() => volumeFromItk(wide)).message).toMatch(/no voxels of a kind/);
+  expect(failure(() => volumeFromItk(wide)).message).toMatch(/unsupported voxel type/);
 });

@@ -1,26 +1,26 @@
-// A ball that beats, as a 4D volume with noise, and what is true of it.
+// A pulsating ball as a 4D volume with noise, and its true measures.
 import { type Vec3, Volume, type VolumeInit } from '../../pkg/index.js';
 
 export const FRAMES = 8;
 export const SECONDS = 0.05;
-/** Voxels along each axis, and their side in the world. */
+/** Voxels along each axis, and their size in world units. */
 const [SIZE, SIDE] = [20, 1.5];
-/** Where the ball is in the world. */
+/** Centre of the ball in world units. */
 export const MIDDLE: Vec3 = [40, -20, 10];
 const ORIGIN = MIDDLE.map((x) => x - ((SIZE - 1) / 2) * SIDE) as Vec3;
-/** The whole volume in the world. */
+/** Bounds of the whole volume in world units. */
 export const REACH = { min: ORIGIN, max: MIDDLE.map((x) => x + ((SIZE - 1) / 2) * SIDE) as Vec3 };
 
-/** Bright and dark, and the largest noise. */
+/** Intensities inside and outside, and the largest noise. */
 const [BRIGHT, DARK, NOISE] = [160, 40, 10];
 
-/** In voxels: largest in the first frame, smallest in the middle one. */
+/** Returns the radius in voxels: largest in the first frame, smallest in the middle one. */
 const radius = (frame: number) => 6 - 0.75 * (1 - Math.cos((2 * Math.PI * frame) / FRAMES));
 
-/** What the ball encloses in a frame. */
+/** Returns the true volume of the ball in a frame, in world units cubed. */
 export const truth = (frame: number) => (4 / 3) * Math.PI * (SIDE * radius(frame)) ** 3;
 
-/** Numbers in [0, 1), the same ones each time. */
+/** Returns a generator of reproducible random numbers in [0, 1). */
 function randomNumbers(seed: number) {
   let state = seed;
   return () => {
@@ -29,7 +29,7 @@ function randomNumbers(seed: number) {
   };
 }
 
-/** The intensities of one ball, one voxel of ramp at its surface. */
+/** Returns the intensities of one ball, with a ramp of one voxel at its surface. */
 function paint(size: number, middle: Vec3, radius: number, random: () => number): number[] {
   return Array.from({ length: size ** 3 }, (_, i) => {
     const place = [i % size, Math.floor(i / size) % size, Math.floor(i / size ** 2)];
@@ -39,7 +39,7 @@ function paint(size: number, middle: Vec3, radius: number, random: () => number)
   });
 }
 
-/** Voxels of so many frames of the beat, x fastest. */
+/** Returns the voxels of some frames of the beat, x fastest. */
 export function beats({ frames = FRAMES, seed = 7 } = {}): Uint8Array {
   const random = randomNumbers(seed);
   const middle = [0, 0, 0].map(() => (SIZE - 1) / 2) as Vec3;
@@ -48,14 +48,14 @@ export function beats({ frames = FRAMES, seed = 7 } = {}): Uint8Array {
   );
 }
 
-/** The same as a volume. */
+/** Returns some frames of the beat as a volume. */
 export function beating(shape: { frames?: number; seed?: number } = {}, more: Partial<VolumeInit> = {}): Volume {
   const dims: VolumeInit['dims'] = [SIZE, SIZE, SIZE, shape.frames ?? FRAMES];
   const place = more.affine ? {} : { spacing: [SIDE, SIDE, SIDE] as Vec3, origin: ORIGIN };
   return new Volume({ data: beats(shape), dims, ...place, frameSeconds: SECONDS, ...more });
 }
 
-/** A large ball and a small one that do not move, in two frames; voxels of side 1 from the origin on. */
+/** A large ball and a small one that do not move, in two frames; voxels of side 1, with the origin at the first. */
 export const LARGE = { at: [8, 12, 12] as Vec3, radius: 5 };
 export const SMALL = { at: [19, 12, 12] as Vec3, radius: 3 };
 export function pair(): Volume {

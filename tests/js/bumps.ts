@@ -1,8 +1,8 @@
-// A bumpy ellipsoid from 400 points, as a number over the bits of its positions. The function names nothing outside itself, so
-// that it can be sent into a browser.
+// The implicit surface of 400 points of a bumpy ellipsoid, as a hash of the bits of its positions. The function is
+// self-contained, so that it can be sent to a browser.
 import type * as Package from '../../pkg/index.js';
 
-/** FNV-1a over all positions: what the core gives natively (`tests/core/implicit.rs`). */
+/** FNV-1a hash over all positions that the core gives natively (`tests/core/implicit.rs`). */
 export const BUMPS_BITS = '78aedacfbadc8109';
 
 export function bumpsBits({ ImplicitSurface }: typeof Package): string {

@@ -61,7 +61,7 @@ export class Volume {
   toNifti(): Uint8Array;
   readonly dims: Vec3;
   readonly frames: number;
-  /** 0 where there is no such time. */
+  /** 0 if the volume has no time axis. */
   readonly frameSeconds: number;
   readonly spacing: Vec3;
   readonly affine: Float64Array;
@@ -110,7 +110,7 @@ export interface MeshInfo {
   minAngleDegrees: number;
   bounds: { min: Vec3; max: Vec3 };
 }
-/** What an independent look at the mesh finds; a healthy one is closed, oriented and has all counts at 0. */
+/** Result of an independent check of the mesh; a healthy one is closed, oriented and has all counts at 0. */
 export interface MeshReport {
   closed: boolean;
   oriented: boolean;
@@ -129,11 +129,11 @@ export class Mesh {
   static marchingCubes(volume: Volume, iso: number, options?: { frame?: number }): Mesh;
   readonly vertexCount: number;
   readonly triangleCount: number;
-  /** Counts up when connectivity changes / when any vertex moves. */
+  /** Increases when connectivity changes / when any vertex moves. */
   readonly topologyVersion: number;
   readonly geometryVersion: number;
   arrays(): MeshArrays;
-  /** Into the caller's buffers, which are replaced only when too small; returns the counts written. */
+  /** Copies into the caller's buffers, which are replaced only when too small; returns the counts written. */
   copyTo(out: MeshArrays): { vertices: number; triangles: number };
   info(): MeshInfo;
   check(): MeshReport;
@@ -165,18 +165,18 @@ export class Mesh {
 export interface StepReport {
   iteration: number;
   done: boolean;
-  /** What the method is doing now: 'level 2', 'solve', 'extract', 'frame 7' ... */
+  /** The current phase of the method: 'level 2', 'solve', 'extract', 'frame 7' ... */
   phase: string;
   /** 0..1 where it can be known, else NaN. */
   progress: number;
-  /** The method's own convergence figure, and what it is compared with. */
+  /** The method's own measure of convergence, and the tolerance that it is compared with. */
   residual: number;
   tolerance: number;
   vertices: number;
   triangles: number;
   components: number;
   euler: number;
-  /** Counted since the last report. axial joins (or splits off) by contact, annular cuts a neck. */
+  /** Counted since the last report. axial: joins (or splits) by contact; annular: cuts of a neck. */
   events: {
     creations: number;
     deletions: number;
@@ -242,12 +242,15 @@ export interface DeformableParams {
   topology?: 'adaptive' | 'fixed';
   adaptivity?: number; // 0..1; 0 = the paper: one δ, contact by distance alone
   seeding?: 'auto' | 'on' | 'off'; // parts that a level shows and the surface leaves out; auto: with start 'contour'
-  smallestPart?: number; // voxels; what encloses less is left out
+  smallestPart?: number; // voxels; components that enclose less are left out
 }
-/** Of the volume's iso-surface, less what encloses fewer voxels than smallestPart; within one voxel. */
+/**
+ * Coverage of the volume's iso-surface, without components that enclose fewer voxels than smallestPart; within one
+ * voxel.
+ */
 export interface Coverage {
-  recall: number; // share of its area that the surface covers
-  precision: number; // share of the surface's area that it covers
+  recall: number; // fraction of the iso-surface's area that the surface covers
+  precision: number; // fraction of the surface's area that the iso-surface covers
   uncovered: UncoveredRegion[]; // largest first
 }
 export interface UncoveredRegion {
@@ -281,14 +284,14 @@ export class DeformableModel implements Stepper {
     params?: DeformableParams;
   });
   readonly level: number;
-  readonly delta: number; // δ now
+  readonly delta: number; // current δ
   /** Attachment points the user places; pull the surface within radius. */
   setAttractors(list: Attractor[]): void;
   readonly mesh: Mesh;
   readonly params: Required<DeformableParams>;
   step(iterations?: number): StepReport;
   run(options?: RunOptions): Promise<StepReport>;
-  /** Adds what this level shows and the surface leaves out; counted in events.seeds. */
+  /** Seeds components of this level that the surface leaves out; counted in events.seeds. */
   seed(): StepReport;
   /** Yields between slices. */
   coverage(options?: CoverageOptions): Promise<Coverage>;
@@ -343,7 +346,7 @@ export class ImplicitSurface implements Stepper {
   /** f > 0 inside, 0 on the surface, < 0 outside. */
   evaluate(points: Float32Array): Float32Array;
   gradient(points: Float32Array): Float32Array;
-  /** The points that took part, and the exterior ones, for display. */
+  /** The points that are used, and the exterior ones, for display. */
   constraints(): { surface: Float32Array; exterior: Float32Array };
   /** Distances from all the original points to the surface. */
   fitness(): { mean: number; rms: number; max: number; meanCurvature: number };
@@ -360,7 +363,7 @@ export class ImplicitSurface implements Stepper {
 export interface TrackingParams {
   threshold?: number; // τ, smallest step between the two cluster means, intensity units
   window?: number; // k: a window is 2k+1 voxels wide
-  windowFrames?: number; // and so many frames to either side
+  windowFrames?: number; // and this many frames to either side
   radius?: number; // support of the weight θ, world units
   timeScale?: number; // c, world units per frame
   damping?: number; // β
@@ -372,7 +375,7 @@ export interface TrackingParams {
 export interface TrackingOptions {
   volume: Volume; // 4D
   box?: { min: Vec3; max: Vec3 };
-  component?: 'largest' | Vec3; // the surface of interest: largest, or the one nearest a point
+  component?: 'largest' | Vec3; // the surface to track: the largest, or the one nearest to a point
   start?: Mesh; // instead of meshing the first frame
   params?: TrackingParams;
 }
@@ -389,13 +392,13 @@ export interface FrameStatistics {
 }
 export class SurfaceTracker implements Stepper {
   constructor(options: TrackingOptions);
-  step(iterations?: number): StepReport; // one frame at a time: of the boundary, then of the surface
+  step(iterations?: number): StepReport; // one frame: first the boundaries of all frames, then their surfaces
   run(options?: RunOptions): Promise<StepReport>;
   readonly mesh: Mesh; // of the current frame
   readonly frame: number;
   readonly frames: number;
   readonly noise: number; // standard deviation, intensity units
-  readonly cycleClosureError: number | undefined; // of a cycle: how far it is from its beginning, world units
+  readonly cycleClosureError: number | undefined; // for cyclic sequences: distance of the closed cycle from its first surface, world units
   readonly statistics: FrameStatistics[];
   readonly params: Required<TrackingParams>;
   setParams(params: TrackingParams): void;

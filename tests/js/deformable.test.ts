@@ -10,7 +10,7 @@ const volume = ball(32, 9);
 const PARAMS: DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2, ...PAPER };
 const models: DeformableModel[] = [];
 
-/** From outside and in many small steps, by default. */
+/** Returns a model that starts from outside and takes many small steps by default. */
 function model(more: Partial<Options> = {}): DeformableModel {
   const made = new DeformableModel({ volume, start: 'enclosing', params: PARAMS, ...more });
   models.push(made);
@@ -23,7 +23,7 @@ afterEach(() => {
 
 const bytesOf = (mesh: Mesh) => Buffer.from(mesh.arrays().positions.buffer);
 
-test('it comes to rest on the ball', async () => {
+test('it converges to the ball', async () => {
   const fitted = model();
   const report = await fitted.run();
   expect(report).toMatchObject({ done: true, components: 1, euler: 2, triangles: fitted.mesh.triangleCount });
@@ -40,7 +40,7 @@ test('it comes to rest on the ball', async () => {
   for (const coordinate of info.centroid) expect(Math.abs(coordinate)).toBeLessThan(0.2);
 });
 
-test('coarse to fine it ends on the volume itself, at the edge length asked for', async () => {
+test('coarse to fine it ends on the full volume, with the requested edge length', async () => {
   const fitted = model({ levels: 2 });
   expect(fitted.level).toBe(2);
   const coarse = fitted.delta;
@@ -50,25 +50,25 @@ test('coarse to fine it ends on the volume itself, at the edge length asked for'
   expect(fitted.delta).toBeLessThan(coarse);
 });
 
-test('speeds are told for each vertex of the arrays, inwards while an enclosing surface comes in', () => {
+test('speeds are given for each vertex, inwards while an enclosing surface shrinks', () => {
   const fitted = model();
   expect([...fitted.speeds()].every((speed) => speed === 0)).toBe(true);
   fitted.step(5);
   const speeds = fitted.speeds();
   expect(speeds).toHaveLength(fitted.mesh.vertexCount);
   expect([...speeds].every((speed) => speed < 0)).toBe(true);
-  // No vertex goes farther than its bound.
+  // No vertex moves further than its bound.
   const most = fitted.params.maxMove * fitted.delta * (1 + 1e-5);
   expect(Math.min(...speeds)).toBeGreaterThanOrEqual(-most);
   fitted.free();
   expect(failure(() => fitted.speeds()).code).toBe('freed');
 });
 
-test('the time of a step is told for each of its parts', () => {
+test('the time of a step is reported for each of its parts', () => {
   expect(Object.keys(model().step().times).sort()).toEqual(['embedding', 'forces', 'motion', 'normals', 'topology']);
 });
 
-test('every start shape', async () => {
+test('every kind of start', async () => {
   const starts: [Options['start'], number][] = [
     ['contour', 1],
     ['enclosing', 1],
@@ -106,7 +106,7 @@ test('the live mesh is one object that follows the model', () => {
   expect(fitted.step().iteration).toBe(6);
 });
 
-test('a step report has everything', () => {
+test('a step report has all fields', () => {
   const report = model().step(3);
   expect(report.iteration).toBe(3);
   expect(report.done).toBe(false);
@@ -117,7 +117,7 @@ test('a step report has everything', () => {
   for (const milliseconds of Object.values(report.times)) expect(milliseconds).toBeGreaterThanOrEqual(0);
 });
 
-test('the events of several steps are those of each together', () => {
+test("the events of several steps are the sum of each step's", () => {
   const [together, each] = [model(), model()];
   const events = (reports: StepReport[]) => reports.reduce((sum, report) => sum + report.events.deletions, 0);
   const single = Array.from({ length: 20 }, () => each.step());
@@ -143,7 +143,7 @@ test('restore(save()) then step() equals step()', () => {
   expect(bytesOf(resumed.mesh).equals(bytesOf(saved.mesh))).toBe(true);
 });
 
-test('a broken state is refused and changes nothing', () => {
+test('a damaged state is refused and changes nothing', () => {
   const [fitted, untouched] = [model(), model()];
   fitted.step(3);
   untouched.step(3);
@@ -156,7 +156,7 @@ test('a broken state is refused and changes nothing', () => {
   expect(bytesOf(fitted.mesh).equals(bytesOf(untouched.mesh))).toBe(true);
 });
 
-test('an aborted run rejects with the reason, and goes on later', async () => {
+test('an aborted run rejects with the reason and can continue later', async () => {
   const fitted = model();
   const abort = new AbortController();
   const reason = new Error('enough');
@@ -172,13 +172,13 @@ test('an aborted run rejects with the reason, and goes on later', async () => {
   expect((await fitted.run({ maxIterations: 2 })).iteration).toBe(7);
 });
 
-test('an abort from a timer is heard while the model works', async () => {
+test('an abort from a timer takes effect during a run', async () => {
   const abort = new AbortController();
   setTimeout(() => abort.abort('late'), 1);
   await expect(model().run({ signal: abort.signal, budgetMs: 1 })).rejects.toBe('late');
 });
 
-test('onStep hears every iteration, and may end the run', async () => {
+test('onStep is called for every iteration and can end the run', async () => {
   const fitted = model();
   const heard: number[] = [];
   const last = await fitted.run({ maxIterations: 6, onStep: ({ iteration }) => heard.push(iteration) });
@@ -194,25 +194,25 @@ test('onStep hears every iteration, and may end the run', async () => {
   expect(fitted.step().iteration).toBe(8);
 });
 
-test('one run at a time; parameters may change meanwhile', async () => {
+test('a second run is refused, but parameters can change during a run', async () => {
   const fitted = model();
   const first = fitted.run({ maxIterations: 10, budgetMs: 0.01 });
   expect((await rejection(fitted.run())).code).toBe('invalid-argument');
-  expect(failure(() => fitted.step()).message).toContain('under way');
-  expect(failure(() => fitted.restore(fitted.save())).message).toContain('under way');
+  expect(failure(() => fitted.step()).message).toContain('during a run');
+  expect(failure(() => fitted.restore(fitted.save())).message).toContain('during a run');
   fitted.setParams({ rigidity: 0.1 });
   expect((await first).iteration).toBe(10);
   expect(fitted.step().iteration).toBe(11);
 });
 
-test('a model freed during a run ends it', async () => {
+test('freeing a model ends its run', async () => {
   const fitted = model();
   const running = fitted.run({ budgetMs: 0.01 });
   fitted.free();
   expect((await rejection(running)).code).toBe('freed');
 });
 
-test('parameters: any subset, all or nothing', () => {
+test('any subset of parameters can be set, all or nothing', () => {
   const fitted = model();
   const before = fitted.params;
   expect(before).toMatchObject(PARAMS);
@@ -249,7 +249,7 @@ test('specs describe every parameter, with its default', () => {
     expect(spec.help.length, spec.name).toBeGreaterThan(10);
     expect(spec.label.length, spec.name).toBeGreaterThan(0);
     if (spec.type === 'choice') expect(spec.choices).toContain(spec.default);
-    // The iso value's own default is the middle of the volume's range.
+    // The default iso value is the centre of the volume's range.
     if (spec.name !== 'iso') expect(defaults[spec.name], spec.name).toEqual(spec.default);
     else expect(defaults.iso).toBe(100);
   }
@@ -264,10 +264,10 @@ test('an attractor pulls the surface', () => {
   expect(pulled.mesh.info().bounds.max[0]).toBeGreaterThan(free.mesh.info().bounds.max[0] + 0.5);
 });
 
-/** The defaults of the method. */
+/** Default parameters of the method, with adaptive sampling. */
 const ADAPTING: DeformableParams = { iso: 100 };
 
-test('from the contour, the default, nothing of a ball with a cavity and a thin plate is missing', async () => {
+test('from the contour, the default, a ball with a cavity and a thin plate is found completely', async () => {
   const fitted = new DeformableModel({ volume: ballWithHollowAndPlate(), params: ADAPTING });
   models.push(fitted);
   expect(await fitted.run()).toMatchObject({ done: true, components: 3, euler: 6 });
@@ -301,7 +301,7 @@ test('a cavity that an enclosing surface cannot reach is reported, and seeding a
   expect(fitted.seed().events.seeds).toBe(0);
 });
 
-test('seeds of a run are counted', async () => {
+test('the seeds of a run are counted', async () => {
   const fitted = model({ volume: ballWithHollowAndPlate(), params: { ...ADAPTING, seeding: 'on' } });
   let seeds = 0;
   const onStep = ({ events }: StepReport) => {
@@ -324,17 +324,17 @@ test('matter that a surface leaves out is reported as such, and small parts are 
   expect(await kinds({ smallestPart: 1500 })).toEqual([]);
 });
 
-test('coverage is measured beside a run, of the surface as it was', async () => {
+test('coverage is measured during a run, for the surface at its beginning', async () => {
   const fitted = model();
   const before = await fitted.coverage();
   const running = fitted.run({ maxIterations: 30, budgetMs: 0.01 });
-  expect(failure(() => fitted.seed()).message).toContain('under way');
+  expect(failure(() => fitted.seed()).message).toContain('during a run');
   const [meanwhile] = await Promise.all([fitted.coverage(), running]);
   expect(meanwhile.recall).toBeLessThanOrEqual(1);
   expect(await model().coverage()).toEqual(before);
 });
 
-test('a measurement that is aborted rejects with the reason, one of a freed model with freed', async () => {
+test('an aborted measurement rejects with the reason, and one of a freed model with freed', async () => {
   const fitted = model();
   const reason = new Error('enough');
   await expect(fitted.coverage({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
@@ -354,7 +354,7 @@ test('a measurement that is aborted rejects with the reason, one of a freed mode
   expect(failure(() => fitted.seed()).code).toBe('freed');
 });
 
-test('wrong options of a measurement', async () => {
+test('invalid options of a measurement are refused', async () => {
   const refused: [string, unknown][] = [
     ['signal', { signal: {} }],
     ['onProgress', { onProgress: 1 }],
@@ -412,7 +412,7 @@ const REFUSED: [string, string, string, () => unknown][] = [
   [
     'a start mesh that crosses itself',
     'self-intersecting',
-    'cross',
+    'intersects itself',
     () => {
       const { positions, indices } = closed.arrays();
       const twice = Float32Array.from([...positions, ...positions.map((value) => value + 1)]);
@@ -428,7 +428,7 @@ test.each(REFUSED)('%s is refused: %s, saying %s', (_, code, word, work) => {
   expect(error.message).toContain(word);
 });
 
-test('wrong run options', async () => {
+test('invalid run options are refused', async () => {
   const refused: [string, object][] = [
     ['maxIterations', { maxIterations: 0 }],
     ['budgetMs', { budgetMs: -1 }],
@@ -443,7 +443,7 @@ test('wrong run options', async () => {
   }
 });
 
-test('the volume may go, the model stays; a freed model is gone', () => {
+test('a model survives its volume, and a freed model is refused', () => {
   const own = ball(16, 4);
   const fitted = model({ volume: own });
   own.free();
@@ -456,7 +456,7 @@ test('the volume may go, the model stays; a freed model is gone', () => {
   expect(failure(() => model({ volume: own })).code).toBe('freed');
 });
 
-test('parameters may be getters that ask the model', () => {
+test('getters of parameters may use the model', () => {
   const fitted = model();
   fitted.setParams({
     get iso() {
@@ -466,14 +466,14 @@ test('parameters may be getters that ask the model', () => {
   expect(fitted.params.iso).toBe(101);
 });
 
-test('names that every object has are no parameters, and an array holds none', () => {
+test('names of inherited properties are no parameters, and arrays are refused', () => {
   const fitted = model();
   expect(failure(() => fitted.setParams({ toString: 1 } as unknown as DeformableParams)).message).toContain('toString');
   expect(failure(() => fitted.setParams([] as unknown as DeformableParams)).code).toBe('invalid-argument');
   expect(failure(() => model({ start: { bubbles: 1, seeds: 1 } as never })).message).toContain('seeds');
 });
 
-test('a restored mesh is never mistaken for the one before', () => {
+test('a restored mesh has new version numbers', () => {
   const fitted = model();
   const state = fitted.save();
   fitted.step(5);
@@ -483,6 +483,6 @@ test('a restored mesh is never mistaken for the one before', () => {
   expect(fitted.mesh.geometryVersion).toBeGreaterThan(geometryVersion);
 });
 
-test('two hundred steps end in the bits that the core gives natively', async () => {
+test('two hundred steps give the same bits as the native core', async () => {
   expect(await spongeBits(vesicle)).toBe(SPONGE_BITS);
 });

@@ -1,4 +1,4 @@
-// Ways into the package beside `vesicle` itself, in Node.
+// Entry points of the package other than `vesicle`, in Node.
 import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdtempSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -9,7 +9,7 @@ import { SPONGE_BITS, spongeBits } from './sponge.js';
 
 const root = fileURLToPath(new URL('../..', import.meta.url));
 
-/** What a script prints, run by Node in a process of its own, in a folder of the project. */
+/** Runs a script in a separate Node process, in a folder of the project, and returns what it prints. */
 function node(script: string, cwd = root): string {
   const args = ['--input-type=module', '--eval', script];
   return execFileSync(process.execPath, args, { cwd, encoding: 'utf8', timeout: 120_000 }).trim();
@@ -24,7 +24,7 @@ test('the file with the module inside gives the same bits, whatever folder it is
   expect(node(bits(`${root}pkg/inline.js`), '/')).toBe(SPONGE_BITS);
 });
 
-test('an engine without vectors gets the plain module, with the same bits', () => {
+test('an engine without SIMD gets the plain module, with the same bits', () => {
   const without = `
     const { readFile } = (await import('node:fs')).promises;
     const read = [];
@@ -37,11 +37,11 @@ test('an engine without vectors gets the plain module, with the same bits', () =
   expect(node(`${without}${bits('./pkg/index.js')}${sizes}`)).toBe(`${SPONGE_BITS}\ntrue false`);
 });
 
-test('only the plain module is valid without vectors', () => {
+test('only the plain module is valid without SIMD', () => {
   const check = (...args: string[]) =>
     spawnSync('node_modules/.bin/wasm-opt', ['--all-features', ...args], { cwd: root }).status;
   const isValid = (module: string) => {
-    // What a module says of itself would allow it vectors again.
+    // The module's own feature section would enable SIMD again.
     const bare = join(mkdtempSync(join(tmpdir(), 'vesicle-')), 'bare.wasm');
     expect(check('--strip-target-features', `pkg/${module}`, '-o', bare)).toBe(0);
     return check('--disable-simd', bare, '-o', bare) === 0;

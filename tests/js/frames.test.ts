@@ -1,11 +1,11 @@
-// Volumes of several frames: in one file, or as a series of files.
+// Volumes of several frames, in one file or as a series of files.
 import { gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
 import { SurfaceTracker, type Vec3, Volume } from '../../pkg/index.js';
 import { beating, SECONDS } from './beating.js';
 import { failure, wrong } from './helpers.js';
 
-/** 2 x 3 x 4 voxels in two frames that hold their own index. */
+/** 2 x 3 x 4 voxels in two frames, whose values are their indices. */
 const DATA = Uint8Array.from({ length: 48 }, (_, index) => index);
 const FRAME = 24;
 const SPACING: Vec3 = [2, 3, 4];
@@ -14,7 +14,7 @@ const bytesOf = (lines: string[]) => new TextEncoder().encode(lines.join('\n'));
 const joined = (...parts: Uint8Array[]) => new Uint8Array(Buffer.concat(parts));
 const nifti = (volume: Volume) => volume.toNifti();
 const view = (bytes: Uint8Array) => new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-/** Seconds a frame, as it is written out. */
+/** Returns the seconds per frame as stored in a NIfTI file. */
 const seconds = (volume: Volume) => view(nifti(volume)).getFloat32(76 + 4 * 4, true);
 
 function expectCounted(volume: Volume, spacing = SPACING): void {
@@ -22,10 +22,10 @@ function expectCounted(volume: Volume, spacing = SPACING): void {
   expect([...volume.intensities(0), ...volume.intensities(1)]).toEqual([...DATA]);
 }
 
-/** What a NIfTI-1 header of bytes says. */
+/** Header fields of a NIfTI-1 file of bytes. */
 interface Header {
   dim?: number[];
-  /** Of the frames; the others are those of `SPACING`. */
+  /** Spacing of the frames; the other axes have `SPACING`. */
   step?: number;
   units?: number;
   slope?: number;
@@ -37,7 +37,7 @@ function niftiFile({ dim = [4, 2, 3, 4, 2], step = 0, units = 0, slope = 0, big 
   const header = view(bytes);
   header.setInt32(0, 348, !big);
   for (const [i, n] of dim.entries()) header.setInt16(40 + 2 * i, n, !big);
-  // One byte a voxel.
+  // One byte per voxel.
   header.setInt16(70, 2, !big);
   header.setInt16(72, 8, !big);
   for (const [i, length] of [1, ...SPACING, step].entries()) header.setFloat32(76 + 4 * i, length, !big);
@@ -66,7 +66,7 @@ test.each([
   }
 });
 
-test('NIfTI frames with a slope, and what is not of the axes', () => {
+test('NIfTI frames with a slope, and a fourth axis that is not time', () => {
   expect(Volume.parse(niftiFile({ slope: 2 })).intensities(1)[0]).toBe(2 * FRAME);
   expect(Volume.parse(niftiFile({ slope: Number.NaN })).intensities(1)[0]).toBe(FRAME);
   const three = Volume.parse(niftiFile({ dim: [3, 2, 3, 8, 9] }));
@@ -106,14 +106,14 @@ test.each([
   expect(seconds(volume)).toBeCloseTo(time, 6);
 });
 
-test('NRRD frames whose spacings nobody knows, and frames of one slice', () => {
+test('NRRD frames with unknown spacings, and frames of one slice', () => {
   expectCounted(Volume.parse(nrrdFile(...LAST, 'spacings: NaN NaN NaN NaN')), [1, 1, 1]);
   const sizes = ['dimension: 3', 'sizes: 4 6 2', 'space: RAS', 'space directions: (1,0,0) (0,1,0) none'];
   const flat = Volume.parse(nrrdFile(...sizes, 'kinds: domain domain list'));
   expect([flat.dims, flat.frames, flat.intensities(1)[0]]).toEqual([[4, 6, 1], 2, FRAME]);
 });
 
-/** The same file with the axis of frames at another place: what the header says of each axis, and the voxels. */
+/** Returns the same file with the axis of frames at another position, in header and voxels. */
 function moved(at: number, ...fields: string[]): Uint8Array {
   const order = [0, 1, 2];
   order.splice(at, 0, 3);
@@ -129,7 +129,7 @@ function moved(at: number, ...fields: string[]): Uint8Array {
     [2, 3, 4, 2],
     [1, 2, 6, 24],
   ];
-  // Where a voxel of the file comes to lie.
+  // Returns the index in `DATA` of a voxel of the file.
   const place = (index: number) => {
     let [rest, sum] = [index, 0];
     for (const axis of order) {
@@ -171,7 +171,7 @@ test('NRRD frames of one slice, without directions', () => {
   expect([flat.dims, flat.frames, flat.intensities(1)[0]]).toEqual([[4, 6, 1], 2, FRAME]);
 });
 
-/** Numbers that are parts of one voxel are not read, and never taken for frames. */
+/** Components of one voxel are refused, and never read as frames. */
 test.each([
   ['of vectors', 'kinds', [...LAST, 'space: RAS', DIRECTIONS, 'kinds: domain domain domain vector']],
   ['of colours', 'kinds', [...LAST, 'space: RAS', DIRECTIONS, 'kinds: domain domain domain RGB-color']],
@@ -197,7 +197,7 @@ test('MetaImage frames', () => {
   expect([...volume.affine.slice(12, 15)]).toEqual([5, 6, 7]);
 });
 
-/** The files of a series, one frame each. */
+/** Returns a file for each frame. */
 function series(volume: Volume): Uint8Array[] {
   const { dims, affine } = volume;
   return Array.from({ length: volume.frames }, (_, frame) =>
@@ -205,7 +205,7 @@ function series(volume: Volume): Uint8Array[] {
   );
 }
 
-test('a series of files is the frames of one volume', () => {
+test('a series of files gives the frames of one volume', () => {
   const whole = Volume.parse(niftiFile());
   const volume = Volume.fromFrames(
     series(whole).map((bytes) => Volume.parse(bytes)),
@@ -214,7 +214,7 @@ test('a series of files is the frames of one volume', () => {
   expectCounted(volume);
   expect([...volume.affine]).toEqual([...whole.affine]);
   expect(seconds(volume)).toBeCloseTo(0.04, 6);
-  // A file of several frames gives all of them.
+  // All frames of a file with several are taken.
   const longer = Volume.fromFrames([volume, Volume.parse(series(whole)[0] as Uint8Array)]);
   expect([longer.frames, longer.intensities(1)[0], longer.intensities(2)[0]]).toEqual([3, FRAME, 0]);
   expect(seconds(longer)).toBeCloseTo(0.04, 6);
@@ -233,7 +233,7 @@ test('frames keep their intensities, whatever type and slope each has', () => {
   expect(volume.range).toEqual([-5, 65535]);
 });
 
-test('frames of a grid that differs by what a header rounds are those of one', () => {
+test('grids that differ by header rounding are the same', () => {
   expect(Volume.fromFrames([still(), still({ origin: [1e-6, 0, 0] })]).frames).toBe(2);
 });
 
@@ -251,7 +251,7 @@ test.each([
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining(named)]);
 });
 
-test('a sequence is followed alike from memory, one file, and a series of files', () => {
+test('a sequence is tracked alike from memory, one file, and a series of files', () => {
   const given = beating({ frames: 2 });
   const file = Volume.parse(nifti(given));
   const files = Volume.fromFrames(

@@ -1,16 +1,16 @@
-// What the tests of the package share. Importing it starts the module.
+// Helpers of the package's tests. Importing this module starts the library.
 import init, { VesicleError, Volume } from '../../pkg/index.js';
 
 await init();
 
-/** A bright ball (200) in darkness (0), `size` voxels of side 1, its centre at the world's origin. */
+/** Returns a volume of a bright ball (200) in darkness (0), `size` voxels of side 1, centred at the world's origin. */
 export function ball(size: number, radius: number): Volume {
   const middle = (size - 1) / 2;
   const data = new Uint8Array(size ** 3);
   for (let z = 0, at = 0; z < size; z++) {
     for (let y = 0; y < size; y++) {
       for (let x = 0; x < size; x++, at++) {
-        // One voxel of ramp, so that the surface lies where the radius says.
+        // A ramp of one voxel, so that the surface is exactly at the radius.
         const inside = radius + 0.5 - Math.hypot(x - middle, y - middle, z - middle);
         data[at] = 200 * Math.min(1, Math.max(0, inside));
       }
@@ -19,10 +19,13 @@ export function ball(size: number, radius: number): Volume {
   return new Volume({ data, dims: [size, size, size], origin: [-middle, -middle, -middle] });
 }
 
-/** The deformable model as in the paper: one sampling distance everywhere, and Euler's steps. */
+/** Parameters of the paper's deformable model: uniform sampling, and explicit Euler steps. */
 export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
 
-/** A bright ball of radius 14 in 48 voxels, with a hollow of radius 6 in its middle and, apart from it, a plate two voxels thick. */
+/**
+ * Returns a volume of 48³ voxels: a bright ball of radius 14 with a concentric hollow of radius 6 and, apart from it, a
+ * plate two voxels thick.
+ */
 export function ballWithHollowAndPlate(): Volume {
   const size = 48;
   const data = new Uint8Array(size ** 3);
@@ -39,7 +42,7 @@ export function ballWithHollowAndPlate(): Volume {
   return new Volume({ data, dims: [size, size, size] });
 }
 
-/** The VesicleError that something throws; fails the test where it throws none, or anything else. */
+/** Returns the VesicleError that a function throws; fails the test if it throws none, or another error. */
 export function failure(work: () => unknown): VesicleError {
   try {
     work();
@@ -50,7 +53,7 @@ export function failure(work: () => unknown): VesicleError {
   throw new Error('nothing was thrown');
 }
 
-/** The same for a promise. */
+/** Returns the VesicleError that a promise rejects with. */
 export async function rejection(promise: Promise<unknown>): Promise<VesicleError> {
   const error: unknown = await promise.then(
     () => new Error('nothing was thrown'),
@@ -60,11 +63,11 @@ export async function rejection(promise: Promise<unknown>): Promise<VesicleError
   throw error;
 }
 
-/** Deliberately wrong arguments, past the type checker. */
+/** Hides the type of deliberately invalid arguments from the type checker. */
 // biome-ignore lint/suspicious/noExplicitAny: what a caller without types may pass
 export const wrong = (value: unknown): any => value;
 
-/** What `check()` tells of a sound mesh. */
+/** Result of `check()` for a valid mesh. */
 export const HEALTHY = {
   closed: true,
   oriented: true,

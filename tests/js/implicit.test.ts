@@ -6,7 +6,7 @@ import { failure, HEALTHY, rejection, wrong } from './helpers.js';
 
 type Options = ConstructorParameters<typeof ImplicitSurface>[0];
 
-/** Points of the unit ball, on a spiral. */
+/** Returns points of the unit sphere on a spiral, packed xyz. */
 function ball(count: number): Float32Array {
   const golden = Math.PI * (3 - Math.sqrt(5));
   return Float32Array.from({ length: 3 * count }, (_, at) => {
@@ -26,7 +26,7 @@ const finished = (options: Partial<Options> = {}) => {
 };
 const bytesOf = ({ mesh }: ImplicitSurface) => Buffer.from(mesh.arrays().positions);
 
-/** From +z, looking down on the ball; a picture of one colour. */
+/** Returns a camera on the z axis, directed at the ball, with an image of one colour. */
 const above = (color = [255, 0, 0, 255]): Camera => ({
   projection: [100, 0, -50, 250, 0, -100, -50, 250, 0, 0, -1, 5],
   width: 101,
@@ -34,7 +34,7 @@ const above = (color = [255, 0, 0, 255]): Camera => ({
   image: Uint8ClampedArray.from({ length: 4 * 101 * 101 }, (_, i) => color[i % 4] as number),
 });
 
-test('a ball is found', async () => {
+test('a ball is reconstructed', async () => {
   const found = surface();
   const phases = new Set<string>();
   const report = await found.run({ onStep: ({ phase }) => phases.add(phase) });
@@ -54,7 +54,7 @@ test('a ball is found', async () => {
   expect(found.cell).toBeGreaterThan(0);
 });
 
-test('the function and its slope', () => {
+test('values and gradients of the function', () => {
   const found = finished();
   const [inside, outside] = found.evaluate(Float32Array.of(0, 0, 0, 1.3, 0, 0));
   expect(inside).toBeGreaterThan(0);
@@ -67,7 +67,7 @@ test('the function and its slope', () => {
   expect(exterior.length).toBeGreaterThan(3 * 16);
 });
 
-test('the live mesh is one object, empty before the first surface is there', () => {
+test('the live mesh is one object, empty before the first surface', () => {
   const found = surface();
   const { mesh } = found;
   expect(mesh.vertexCount).toBe(0);
@@ -78,7 +78,7 @@ test('the live mesh is one object, empty before the first surface is there', () 
   expect(mesh.geometryVersion).toBeGreaterThan(before);
 });
 
-test('run, step and step by step end in the same bits', async () => {
+test('run, step and single steps end in the same bits', async () => {
   const [run, atOnce, each] = [surface(), surface(), surface()];
   const last = await run.run({ budgetMs: 0.01 });
   expect(atOnce.step(100_000).iteration).toBe(last.iteration);
@@ -87,7 +87,7 @@ test('run, step and step by step end in the same bits', async () => {
   expect(bytesOf(run).equals(bytesOf(each))).toBe(true);
 });
 
-test('restore(save()) goes on bit for bit in every phase', () => {
+test('a restored run continues bit for bit in every phase', () => {
   const whole = finished();
   const running = surface();
   for (const steps of [1, 1, 1, 2, 2, 5]) {
@@ -99,7 +99,7 @@ test('restore(save()) goes on bit for bit in every phase', () => {
   }
 });
 
-test('points by hand are live, and come back with a saved state', () => {
+test('edits change the surface, and are restored with a saved state', () => {
   const found = finished();
   const { volume } = found.mesh.info();
   const edits = {
@@ -139,7 +139,7 @@ test('points by hand are live, and come back with a saved state', () => {
   }
 });
 
-test('states that are none are refused', () => {
+test('invalid states are refused', () => {
   const found = finished();
   const state = found.save();
   for (const bytes of [
@@ -155,7 +155,7 @@ test('states that are none are refused', () => {
   expect(found.step().done).toBe(true);
 });
 
-test('as a volume the deformable model takes it over', async () => {
+test('sampled as a volume it can be fitted by the deformable model', async () => {
   const volume = finished().toVolume([32, 32, 32]);
   expect(volume.dims).toEqual([32, 32, 32]);
   const model = new DeformableModel({ volume, params: { iso: 0 } });
@@ -164,7 +164,7 @@ test('as a volume the deformable model takes it over', async () => {
   expect(model.mesh.info().volume / ((4 / 3) * Math.PI)).toBeGreaterThan(0.9);
 });
 
-test('colours from pictures and from points', () => {
+test('colours from images and from points', () => {
   const found = finished();
   expect(found.mesh.arrays().colors).toBeUndefined();
   found.colorize([above()]);
@@ -181,7 +181,7 @@ test('colours from pictures and from points', () => {
   }
 });
 
-test('parameters: any subset, all or nothing', () => {
+test('any subset of parameters can be set, all or nothing', () => {
   const found = finished();
   const before = found.params;
   found.setParams({ delta: 30 });
@@ -258,7 +258,7 @@ test.each(REFUSED)('%s is refused, naming %s', (_, word, work) => {
   expect(error.message).toContain(word);
 });
 
-test('a system without solution says so, and other parameters go on', () => {
+test('a system without solution is reported, and other parameters continue', () => {
   const twins = Float32Array.from([...points, ...points.map((value) => value + 1e-7)]);
   const params = { kernel: 'gaussian', sigma: 1, lambdaSurface: 0, lambdaExterior: 0, tolerance: 1e-12 } as const;
   const found = surface({ points: twins, params });
@@ -269,7 +269,7 @@ test('a system without solution says so, and other parameters go on', () => {
   expect(found.step(100_000).done).toBe(true);
 });
 
-test('an aborted run rejects with the reason, and goes on later', async () => {
+test('an aborted run rejects with the reason and can continue later', async () => {
   const found = surface();
   const [abort, reason] = [new AbortController(), new Error('enough')];
   const stopped = found.run({
@@ -284,17 +284,17 @@ test('an aborted run rejects with the reason, and goes on later', async () => {
   expect((await found.run()).done).toBe(true);
 });
 
-test('one run at a time; a surface freed during it ends it', async () => {
+test('a second run is refused, and freeing a surface ends its run', async () => {
   const found = surface();
   const running = found.run({ budgetMs: 0.01 });
   expect((await rejection(found.run())).code).toBe('invalid-argument');
-  expect(failure(() => found.step()).message).toContain('under way');
-  expect(failure(() => found.restore(found.save())).message).toContain('under way');
+  expect(failure(() => found.step()).message).toContain('during a run');
+  expect(failure(() => found.restore(found.save())).message).toContain('during a run');
   found.free();
   expect((await rejection(running)).code).toBe('freed');
 });
 
-test('a freed surface is gone', () => {
+test('a freed surface is refused', () => {
   const found = finished();
   const { mesh } = found;
   found.free();
@@ -316,7 +316,7 @@ test('a freed surface is gone', () => {
   for (const use of uses) expect(failure(use).code).toBe('freed');
 });
 
-test('points of files', () => {
+test('parsing files of points', () => {
   const bytes = (text: string) => new TextEncoder().encode(text);
   const { points: found, normals, colors } = parsePoints(bytes('0 0 1\n1 0 0\n0 1 0\n0 0 0\n'));
   expect([...found]).toEqual([0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 0]);

@@ -1,4 +1,4 @@
-// Starting the module, and what happens when it crashes. Each case needs a process of its own.
+// Starting the module, and crashes. Each case needs a process of its own.
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -6,7 +6,7 @@ import { expect, test } from 'vitest';
 
 const root = fileURLToPath(new URL('../../', import.meta.url));
 
-/** What a module script prints, run in a new Node from the project's folder. */
+/** Runs a module script in a new Node process from the project's folder and returns what it prints. */
 function node(script: string, timeout = 30_000): string {
   return execFileSync(process.execPath, ['--input-type=module', '--eval', script], {
     cwd: root,
@@ -37,7 +37,7 @@ test('init is idempotent, and also takes bytes, a module, a response and an addr
   }
 });
 
-test('initSync starts at once', () => {
+test('initSync starts synchronously', () => {
   const script = `
     import { readFileSync } from 'node:fs';
     import init, { initSync, version } from './pkg/index.js';
@@ -55,7 +55,7 @@ test('a failed start can be tried again', () => {
   expect(node(script)).toBe('CompileError true');
 });
 
-test('anything before init says what to do', () => {
+test('calls before init say what to do', () => {
   const script = `
     import { version } from './pkg/index.js';
     try { version(); } catch (error) { console.log(error.name, error.code, error.message); }`;
@@ -66,7 +66,7 @@ test('importing and starting print nothing and keep no process alive', () => {
   expect(node(`import init from './pkg/index.js'; await init();`)).toBe('');
 });
 
-// A trap cannot be had without a bug, so the raw function is made to fail as one does.
+// Traps need a bug, so the raw function is replaced by one that throws the same error.
 const CRASH = `
   import init, { Mesh } from './pkg/index.js';
   import { RawMesh } from './pkg/vesicle.js';
@@ -83,7 +83,7 @@ const CRASH = `
   seen.push(attempt(() => Mesh.icosphere([0, 0, 0], 1, 1).info().genus));
   console.log(JSON.stringify(seen));`;
 
-test('after a crash everything says so, until init starts a fresh instance', () => {
+test('after a crash every call reports it, until init starts a new instance', () => {
   const crash = 'VesicleCrash undefined';
   expect(JSON.parse(node(CRASH))).toEqual([crash, crash, crash, 'VesicleError freed', null, 0]);
 });
@@ -96,6 +96,6 @@ test('the example of the README runs', () => {
     ${example.replace("from 'vesicle'", "from './pkg/index.js'")}
     console.log(report.done, positions.length / 3 === report.vertices, indices.length / 3 === report.triangles);
     console.log(new TextDecoder().decode(glb.subarray(0, 4)));`;
-  // A whole run of the model.
+  // A complete run of the model.
   expect(node(script, 60_000).split('\n').slice(-2)).toEqual(['true true true', 'glTF']);
 });

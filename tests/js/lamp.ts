@@ -1,8 +1,8 @@
-// A lava lamp whose two balls part and meet again, as a number over the bits of its positions. The function names nothing
-// outside itself, so that it can be sent into a browser.
+// A lava lamp whose two balls separate and join again, as a hash of the bits of its positions. The function is
+// self-contained, so that it can be sent to a browser.
 import type * as Package from '../../pkg/index.js';
 
-/** FNV-1a over all positions: what the core gives natively (`tests/core/multires.rs`). */
+/** FNV-1a hash over all positions that the core gives natively (`tests/core/multires.rs`). */
 export const LAMP_BITS = '82280a25d547c21c';
 
 export function lampBits({ MultiresolutionModel }: typeof Package): string {

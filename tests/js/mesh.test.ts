@@ -4,12 +4,12 @@ import { ball, failure, HEALTHY, wrong } from './helpers.js';
 
 const sphere = (radius = 1, edge = 0.2) => Mesh.icosphere([0, 0, 0], radius, edge);
 
-/** A tetrahedron with its corner at the origin; without its last face it is open. */
+/** A tetrahedron with a corner at the origin; without its last face it is open. */
 const CORNERS = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
 const FACES = Uint32Array.from([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
 const open = () => Mesh.fromArrays(CORNERS, FACES.slice(0, 9));
 
-/** Two meshes as one, the second moved along x. */
+/** Returns two meshes as one, the second moved along x. */
 function joined(a: MeshArrays, b: MeshArrays, shift: number): Mesh {
   const moved = b.positions.map((value, index) => (index % 3 === 0 ? value + shift : value));
   const first = a.positions.length / 3;
@@ -31,7 +31,7 @@ test('an icosphere is a sphere', () => {
   expect(mesh.check()).toEqual(HEALTHY);
 });
 
-test('arrays: outward unit normals, indices in range, nothing the mesh has not', () => {
+test('arrays: outward unit normals, indices in range, no absent attributes', () => {
   const { positions, normals, indices, ...rest } = sphere().arrays();
   expect(rest).toEqual({});
   expect(Math.max(...indices)).toBe(positions.length / 3 - 1);
@@ -68,12 +68,12 @@ test('from arrays, with texture coordinates', () => {
   expect(arrays.uvs).toEqual(uvs);
 });
 
-test('an open mesh is taken, told, and refused where a closed one is needed', () => {
+test('an open mesh is accepted, reported, and refused if a closed one is needed', () => {
   expect(open().check()).toMatchObject({ closed: false, oriented: true });
   expect(failure(() => open().refine()).code).toBe('not-closed');
 });
 
-test('crossing triangles are counted', () => {
+test('self-intersections are counted', () => {
   const tetrahedron = Mesh.fromArrays(CORNERS, FACES).arrays();
   expect(joined(tetrahedron, tetrahedron, 0.25).check().selfIntersections).toBeGreaterThan(0);
   expect(joined(tetrahedron, tetrahedron, 2).check().selfIntersections).toBe(0);
@@ -86,7 +86,7 @@ test('components', () => {
   expect(parts.map((part) => part.info().bounds.min[0])).toEqual([0, 5]);
 });
 
-test('refining triples the triangles and counts versions up', () => {
+test('refining triples the triangles and increases versions', () => {
   const mesh = sphere();
   const [triangles, topology, geometry] = [mesh.triangleCount, mesh.topologyVersion, mesh.geometryVersion];
   mesh.refine();
@@ -96,7 +96,7 @@ test('refining triples the triangles and counts versions up', () => {
   expect(mesh.check()).toEqual(HEALTHY);
 });
 
-/** Tube and ring of a torus about z, `along` × `around` vertices. */
+/** Returns a torus about z with `along` × `around` vertices. */
 function torus(around: number, along: number): Mesh {
   const positions: number[] = [];
   const indices: number[] = [];
@@ -132,7 +132,7 @@ test('decimation reaches the target and keeps the shape', () => {
   }
 });
 
-test('decimation: nothing to do, nothing left to do, nothing closed to do it to', () => {
+test('decimation: a target already met, one out of reach, and open meshes', () => {
   const uvs = Float32Array.from([0, 0, 1, 0, 0, 1, 1, 1]);
   const mesh = Mesh.fromArrays(CORNERS, FACES, { uvs });
   for (const target of [4, 5, 1e12]) mesh.decimate(target);
@@ -144,7 +144,7 @@ test('decimation: nothing to do, nothing left to do, nothing closed to do it to'
   for (const target of [1, 2, 3, 1000]) expect(failure(() => open().decimate(target)).code).toBe('not-closed');
 });
 
-test('remeshing: triangles alike, the shape kept', () => {
+test('remeshing: even triangles, the shape kept', () => {
   for (const [mesh, euler] of [
     [sphere(2, 0.2), 2],
     [torus(120, 20), 0],
@@ -164,7 +164,7 @@ test('remeshing: triangles alike, the shape kept', () => {
   }
 });
 
-test('remeshing: what is open and what would be too large stays as it was', () => {
+test('remeshing: open meshes and results too large are refused and unchanged', () => {
   expect(failure(() => open().remesh({ min: 0.1, max: 0.3 })).code).toBe('not-closed');
   const mesh = sphere();
   const before = mesh.arrays();
@@ -172,7 +172,7 @@ test('remeshing: what is open and what would be too large stays as it was', () =
   expect(mesh.arrays()).toEqual(before);
 });
 
-test('decimation takes texture coordinates away, as refining and remeshing do', () => {
+test('decimation, refining and remeshing drop texture coordinates', () => {
   const edits = [
     (mesh: Mesh) => mesh.decimate(100),
     (mesh: Mesh) => mesh.refine(),
@@ -226,7 +226,7 @@ test('geodesic distance: great circles, other components, straight lines', () =>
   ]);
 });
 
-test('distance between concentric spheres, to itself, and the other way round', () => {
+test('distance between concentric spheres, to itself, and in the other direction', () => {
   const [inner, outer] = [sphere(1, 0.1), sphere(1.5, 0.15)];
   const { perVertex, ...there } = inner.distanceTo(outer);
   const { perVertex: other, ...back } = outer.distanceTo(inner);
@@ -246,7 +246,7 @@ test('distance between concentric spheres, to itself, and the other way round', 
   });
 });
 
-test('distance to and from nothing', () => {
+test('distance to and from an empty mesh', () => {
   const nothing = Mesh.fromArrays(new Float32Array(), new Uint32Array());
   for (const [mesh, other, named] of [
     [sphere(), nothing, 'other'],
@@ -260,7 +260,7 @@ test('distance to and from nothing', () => {
   expect(failure(() => nothing.geodesic(0)).message).toContain('fromVertex');
 });
 
-test('a clone goes its own way', () => {
+test('a clone is independent', () => {
   const mesh = sphere();
   const copy = mesh.clone();
   mesh.refine();
@@ -286,7 +286,7 @@ test('picking', () => {
   expect(sphere().pick([5, 0, 0], [1, 0, 0])).toBeUndefined();
 });
 
-test('a cross-section is as long as the circle it draws', () => {
+test('a cross-section is as long as the circle it approximates', () => {
   const segments = sphere(1, 0.05).crossSection([0, 0, 0.1], [0, 0, 2]);
   let length = 0;
   for (let at = 0; at < segments.length; at += 6) {
@@ -379,17 +379,17 @@ test.each(REFUSED)('%s is refused, naming %s', (_, parameter, work) => {
   expect(error.message).toContain(parameter);
 });
 
-test('files that are none', () => {
+test('invalid files are refused', () => {
   const whole = sphere().toBytes('glb');
   const broken = [new Uint8Array(), new TextEncoder().encode('not a mesh'), whole.slice(0, 30), whole.slice(0, -50)];
   for (const bytes of broken) expect(failure(() => Mesh.parse(bytes)).code).toBe('bad-file');
 });
 
-test('more triangles than there is memory for', () => {
+test('more triangles than fit into memory are refused', () => {
   expect(failure(() => Mesh.icosphere([0, 0, 0], 1, 1e-6)).code).toBe('too-large');
 });
 
-test('use after free', () => {
+test('use after free is refused', () => {
   const mesh = sphere();
   mesh.free();
   mesh.free();
@@ -410,7 +410,7 @@ test('use after free', () => {
   }
 });
 
-test('directions of any length', () => {
+test('directions of any length are accepted', () => {
   const sphere = Mesh.icosphere([0, 0, 0], 1, 0.3);
   for (const length of [1e-60, 1, 1e60, 1e300]) {
     expect(sphere.pick([0, 0, 3], [0, 0, -length])?.distance).toBeCloseTo(2, 1);
@@ -418,7 +418,7 @@ test('directions of any length', () => {
   }
 });
 
-test('arrays are copied into an object of arrays only', () => {
+test('arrays are copied from an object of arrays only', () => {
   const sphere = Mesh.icosphere([0, 0, 0], 1, 0.5);
   expect(failure(() => sphere.copyTo(null as never)).code).toBe('invalid-argument');
 });

@@ -26,7 +26,7 @@ function model(more: Partial<Options> = {}): MultiresolutionModel {
   return made;
 }
 
-/** A ball with waves on it. */
+/** Returns a ball with waves on it. */
 function wavy(edge = 0.15): Mesh {
   const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, edge).arrays();
   for (let at = 0; at < positions.length; at += 3) {
@@ -40,7 +40,7 @@ afterEach(() => {
   for (const made of models.splice(0)) made.free();
 });
 
-test('a bare skin comes to rest over its ellipsoids', async () => {
+test('a bare surface converges over its ellipsoids', async () => {
   const skin = model();
   const report = await skin.run();
   expect(report).toMatchObject({ done: true, components: 1, euler: 2, triangles: skin.mesh.triangleCount });
@@ -50,7 +50,7 @@ test('a bare skin comes to rest over its ellipsoids', async () => {
   expect(skin.bandCount).toBe(1);
 });
 
-test('pulled apart it splits, and each frame is sound', () => {
+test('pulled apart it splits, and each frame is valid', () => {
   const skin = model({ params: { ...EDGES, topology: 'split' } });
   let annular = 0;
   let report: StepReport | undefined;
@@ -64,7 +64,7 @@ test('pulled apart it splits, and each frame is sound', () => {
   expect(annular).toBeGreaterThan(0);
 });
 
-test('detail is kept, and told how far it is distorted', () => {
+test('detail is kept, and its distortion is reported', () => {
   const detail = wavy();
   const base = Mesh.icosphere([0, 0, 0], 1, 0.2);
   const deformed = model({
@@ -87,7 +87,7 @@ test('detail is kept, and told how far it is distorted', () => {
   expect([deformed.folded, deformed.unmatchedVertices]).toEqual([0, 0]);
 });
 
-test('texture travels with the surface', () => {
+test('texture coordinates move with the surface', () => {
   const globe = Mesh.icosphere([0, 0, 0], 1, 0.15).arrays();
   const uvs = new Float32Array((globe.positions.length / 3) * 2);
   for (let v = 0; v < uvs.length / 2; v++) {
@@ -100,7 +100,7 @@ test('texture travels with the surface', () => {
   textured.step();
   const found = textured.mesh.arrays();
   expect(found.uvs).toHaveLength((found.positions.length / 3) * 2);
-  // Latitude is that of the place on the globe.
+  // Latitudes are those of the corresponding points on the globe.
   const link = textured.linkMesh.arrays().positions;
   for (let v = 0; v < link.length / 3; v++) {
     const latitude = 0.5 + Math.asin(Math.max(-1, Math.min(1, link[3 * v + 2] as number))) / Math.PI;
@@ -125,7 +125,7 @@ test('a state is restored bit for bit', () => {
   expect(failure(() => skin.restore(state.slice(0, 100))).code).toBe('bad-file');
 });
 
-test('levels and restructuring can be looked at one by one', () => {
+test('levels and single restructuring passes can be inspected', () => {
   const levels = model({ params: { edgeMin: 0.06, edgeMax: 0.13 } }).levelMeshes();
   expect(levels.length).toBeGreaterThan(1);
   const mesh = Mesh.icosphere([0, 0, 0], 1, 0.2);
@@ -136,7 +136,7 @@ test('levels and restructuring can be looked at one by one', () => {
   expect(mesh.triangleCount).toBeGreaterThan(before);
 });
 
-test('a run can be aborted, and goes on', async () => {
+test('an aborted run can continue', async () => {
   const skin = model();
   skin.setEllipsoids([ball(-0.5, 1), ball(6, 0.8)]);
   const abort = new AbortController();
@@ -146,7 +146,7 @@ test('a run can be aborted, and goes on', async () => {
   expect((await skin.run()).done).toBe(true);
 });
 
-test('wrong arguments are named', async () => {
+test('invalid arguments are refused by name', async () => {
   const code = (work: () => unknown) => failure(work).code;
   const message = (work: () => unknown) => failure(work).message;
   expect(message(() => model({ ellipsoids: [] }))).toContain('ellipsoids');
@@ -190,6 +190,6 @@ test('parameters describe themselves', () => {
   for (const { help } of specs) expect(help.length).toBeGreaterThan(20);
 });
 
-test('the bits are those of every other platform', () => {
+test('the same bits as on every other platform', () => {
   expect(lampBits(vesicle)).toBe(LAMP_BITS);
 });

@@ -1,4 +1,4 @@
-// The deformable model at its defaults on the real volumes that the project carries; `npm run real` takes any folder.
+// The deformable model at its defaults on the volumes that the project includes; `npm run real` takes any folder.
 import { readFile } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
 import init, * as library from '../../pkg/index.js';
@@ -11,7 +11,7 @@ const VOLUMES = ['ovule.nrrd', 'tooth.nrrd', 'visible-human-head.nii.gz', 'heart
 
 const volumeOf = async (name) => library.Volume.parse(new Uint8Array(await readFile(at('www/public/data', name))));
 
-test.each(VOLUMES)('all of the contour of %s is found, and nothing else', async (name) => {
+test.each(VOLUMES)('the whole contour of %s is found, and nothing else', async (name) => {
   const volume = await volumeOf(name);
   for (const iso of valleys(volume.histogram(256), volume.range, 2)) {
     const row = await measured(library, volume, iso, 0);
@@ -22,7 +22,7 @@ test.each(VOLUMES)('all of the contour of %s is found, and nothing else', async 
   volume.free();
 });
 
-test('coarse to fine it is, too', async () => {
+test('coarse to fine, too', async () => {
   const volume = await volumeOf('tooth.nrrd');
   const [iso = 0] = valleys(volume.histogram(256), volume.range, 1);
   expect(await measured(library, volume, iso, 2)).toSatisfy(isComplete);

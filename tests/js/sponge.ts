@@ -1,10 +1,10 @@
-// The Menger sponge of depth two, as numbers over the bits of its positions: after 200 steps of the paper's model, and at the end of a
-// run at the default settings. The function names nothing outside itself, so that it can be sent into a browser, and waits where the
-// package in a worker makes it.
+// The Menger sponge of depth two, as hashes of the bits of its positions: after 200 steps of the paper's model, and at
+// the end of a run at the default settings. The function is self-contained, so that it can be sent to a browser, and
+// awaits the results, so that it also runs with the package in a worker.
 import type * as Package from '../../pkg/index.js';
 import type * as Worker from '../../pkg/worker.js';
 
-/** FNV-1a over all positions: what the core gives natively. */
+/** FNV-1a hashes over all positions that the core gives natively. */
 export const SPONGE_BITS = 'b68397c8ac5b3b1f 1846ab98aaad72ea';
 
 export async function spongeBits(library: typeof Package | typeof Worker): Promise<string> {

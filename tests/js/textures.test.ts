@@ -1,4 +1,4 @@
-// Pictures on meshes, and meshes one after the other as an animation.
+// Textures of meshes, and animations of several meshes.
 import { readFile } from 'node:fs/promises';
 import { AnimationMixer, type Mesh as Drawn, type Object3D } from 'three';
 import { type GLTF, GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -11,7 +11,7 @@ const file = async (name: string) => new Uint8Array(await readFile(new URL(`../d
 const CORNERS = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
 const FACES = Uint32Array.from([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
 const UVS = Float32Array.from([0, 0, 1, 0, 0, 1, 1, 1]);
-/** Begins as a picture does; nobody looks further. */
+/** Begins like an image; the rest is not read. */
 const PICTURE: MeshTexture = { type: 'image/jpeg', bytes: Uint8Array.of(0xff, 0xd8, 0xff, 0xe0, 1, 2, 3) };
 
 const textured = (shift = 0) =>
@@ -21,7 +21,7 @@ const textured = (shift = 0) =>
     { uvs: UVS, texture: PICTURE },
   );
 
-test('a texture comes with a file, through seams, copies and parts, and out again', async () => {
+test('the texture of a file is kept through seams, copies and components, and written again', async () => {
   const cow = Mesh.parse(await file('spot.glb'));
   expect(cow.check()).toEqual(HEALTHY);
   const texture = cow.texture as MeshTexture;
@@ -29,7 +29,7 @@ test('a texture comes with a file, through seams, copies and parts, and out agai
   expect(texture.bytes).toHaveLength(80212);
   texture.bytes.fill(0);
   expect(cow.texture?.bytes[1]).toBe(0x50);
-  // Of one side of each seam.
+  // Of one side of each seam only.
   expect(cow.arrays().uvs).toHaveLength(2 * cow.vertexCount);
   const drawn = cow.splitAtSeams();
   expect(drawn.vertexCount).toBeGreaterThan(cow.vertexCount);
@@ -42,7 +42,7 @@ test('a texture comes with a file, through seams, copies and parts, and out agai
   expect(cow.texture).toBeUndefined();
 });
 
-test('a texture of the caller', async () => {
+test('a texture can be given by the caller', async () => {
   expect(textured().texture).toEqual(PICTURE);
   expect(textured().arrays().uvs).toEqual(UVS);
   expect(Mesh.fromArrays(CORNERS, FACES, { uvs: UVS }).texture).toBeUndefined();
@@ -85,7 +85,7 @@ test('a texture for a file without coordinates, and compressed files', async () 
   expect(error.message).toMatch(/KHR_draco_mesh_compression .*save the mesh without it/);
 });
 
-/** What three.js makes of a glb; pictures are not decoded outside a browser, so meshes come without them here. */
+/** Loads a GLB with three.js. Images cannot be decoded outside a browser, so meshes have none here. */
 const loaded = (glb: Uint8Array): Promise<GLTF> => new GLTFLoader().parseAsync(glb.buffer as ArrayBuffer, '');
 
 test('three.js shows exactly one frame of an animation at a time', async () => {
@@ -108,18 +108,18 @@ test('three.js shows exactly one frame of an animation at a time', async () => {
   }
 });
 
-test('an animation stores equal frames and equal textures once', () => {
+test('equal frames and textures of an animation are stored once', () => {
   const [one, other] = [textured(), textured(3)];
   const size = (frames: Mesh[]) => animationGlb(frames).length;
   const text = new TextDecoder().decode(animationGlb([one, textured(), other, one]));
   expect(text.match(/"POSITION"/g)).toHaveLength(3);
   expect(text.match(/"mimeType":"image\/jpeg"/g)).toHaveLength(1);
-  // A longer number in a time is all that comes with a frame that repeats.
+  // A repeated frame only adds digits to the time of the last.
   expect(size([one, one, one]) - size([one])).toBeLessThan(16);
   expect(Mesh.parse(animationGlb([one, other])).texture).toEqual(PICTURE);
 });
 
-test('an animation at rest is its first frame', () => {
+test('the first frame of an animation is its static pose', () => {
   const frames = [0.9, 0.6].map((edge) => Mesh.icosphere([0, 0, 0], 1, edge));
   const first = Mesh.parse(animationGlb(frames));
   expect(first.check()).toEqual(HEALTHY);
@@ -142,7 +142,7 @@ test.each([
   expect(error.message).toContain(named);
 });
 
-test('an animation of a mesh that was freed', () => {
+test('a freed mesh in an animation is refused', () => {
   const mesh = textured();
   mesh.free();
   expect(failure(() => animationGlb([textured(), mesh])).code).toBe('freed');

@@ -24,7 +24,7 @@ function tracker(more: Partial<TrackingOptions> = {}): SurfaceTracker {
   return made;
 }
 
-/** To the end. */
+/** Returns a tracker that has run to the end. */
 function tracked(more: Partial<TrackingOptions> = {}): SurfaceTracker {
   const made = tracker(more);
   expect(made.step(1000).done).toBe(true);
@@ -36,12 +36,12 @@ afterEach(() => {
 });
 
 const bytesOf = (mesh: Mesh) => Buffer.from(mesh.arrays().positions.buffer);
-/** The surfaces of all frames that are done, as bytes. */
+/** Returns the bytes of the surfaces of all completed frames. */
 const bytesOfAll = (one: SurfaceTracker) =>
   Buffer.concat(Array.from(one.volumes(), (_, frame) => bytesOf(one.meshAt(frame))));
 const apart = (a: Vec3, b: Vec3) => Math.hypot(...a.map((x, k) => x - (b[k] as number)));
 
-test('the ball is followed through its beat: sound, in its place, and as large as it is', () => {
+test('the ball is tracked through its beat: valid surfaces of the right position and size', () => {
   const one = tracked({ params: { cyclic: true } });
   expect([one.frames, one.frame]).toEqual([FRAMES, FRAMES - 1]);
   const volumes = [...one.volumes()];
@@ -53,13 +53,13 @@ test('the ball is followed through its beat: sound, in its place, and as large a
     expect([components, euler]).toEqual([1, 2]);
     expect(found).toBeCloseTo(volume, 6);
     expect(apart(centroid, MIDDLE)).toBeLessThan(0.2);
-    // What is round is drawn in a little, as by every mean over a neighbourhood.
+    // Round surfaces shrink a little, as with any mean over a neighbourhood.
     expect(found / truth(frame), `${frame}`).toBeGreaterThan(0.84);
     expect(found / truth(frame), `${frame}`).toBeLessThan(1.06);
   }
 });
 
-test('volumes fall and rise once, and a cycle closes', () => {
+test('volumes decrease and increase once, and a cycle closes', () => {
   const one = tracker({ params: { cyclic: true } });
   expect(one.cycleClosureError).toBeUndefined();
   one.step(2 * FRAMES);
@@ -72,7 +72,7 @@ test('volumes fall and rise once, and a cycle closes', () => {
   expect(rises).toEqual(volumes.map((_, frame) => frame >= FRAMES / 2));
 });
 
-test('steps tell how far it is: boundaries first, then surfaces, then back to the first', () => {
+test('reports show progress: first boundaries, then surfaces, then the closing of the cycle', () => {
   const one = tracker({ volume: short, params: { cyclic: true } });
   const reports: StepReport[] = [];
   const frames: number[] = [];
@@ -131,7 +131,7 @@ test('the surface of a frame is a copy', () => {
   expect(copy.check()).toEqual(HEALTHY);
 });
 
-test('the boundary is points in space and time with weights', () => {
+test('the boundary consists of weighted space-time points', () => {
   const one = tracker({ volume: short });
   expect(one.boundary()).toHaveLength(0);
   one.step(2);
@@ -153,9 +153,9 @@ test('the boundary is points in space and time with weights', () => {
   expect(near / all).toBeGreaterThan(0.9);
 });
 
-test('every frame tells what happened in it, and the volume how noisy it is', () => {
+test('every frame has its statistics, and the volume its noise', () => {
   const one = tracked({ volume: short });
-  // Of two uniform numbers from -5 to 5 together.
+  // The sum of two uniform numbers from -5 to 5.
   expect(one.noise / (10 / Math.sqrt(6))).toBeGreaterThan(0.8);
   expect(one.noise / (10 / Math.sqrt(6))).toBeLessThan(1.4);
   expect(one.statistics).toHaveLength(3);
@@ -169,7 +169,7 @@ test('every frame tells what happened in it, and the volume how noisy it is', ()
   }
 });
 
-test('with prediction and without, both arrive', () => {
+test('tracking succeeds with and without prediction', () => {
   const [predicted, not] = [tracked(), tracked({ params: { prediction: false } })];
   expect(bytesOfAll(predicted).equals(bytesOfAll(not))).toBe(false);
   const last = FRAMES - 1;
@@ -178,7 +178,7 @@ test('with prediction and without, both arrive', () => {
   expect((not.volumes()[last] as number) / truth(last)).toBeGreaterThan(0.8);
 });
 
-test('an animation shows each frame for as long as the volume says', async () => {
+test('an animation shows each frame for the duration given by the volume', async () => {
   const one = tracked({ volume: short });
   const glb = one.toGlb();
   const { scene, animations } = await new GLTFLoader().parseAsync(glb.buffer as ArrayBuffer, '');
@@ -197,14 +197,14 @@ test('an animation shows each frame for as long as the volume says', async () =>
   expect(first.info().volume).toBeCloseTo(one.volumes()[0] as number, 3);
 });
 
-test('an animation of a volume without times, and of what is done so far', async () => {
+test('an animation of a volume without times, and of the frames done so far', async () => {
   const one = tracker({ volume: beating({ frames: 3 }, { frameSeconds: wrong(undefined) }) });
   one.step(5);
   const { animations } = await new GLTFLoader().parseAsync(one.toGlb().buffer as ArrayBuffer, '');
   expect(animations[0]?.duration).toBeCloseTo(2 * 0.1, 6);
 });
 
-test.each([0, 2, 3, 4, 5, 6])('a state after %i steps goes on bit for bit', (steps) => {
+test.each([0, 2, 3, 4, 5, 6])('a state after %i steps continues bit for bit', (steps) => {
   const more = { volume: short, params: { cyclic: true } };
   const [saved, resumed] = [tracker(more), tracker(more)];
   if (steps > 0) saved.step(steps);
@@ -219,7 +219,7 @@ test.each([0, 2, 3, 4, 5, 6])('a state after %i steps goes on bit for bit', (ste
   expect(resumed.cycleClosureError).toBe(saved.cycleClosureError);
 });
 
-test('a state brings its parameters along', () => {
+test('a state includes its parameters', () => {
   const [saved, resumed] = [
     tracker({ volume: short, params: { damping: 0.7, threshold: 50 } }),
     tracker({ volume: short }),
@@ -230,7 +230,7 @@ test('a state brings its parameters along', () => {
   expect(resumed.mesh.vertexCount).toBe(saved.mesh.vertexCount);
 });
 
-test('what is no state is refused and changes nothing', () => {
+test('an invalid state is refused and changes nothing', () => {
   const [one, untouched] = [tracker({ volume: short }), tracker({ volume: short })];
   for (const each of [one, untouched]) each.step(4);
   const state = one.save();
@@ -261,8 +261,8 @@ test('the same steps give the same bits, in slices or at once', async () => {
   expect(bytesOfAll(inParts).equals(bytesOfAll(atOnce))).toBe(true);
 });
 
-test('the events of several steps are those of each together', () => {
-  // Bounds so close that edges are split and drawn together in every frame.
+test("the events of several steps are the sum of each step's", () => {
+  // Bounds so close that edges are split and collapsed in every frame.
   const params = { edgeMin: 0.7, edgeMax: 1.5 };
   const [together, each] = [tracker({ params }), tracker({ params })];
   const sum = (reports: StepReport[]) => reports.reduce((total, { events }) => total + events.deletions, 0);
@@ -271,7 +271,7 @@ test('the events of several steps are those of each together', () => {
   expect(together.step(2 * FRAMES).events.deletions).toBe(sum(single));
 });
 
-test('onStep hears every step, and a run can be cut short', async () => {
+test('onStep is called for every step, and can end the run', async () => {
   const one = tracker({ volume: short });
   const heard: number[] = [];
   const last = await one.run({ maxIterations: 4, onStep: ({ progress }) => heard.push(progress) });
@@ -288,7 +288,7 @@ test('onStep hears every step, and a run can be cut short', async () => {
   expect((await one.run()).iteration).toBe(6);
 });
 
-test('an aborted run rejects with the reason, and goes on later', async () => {
+test('an aborted run rejects with the reason and can continue later', async () => {
   const one = tracker({ volume: short });
   const abort = new AbortController();
   const reason = new Error('enough');
@@ -305,31 +305,31 @@ test('an aborted run rejects with the reason, and goes on later', async () => {
   expect(bytesOfAll(one).equals(bytesOfAll(tracked({ volume: short })))).toBe(true);
 });
 
-test('an abort from a timer is heard between frames', async () => {
+test('an abort from a timer takes effect between frames', async () => {
   const abort = new AbortController();
   setTimeout(() => abort.abort('late'), 1);
   await expect(tracker().run({ signal: abort.signal, budgetMs: 1 })).rejects.toBe('late');
 });
 
-test('one run at a time; parameters may change meanwhile', async () => {
+test('a second run is refused, but parameters can change during a run', async () => {
   const one = tracker({ volume: short });
   const first = one.run({ maxIterations: 5, budgetMs: 0.01 });
   expect((await rejection(one.run())).code).toBe('invalid-argument');
-  expect(failure(() => one.step()).message).toContain('under way');
-  expect(failure(() => one.restore(one.save())).message).toContain('under way');
+  expect(failure(() => one.step()).message).toContain('during a run');
+  expect(failure(() => one.restore(one.save())).message).toContain('during a run');
   one.setParams({ damping: 0.8 });
   expect((await first).iteration).toBe(5);
   expect(one.step().iteration).toBe(6);
 });
 
-test('a tracker freed during a run ends it', async () => {
+test('freeing a tracker ends its run', async () => {
   const one = tracker();
   const running = one.run({ budgetMs: 0.01 });
   one.free();
   expect((await rejection(running)).code).toBe('freed');
 });
 
-test('parameters: any subset, all or nothing', () => {
+test('any subset of parameters can be set, all or nothing', () => {
   const one = tracker({ volume: short, params: { damping: 0.8 } });
   const before = one.params;
   expect(before).toMatchObject({ damping: 0.8, cyclic: false, prediction: true });
@@ -363,7 +363,7 @@ test('parameters: any subset, all or nothing', () => {
   expect(failure(() => one.setParams(wrong([]))).code).toBe('invalid-argument');
 });
 
-test('parameters of the surface hold from the next frame on', () => {
+test('surface parameters apply from the next frame on', () => {
   const [one, other] = [tracker({ volume: short }), tracker({ volume: short })];
   for (const each of [one, other]) each.step(4);
   one.setParams({ damping: 0.6, radius: 3, timeScale: 3, edgeMin: 0.4, edgeMax: 2, prediction: false });
@@ -375,7 +375,7 @@ test('parameters of the surface hold from the next frame on', () => {
 });
 
 const AGAIN: TrackingParams[] = [{ threshold: 50 }, { window: 1 }, { windowFrames: 1 }, { cyclic: true }];
-test.each(AGAIN)('%o begins everything again', (params) => {
+test.each(AGAIN)('%o restarts tracking', (params) => {
   const one = tracker({ volume: short });
   one.step(5);
   const { topologyVersion, geometryVersion } = one.mesh;
@@ -388,14 +388,14 @@ test.each(AGAIN)('%o begins everything again', (params) => {
   expect(bytesOfAll(one).equals(bytesOfAll(tracked({ volume: short, params })))).toBe(true);
 });
 
-test('the same value again does not begin again', () => {
+test('setting the same values does not restart', () => {
   const one = tracker({ volume: short });
   one.step(4);
   one.setParams(one.params);
   expect(one.volumes()).toHaveLength(1);
 });
 
-test('a surface of ones own is what is followed', () => {
+test('a given start surface is tracked', () => {
   const start = Mesh.icosphere(MIDDLE, 8, 2);
   const one = tracker({ volume: short, start });
   expect(one.mesh.triangleCount).toBe(start.triangleCount);
@@ -408,7 +408,7 @@ test('a surface of ones own is what is followed', () => {
   expect(one.mesh.triangleCount).toBeGreaterThan(0);
 });
 
-test('the largest surface is followed, or the one nearest to a point', () => {
+test('the largest surface is tracked, or the one nearest to a point', () => {
   const two = pair();
   const centroid = (component?: TrackingOptions['component']) =>
     tracked({ volume: two, ...(component && { component }) }).mesh.info().centroid;
@@ -420,7 +420,7 @@ test('the largest surface is followed, or the one nearest to a point', () => {
   }
 });
 
-test('a box holds what is looked at', () => {
+test('a box limits the boundary', () => {
   const two = pair();
   const box = { min: [15.5, 7, 7] as Vec3, max: [23, 17, 17] as Vec3 };
   const one = tracker({ volume: two, box });
@@ -432,7 +432,7 @@ test('a box holds what is looked at', () => {
   expect(bytesOfAll(wide).equals(bytesOfAll(tracked()))).toBe(true);
 });
 
-/** Whether a volume with these voxel axes is followed in the world, and faces outwards. */
+/** Asserts that a volume with these voxel axes is tracked in world space, and that the surface faces outwards. */
 function followedAt(affine: number[]): void {
   const one = tracked({ volume: beating({ frames: 2 }, { affine }) });
   const column = (row: number) => [0, 4, 8].reduce((sum, at) => sum + (affine[at + row] as number), 0);
@@ -442,11 +442,11 @@ function followedAt(affine: number[]): void {
   expect((one.volumes()[1] as number) / truth(1)).toBeGreaterThan(0.84);
 }
 
-test('a volume that is turned is followed in the world', () => {
+test('a rotated volume is tracked in world space', () => {
   followedAt([0, 1.5, 0, 0, -1.2, 0, 0.9, 0, 0.9, 0, 1.2, 0, 5, 6, 7, 1]);
 });
 
-test('what was enriched or binned is followed, too', () => {
+test('an enriched or binned volume is tracked', () => {
   for (const other of [volume.binned([1, 1, 2]).enrichSlices(), volume.binned([2, 2, 1]).enrichSlices({ factor: 1 })]) {
     const one = tracked({ volume: other });
     expect(one.mesh.check()).toEqual(HEALTHY);
@@ -455,7 +455,7 @@ test('what was enriched or binned is followed, too', () => {
   }
 });
 
-test('specs describe every parameter, and their defaults are taken', () => {
+test('specs describe every parameter, and their defaults are used', () => {
   const specs = paramSpecs('tracking');
   const defaults: Record<string, unknown> = tracker().params;
   expect(specs.map(({ name }) => name).sort()).toEqual(Object.keys(defaults).sort());
@@ -464,7 +464,7 @@ test('specs describe every parameter, and their defaults are taken', () => {
     expect(label.length, name).toBeGreaterThan(0);
     expect(['number', 'integer', 'boolean']).toContain(type);
     expect(typeof defaults[name], name).toBe(type === 'boolean' ? 'boolean' : 'number');
-    // Others are taken from the volume.
+    // The other defaults depend on the volume.
     if (usual !== undefined) expect(defaults[name], name).toEqual(usual);
     const taken = type === 'boolean' ? [true, false] : [defaults[name]];
     for (const value of taken) expect(tracker({ params: { [name]: value } }).params).toMatchObject({ [name]: value });
@@ -478,7 +478,7 @@ test('specs describe every parameter, and their defaults are taken', () => {
   ]);
 });
 
-test('thresholds and lengths of the volume are where its noise and its voxels say', () => {
+test("default thresholds and lengths depend on the volume's noise and voxels", () => {
   const { threshold, radius, timeScale } = tracker().params;
   expect(threshold).toBeCloseTo(4 * tracker().noise, 6);
   expect(radius).toBeGreaterThan(1.5);
@@ -488,7 +488,7 @@ test('thresholds and lengths of the volume are where its noise and its voxels sa
 const closed = Mesh.icosphere(MIDDLE, 8, 2).arrays();
 const open = () => Mesh.fromArrays(closed.positions, closed.indices.slice(3));
 const insideOut = () => Mesh.fromArrays(closed.positions, closed.indices.toReversed());
-/** Two balls into each other. */
+/** Returns a mesh of two intersecting balls. */
 function crossing(): Mesh {
   const positions = Float32Array.from([...closed.positions, ...closed.positions.map((x) => x + 1)]);
   const count = closed.positions.length / 3;
@@ -520,7 +520,7 @@ const REFUSED: [string, string, string, () => unknown][] = [
   ['a component nowhere', 'invalid-argument', 'component', () => tracker({ component: [1, Number.NaN, 2] })],
   ['a start that is none', 'invalid-argument', 'start', () => tracker({ start: wrong(closed) })],
   ['an open start', 'not-closed', 'closed', () => tracker({ start: open() })],
-  ['a start that crosses itself', 'self-intersecting', 'cross', () => tracker({ start: crossing() })],
+  ['a start that crosses itself', 'self-intersecting', 'intersects itself', () => tracker({ start: crossing() })],
   ['a start inside out', 'invalid-argument', 'start', () => tracker({ start: insideOut() })],
   ['an empty start', 'invalid-argument', 'start', () => tracker({ start: tracker().mesh })],
   ['parameters in a row', 'invalid-argument', 'params', () => tracker({ params: wrong([1]) })],
@@ -543,7 +543,7 @@ test.each(REFUSED)('%s is refused: %s, saying %s', (_, code, word, work) => {
   expect(error.message).toContain(word);
 });
 
-test('where nothing is a boundary, the largest step is told, and less than that is enough', () => {
+test('without any boundary the largest step is reported, and a lower threshold works', () => {
   const one = tracker({ volume: short, params: { threshold: 119 } });
   one.step(3);
   const { code, message } = failure(() => one.step());
@@ -557,12 +557,12 @@ test('where nothing is a boundary, the largest step is told, and less than that 
   expect(one.mesh.check()).toEqual(HEALTHY);
 });
 
-test('a run without a boundary rejects as a step throws', async () => {
+test('a run without a boundary rejects with the error that a step throws', async () => {
   const error = await rejection(tracker({ volume: short, params: { threshold: 119 } }).run());
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('threshold')]);
 });
 
-test('wrong run options', async () => {
+test('invalid run options are refused', async () => {
   const refused: [string, object][] = [
     ['maxIterations', { maxIterations: 0 }],
     ['budgetMs', { budgetMs: -1 }],
@@ -576,7 +576,7 @@ test('wrong run options', async () => {
   }
 });
 
-test('the volume may go, the tracker stays; a freed tracker is gone', () => {
+test('a tracker survives its volume, and a freed tracker is refused', () => {
   const own = beating({ frames: 2 });
   const one = tracker({ volume: own });
   own.free();
@@ -599,11 +599,11 @@ test('the volume may go, the tracker stays; a freed tracker is gone', () => {
   expect(failure(() => scoped.step()).code).toBe('freed');
 });
 
-test('a mirrored volume is followed, and faces outwards', () => {
+test('a mirrored volume is tracked, and its surface faces outwards', () => {
   followedAt([-1.5, 0, 0, 0, 0, 1.5, 0, 0, 0, 0, 1.5, 0, 5, 6, 7, 1]);
 });
 
-test('the largest step is told for thresholds beyond all intensities, too', () => {
+test('the largest step is reported for thresholds beyond all intensities as well', () => {
   const one = tracker({ volume: short, params: { threshold: 1000 } });
   one.step(3);
   const { message } = failure(() => one.step());
@@ -615,7 +615,7 @@ test.each([null, 0, '', false])('%o as a start is refused by name', (start) => {
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('start')]);
 });
 
-test('a state belongs to a volume, box and start, whatever the parameters were', () => {
+test('a state belongs to a volume, box and start, whatever its parameters', () => {
   const box = { min: MIDDLE.map((x) => x - 6) as Vec3, max: MIDDLE.map((x) => x + 6) as Vec3 };
   for (const params of [{ radius: 3 }, { window: 1 }]) {
     const [saved, resumed] = [tracker({ volume: short, box, params }), tracker({ volume: short, box })];
@@ -625,7 +625,7 @@ test('a state belongs to a volume, box and start, whatever the parameters were',
   }
 });
 
-test('steps beyond the end do not count', () => {
+test('steps after the end are not counted', () => {
   const one = tracked({ volume: short });
   expect(one.step().iteration).toBe(6);
 });

@@ -1,8 +1,8 @@
-// Compiled, never run: the package satisfies the contract, and its data types are the contract's to the letter.
+// Compiled, never run: the package satisfies the contract, and its data types equal those of the contract.
 import * as built from '../../pkg/index.js';
 import type * as contract from './contract.js';
 
-/** True where two types accept the same values and give the same. */
+/** True if two types are identical. */
 type Same<A, B> = (<T>() => T extends A ? 1 : 2) extends <T>() => T extends B ? 1 : 2 ? true : false;
 
 /** Does not compile with `false`. */
@@ -32,7 +32,7 @@ same<Same<built.FrameStatistics, contract.FrameStatistics>>(true);
 same<Same<built.ControlEllipsoid, contract.ControlEllipsoid>>(true);
 same<Same<built.MultiresParams, contract.MultiresParams>>(true);
 
-/** The functions of a class itself, without its constructor. */
+/** The static members of a class, without its constructor. */
 type Statics<C> = Omit<C, 'prototype'>;
 
 export const init: typeof contract.default = built.default;
@@ -52,11 +52,11 @@ export const implicit = (surface: built.ImplicitSurface): contract.ImplicitSurfa
 export const Volume: Statics<typeof contract.Volume> = built.Volume;
 export const Mesh: Statics<typeof contract.Mesh> = built.Mesh;
 
-// Arguments: whatever the contract takes, the package takes.
+// Arguments: the package accepts whatever the contract accepts.
 export const newVolume = (init: contract.VolumeInit) => new built.Volume(init);
 
 type ModelOptions = ConstructorParameters<typeof contract.DeformableModel>[0];
-/** The same options with the package's own classes, which no look-alike can stand in for. */
+/** The same options with the package's own classes, which structurally similar types cannot replace. */
 type Own<T> = { [K in keyof T]: Swap<T[K]> };
 type Swap<T> = T extends contract.Volume ? built.Volume : T extends contract.Mesh ? built.Mesh : T;
 export const newModel = (options: Own<ModelOptions>) => new built.DeformableModel(options);

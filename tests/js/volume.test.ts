@@ -8,7 +8,7 @@ const ELEMENTS = [
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
 ];
 
-/** 2 x 3 x 4 voxels that hold their own index. */
+/** Returns 2 x 3 x 4 voxels whose values are their indices. */
 const counted = () => Uint8Array.from({ length: 24 }, (_, index) => index);
 const grid = (more: object = {}) => new Volume({ data: counted(), dims: [2, 3, 4], ...more });
 
@@ -26,7 +26,7 @@ test('the voxels are copied', () => {
   expect(volume.range).toEqual([0, 23]);
 });
 
-test('place in the world: spacing and origin, or an affine', () => {
+test('position in the world: spacing and origin, or an affine', () => {
   const placed = grid({ spacing: [1, 2, 3], origin: [10, 20, 30] });
   expect([...placed.affine]).toEqual([1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 3, 0, 10, 20, 30, 1]);
   expect(placed.spacing).toEqual([1, 2, 3]);
@@ -36,7 +36,7 @@ test('place in the world: spacing and origin, or an affine', () => {
   expect(turned.sample([5 - 3 * 2, 6 + 2, 7 + 4 * 3])).toBe(1 + 2 * 2 + 6 * 3);
 });
 
-test('what it says about itself', () => {
+test('dimensions, spacing, range and other properties', () => {
   const volume = grid({ space: 'LPS' });
   expect(volume.dims).toEqual([2, 3, 4]);
   expect(volume.frames).toBe(1);
@@ -74,7 +74,7 @@ test('frames', () => {
   expect(failure(() => four.frameSeconds).code).toBe('freed');
 });
 
-test('of 4D volumes all frames are taken, in order', () => {
+test('all frames of 4D volumes are taken, in order', () => {
   const pair = (first: number, seconds: number) =>
     new Volume({ data: Uint8Array.of(first, first + 1), dims: [1, 1, 1, 2], frameSeconds: seconds });
   const still = new Volume({ data: Uint8Array.of(9), dims: [1, 1, 1] });
@@ -84,8 +84,8 @@ test('of 4D volumes all frames are taken, in order', () => {
   expect(Volume.fromFrames([still, pair(3, 0.5)]).frameSeconds).toBe(0);
 });
 
-test('slices between thick ones go along with what moves from one to the next', () => {
-  // A disc of radius 8 that is 6 pixels further in the next slice.
+test('slices between thick ones follow motion from one to the next', () => {
+  // A disc of radius 8 that is 6 pixels further along x in the next slice.
   const inside = (x: number, y: number, z: number) => Math.hypot(x - 14 - 6 * z, y - 16) < 8;
   const data = Uint8Array.from({ length: 40 * 32 * 2 }, (_, i) =>
     inside(i % 40, Math.floor(i / 40) % 32, Math.floor(i / 1280)) ? 200 : 20,
@@ -107,7 +107,7 @@ test('slices between thick ones go along with what moves from one to the next', 
   expect(thick.enrichSlices({ factor: 1 }).dims).toEqual(thick.dims);
 });
 
-test('binned voxels are means of blocks, in their place, of all frames', () => {
+test('binned voxels are means of blocks, in the right position, in all frames', () => {
   const placed = { spacing: [1, 2, 3], origin: [10, 20, 30], slope: 2, intercept: -1, frameSeconds: 0.5, space: 'LPS' };
   const volume = grid({ dims: [3, 2, 2, 2], ...placed });
   const binned = volume.binned([2, 1, 2]);
@@ -115,7 +115,7 @@ test('binned voxels are means of blocks, in their place, of all frames', () => {
   expect([binned.dims, binned.frames, binned.space]).toEqual([[1, 2, 1], 2, 'LPS']);
   expect(binned.spacing).toEqual([2, 2, 6]);
   expect([...binned.affine.slice(12, 15)]).toEqual([10.5, 20, 31.5]);
-  // Means of 0, 1, 6, 7 and so on, which are stored as whole numbers.
+  // Means of 0, 1, 6, 7 and so on, stored as integers.
   const stored = [...binned.intensities(0), ...binned.intensities(1)].map((value) => (value + 1) / 2);
   for (const [i, mean] of [3.5, 6.5, 15.5, 18.5].entries())
     expect(Math.abs((stored[i] as number) - mean)).toBeLessThan(0.51);
@@ -123,7 +123,7 @@ test('binned voxels are means of blocks, in their place, of all frames', () => {
   expect([...exact.intensities(0), ...exact.intensities(1)]).toEqual([3.5, 6.5, 15.5, 18.5]);
 });
 
-test('binned by 1 it is the same, by all it is one voxel, and the volume stays', () => {
+test('binning by 1 changes nothing, by the size gives one voxel, and the volume is unchanged', () => {
   const volume = grid();
   const same = volume.binned([1, 1, 1]);
   expect([...same.intensities()]).toEqual([...counted()]);
@@ -228,19 +228,19 @@ test.each(REFUSED)('%s is refused, naming %s', (_, parameter, work) => {
   expect(error.message).toContain(parameter);
 });
 
-test('files that are none', () => {
+test('invalid files are refused', () => {
   const whole = grid().toNifti();
   const broken = [new Uint8Array(), new TextEncoder().encode('not a volume'), whole.slice(0, 200), whole.slice(0, -1)];
   for (const bytes of broken) expect(failure(() => Volume.parse(bytes)).code).toBe('bad-file');
 });
 
-test('more voxels than there is memory for', () => {
-  // Virtual memory only: the pages are never touched before the size is refused.
+test('more voxels than fit into memory are refused', () => {
+  // Virtual memory only: the pages are never touched, because the size is refused before.
   const data = new Uint8Array(4_200_000_000);
   expect(failure(() => new Volume({ data, dims: [4_200_000_000, 1, 1] })).code).toBe('too-large');
 });
 
-test('use after free', () => {
+test('use after free is refused', () => {
   const volume = grid();
   volume.free();
   volume.free();

@@ -1,15 +1,15 @@
-// Compiled, never run: the package in a worker has what the package has, with promises.
+// Compiled, never run: the package in a worker has the same members as the package, with promises.
 import { Worker as NodeWorker } from 'node:worker_threads';
 import type * as built from '../../pkg/index.js';
 import * as worker from '../../pkg/worker.js';
 
-/** True where two types accept the same values and give the same. */
+/** True if two types are identical. */
 type Same<A, B> = (<T>() => T extends A ? 1 : 2) extends <T>() => T extends B ? 1 : 2 ? true : false;
 
 /** Does not compile with `false`. */
 const same = <T extends true>(holds: T): T => holds;
 
-// Every name, but for what cannot be had from a worker, and what only a worker has.
+// All names, except those that a worker cannot have and those that only a worker has.
 same<Same<Exclude<keyof typeof built, 'initSync'>, Exclude<keyof typeof worker, 'terminate' | 'transfer'>>>(true);
 
 same<Same<worker.Volume['dims'], Promise<built.Vec3>>>(true);
@@ -44,7 +44,7 @@ export const inBrowser = (own: Worker) => worker.default({ worker: own });
 export const inNode = () => worker.default({ worker: new NodeWorker('vesicle/worker-host') });
 export const handed = (data: Uint16Array) => new worker.Volume({ data: worker.transfer(data), dims: [1, 1, 1] });
 
-// Objects of one side are none of the other, and meshes are not made by `new`.
+// Objects of one API are not accepted by the other, and meshes are not constructed by `new`.
 // @ts-expect-error
 export const mixed = (volume: built.Volume) => new worker.DeformableModel({ volume });
 // @ts-expect-error

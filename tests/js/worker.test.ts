@@ -1,4 +1,4 @@
-// The package in a worker of Node: the same results as without, and what is its own.
+// The package in a worker, in Node: the same results as without, and features of its own.
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
@@ -15,7 +15,7 @@ const data = ballOf(24, 7);
 const DIMS: vesicle.Vec3 = [24, 24, 24];
 const PARAMS: vesicle.DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2 };
 
-/** Awaiting what is no promise does no harm: what is written for the worker runs without, too. */
+/** The worker's API. Code written for it also runs without a worker, since awaiting a plain value does no harm. */
 type Library = typeof worker;
 
 function ballOf(size: number, radius: number): Uint8Array {
@@ -26,7 +26,7 @@ function ballOf(size: number, radius: number): Uint8Array {
   });
 }
 
-/** A model on its way for tens of thousands of steps, for runs that are to be ended. */
+/** Returns a model that runs for tens of thousands of steps, for tests that end a run. */
 function restless(): worker.DeformableModel {
   const volume = new worker.Volume({ data, dims: DIMS });
   const start = { seeds: Float32Array.of(12, 12, 12), radius: 2 };
@@ -37,7 +37,7 @@ function restless(): worker.DeformableModel {
 beforeEach(() => init());
 afterAll(() => worker.terminate());
 
-/** What each class does, from one end to the other. */
+/** Scenarios that use all features of each class, from construction to results. */
 const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
   functions: async ({ version, paramSpecs, parsePoints, animationGlb, Mesh }) => [
     await version(),
@@ -106,7 +106,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     ];
   },
   implicit: async ({ DeformableModel, ImplicitSurface }) => {
-    // On a ball, in a spiral.
+    // On a spiral on a sphere.
     const points = Float32Array.from({ length: 360 }, (_, at) => {
       const z = 1 - (2 * Math.floor(at / 3) + 1) / 120;
       const turned = 2.4 * Math.floor(at / 3) + (at % 3 === 1 ? Math.PI / 2 : 0);
@@ -190,11 +190,11 @@ test.each(Object.entries(SCENES))('%s: the same as without a worker', async (_, 
   expect(await scene(worker)).toEqual(here);
 });
 
-test('two hundred steps end in the bits that the core gives natively', async () => {
+test('two hundred steps give the same bits as the native core', async () => {
   expect(await spongeBits(worker)).toBe(SPONGE_BITS);
 });
 
-test('everything of the package is here, and nothing of an object but what the package has', async () => {
+test('all names of the package are exported, and objects have no other members', async () => {
   const names = Object.keys(vesicle).filter((name) => name !== 'initSync');
   expect(Object.keys(worker).sort()).toEqual([...names, 'terminate', 'transfer'].sort());
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
@@ -204,7 +204,7 @@ test('everything of the package is here, and nothing of an object but what the p
   expect(wrong(mesh).anything).toBeUndefined();
 });
 
-test('errors come as VesicleErrors with code and message', async () => {
+test('errors arrive as VesicleErrors with code and message', async () => {
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
   const refused = await rejection(mesh.decimate(-1));
   expect([refused.code, refused.message.slice(0, 15), refused.name]).toEqual([
@@ -216,7 +216,7 @@ test('errors come as VesicleErrors with code and message', async () => {
   expect((await rejection(worker.paramSpecs(wrong('magic')))).message).toContain('magic');
 });
 
-test('an object that cannot be made rejects in all that is asked of it; create rejects itself', async () => {
+test('an object whose construction fails rejects all calls, and create itself rejects', async () => {
   const volume = new worker.Volume({ data, dims: [1, 1, 1] });
   expect((await rejection(volume.range)).message).toContain('dims');
   const model = new worker.DeformableModel({ volume, params: PARAMS });
@@ -234,7 +234,7 @@ test('arguments that cannot be sent are refused by name', async () => {
   const cases: [unknown, string][] = [
     [new vesicle.VesicleError('aborted', ''), 'volume: a VesicleError cannot be sent'],
     [() => 1, 'volume: a function cannot be sent'],
-    [loop, 'too many objects inside each other'],
+    [loop, 'objects are nested too deeply'],
   ];
   for (const [value, message] of cases) {
     const model = new worker.DeformableModel({ volume: wrong(value) });
@@ -244,7 +244,7 @@ test('arguments that cannot be sent are refused by name', async () => {
   expect((await rejection(misspelled.step())).message).toContain('level');
 });
 
-test('a measurement of coverage that is aborted rejects with the reason, and goes on beside a run', async () => {
+test('an aborted measurement of coverage rejects with the reason, and measuring works during a run', async () => {
   const model = restless();
   const reason = { because: 'of this' };
   const abort = new AbortController();
@@ -261,7 +261,7 @@ test('a measurement of coverage that is aborted rejects with the reason, and goe
   await expect(failing).rejects.toBe(thrown);
   const running = new AbortController();
   const run = model.run({ signal: running.signal, budgetMs: 1 });
-  expect((await rejection(model.seed())).message).toContain('under way');
+  expect((await rejection(model.seed())).message).toContain('during a run');
   const { recall, precision } = await model.coverage();
   expect([recall, precision].every((share) => share >= 0 && share <= 1 + 1e-9)).toBe(true);
   running.abort('done');
@@ -270,7 +270,7 @@ test('a measurement of coverage that is aborted rejects with the reason, and goe
   expect((await rejection(model.coverage())).code).toBe('freed');
 });
 
-test('an aborted run rejects with the reason, and the model goes on', async () => {
+test('an aborted run rejects with the reason, and the model can continue', async () => {
   const model = restless();
   const abort = new AbortController();
   const reason = new Error('enough');
@@ -289,7 +289,7 @@ test('an aborted run rejects with the reason, and the model goes on', async () =
   await expect(model.run({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
 });
 
-test('what onStep throws ends the run', async () => {
+test('an error thrown by onStep ends the run', async () => {
   const model = restless();
   const thrown = new Error('mine');
   const run = model.run({
@@ -301,20 +301,20 @@ test('what onStep throws ends the run', async () => {
   expect((await model.step()).done).toBe(false);
 });
 
-test('while a run is under way, parameters change and the rest is refused', async () => {
+test('during a run parameters can change, and other calls are refused', async () => {
   const model = restless();
   const abort = new AbortController();
   const run = model.run({ signal: abort.signal, budgetMs: 1 });
   await model.setParams({ rigidity: 0.4 });
   expect((await model.params).rigidity).toBe(0.4);
-  expect((await rejection(model.run())).message).toContain('under way');
-  expect((await rejection(model.step())).message).toContain('under way');
+  expect((await rejection(model.run())).message).toContain('during a run');
+  expect((await rejection(model.step())).message).toContain('during a run');
   expect((await rejection(model.run({ signal: wrong('now') }))).message).toContain('AbortSignal');
   abort.abort('done');
   await expect(run).rejects.toBe('done');
 });
 
-test('arrays are copied, and handed over when that is asked for', async () => {
+test('arrays are copied, or transferred on request', async () => {
   const [kept, given, inside] = [data.slice(), data.slice(), data.slice()];
   const all = new Uint8Array(2 * data.length);
   all.set(data, data.length);
@@ -327,14 +327,14 @@ test('arrays are copied, and handed over when that is asked for', async () => {
   for (const volume of volumes) expect(await volume.intensities()).toEqual(Float32Array.from(data));
   expect([kept, all, given, inside].map(({ length }) => length)).toEqual([data.length, 2 * data.length, 0, 0]);
   const again = new worker.Volume({ data: given, dims: DIMS });
-  expect((await rejection(again.dims)).message).toContain('handed over before');
+  expect((await rejection(again.dims)).message).toContain('already transferred');
   const shared = new Uint8Array(new SharedArrayBuffer(data.length));
   expect((await rejection(worker.Volume.create({ data: worker.transfer(shared), dims: DIMS }))).message).toContain(
     'shared',
   );
 });
 
-test('only what an array shows of its buffer is sent', async () => {
+test('only the part of a buffer that an array covers is sent', async () => {
   const sent: Uint8Array[] = [];
   const own = hostOf();
   const post = own.postMessage.bind(own);
@@ -347,14 +347,14 @@ test('only what an array shows of its buffer is sent', async () => {
   const large = new Uint8Array(1 << 20);
   await rejection(worker.Volume.parse(large.subarray(5, 9)));
   await rejection(worker.Volume.parse(Buffer.from('abc')));
-  // Handed over, so empty by now: it was not the caller's own.
+  // Transferred, and therefore empty: they were copies, not the caller's arrays.
   expect(sent.map(({ length }) => length)).toEqual([0, 0]);
   expect(large.length).toBe(1 << 20);
   worker.terminate();
 });
 
-test('results are handed over', async () => {
-  // Tells how many buffers went with a message, in place of what was in it.
+test('results are transferred', async () => {
+  // Answers with the number of transferred buffers instead of the result.
   const own = hostOf(`
     const { parentPort } = await import('node:worker_threads');
     const post = parentPort.postMessage.bind(parentPort);
@@ -367,7 +367,7 @@ test('results are handed over', async () => {
   await own.terminate();
 });
 
-test('copyTo fills the same memory where there is room', async () => {
+test('copyTo reuses the same memory if it is large enough', async () => {
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.5);
   const { positions, normals, indices } = await mesh.arrays();
   const out = { positions: new Float32Array(9999), normals: new Float32Array(), indices: new Uint32Array(9999) };
@@ -378,7 +378,7 @@ test('copyTo fills the same memory where there is room', async () => {
   expect([out.positions.length, out.normals.length, out.indices.length]).toEqual([9999, normals.length, 9999]);
   expect(out.positions.subarray(0, positions.length)).toEqual(positions);
   expect(out.indices.subarray(0, indices.length)).toEqual(indices);
-  // While the buffers are away, others take their place.
+  // While the buffers are in the worker, new ones replace them.
   expect(await Promise.all([mesh.copyTo(out), mesh.copyTo(out)])).toEqual([await counts, await counts]);
   expect(out.positions.subarray(0, positions.length)).toEqual(positions);
   mesh.free();
@@ -403,7 +403,7 @@ test('the live mesh is one object that follows the model', async () => {
   expect((await rejection(mesh.info())).code).toBe('freed');
 });
 
-test('what is freed is refused, here and as an argument', async () => {
+test('freed objects are refused, as targets and as arguments', async () => {
   const volume = await worker.Volume.create({ data, dims: DIMS });
   const model = new worker.DeformableModel({ volume, params: PARAMS });
   volume.free();
@@ -417,13 +417,13 @@ test('what is freed is refused, here and as an argument', async () => {
   expect((await rejection(run)).code).toBe('freed');
 });
 
-/** The host as a worker made by hand; `before` runs in it first. */
+/** Starts the worker's host script by hand; `before` runs in it first. */
 function hostOf(before = ''): NodeWorker {
   const script = `${before}; import(${JSON.stringify(new URL('worker-host.js', pkg).href)});`;
   return new NodeWorker(`(async () => { ${script} })()`, { eval: true });
 }
 
-/** Sends what no page of ours would, and gives the answer. */
+/** Sends a raw request, which the library itself would not send, and returns the answer. */
 async function answerTo(own: NodeWorker, request: object): Promise<{ failure?: { message: string }; value?: unknown }> {
   const answer = new Promise<object>((resolve) => own.once('message', resolve));
   own.postMessage({ id: 1, args: [], ...request });
@@ -451,17 +451,17 @@ test('names that are not in the tables are refused', async () => {
   ];
   for (const call of calls) {
     const { failure } = await answerTo(own, { type: 'call', ...call });
-    expect(failure?.message, JSON.stringify(call)).toMatch(/there is no such thing|this is no object/);
+    expect(failure?.message, JSON.stringify(call)).toMatch(/no such member|not an object/);
   }
   const { failure } = await answerTo(own, { type: 'make', as: { vesicle: 8, class: 'constructor' } });
-  expect(failure?.message).toContain('there is no such thing');
+  expect(failure?.message).toContain('no such member');
   const polluting = JSON.parse('[{ "__proto__": { "levels": 3 } }]');
   expect((await answerTo(own, { type: 'call', on: 'Volume', name: 'parse', args: polluting })).failure).toBeDefined();
   expect((await answerTo(own, { type: 'call', on: mesh, name: 'dims' })).value).toEqual(DIMS);
   await own.terminate();
 });
 
-/** Meshes whose `info` fails as a fault inside the module does, and whose `check` fails where nobody catches it. */
+/** Makes `info` of meshes fail like a trap in the module, and `check` throw where nothing catches it. */
 const FAULTY = `
   const { RawMesh } = await import(${JSON.stringify(new URL('vesicle.js', pkg).href)});
   RawMesh.prototype.info = () => { throw new WebAssembly.RuntimeError('unreachable'); };
@@ -473,7 +473,7 @@ async function crashOf(promise: Promise<unknown>): Promise<string> {
   return (error as Error).message;
 }
 
-test('a crash of the module rejects everything, until init starts a fresh worker', async () => {
+test('a crash of the module rejects all calls, until init starts a new worker', async () => {
   worker.terminate();
   await init({ worker: hostOf(FAULTY) });
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
@@ -489,11 +489,11 @@ test('a crash of the module rejects everything, until init starts a fresh worker
   expect((await (await worker.Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus).toBe(0);
 });
 
-test('a worker that ends by itself rejects everything that waits', async () => {
+test('a worker that exits by itself rejects all pending calls', async () => {
   worker.terminate();
   await init({ worker: hostOf(FAULTY) });
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
-  // Whether the answer is still heard is up to the system.
+  // Whether the answer still arrives depends on the system.
   const check = mesh.check().catch(() => undefined);
   expect(await crashOf(restless().run())).toContain('no more');
   await check;
@@ -501,12 +501,12 @@ test('a worker that ends by itself rejects everything that waits', async () => {
   await init({ worker: own });
   const waiting = crashOf(restless().run());
   await own.terminate();
-  expect(await waiting).toContain('it left with code');
+  expect(await waiting).toContain('exited with code');
   await init();
   expect(await worker.version()).toBeTruthy();
 });
 
-test('terminate rejects what waits, and init starts again', async () => {
+test('terminate rejects pending calls, and init starts again', async () => {
   const model = restless();
   const run = rejection(model.run());
   worker.terminate();
@@ -521,7 +521,7 @@ test('terminate rejects what waits, and init starts again', async () => {
   expect(await worker.version()).toBeTruthy();
 });
 
-test('a start that fails says why, and the next one works', async () => {
+test('a failed start gives the reason, and the next one works', async () => {
   worker.terminate();
   await expect(init({ module_or_path: new Uint8Array(8) })).rejects.toMatchObject({ name: 'CompileError' });
   await expect(init({ module_or_path: new Response('', { status: 404 }) })).rejects.toThrow('404');
@@ -532,13 +532,13 @@ test('a start that fails says why, and the next one works', async () => {
   expect(await worker.version()).toBeTruthy();
 });
 
-/** What a module script prints, run in a new Node from the project's folder. */
+/** Runs a module script in a new Node process from the project's folder and returns what it prints. */
 function node(script: string, ...flags: string[]): string {
   const args = [...flags, '--input-type=module', '--eval', script];
   return execFileSync(process.execPath, args, { cwd: root, encoding: 'utf8', timeout: 120_000 }).trim();
 }
 
-test('anything before init says what to do; a worker at rest keeps no process alive', () => {
+test('calls before init say what to do, and an idle worker keeps no process alive', () => {
   const script = `
     import init, { Mesh, Volume, version } from './pkg/worker.js';
     for (const early of [version(), Mesh.icosphere([0, 0, 0], 1, 1), new Volume({}).dims, new Volume({}).dims])
@@ -559,7 +559,7 @@ test('the example of the documentation runs', () => {
   expect(node(script).split('\n').at(-1)).toBe('true true true');
 });
 
-test('objects that nobody holds are freed in the worker, those in use are not', () => {
+test('unreachable objects are freed in the worker, those in use are not', () => {
   const script = `
     import { Worker } from 'node:worker_threads';
     import init, { DeformableModel, Mesh, Volume } from './pkg/worker.js';
@@ -577,11 +577,11 @@ test('objects that nobody holds are freed in the worker, those in use are not', 
     const steps = (model) => model.run({ maxIterations: 50 });
     const run = steps(new DeformableModel({ volume: new Volume({ data, dims: [16, 16, 16] }), params: { iso: 50 } }));
     await (async () => { for (let i = 0; i < 20; i++) await Mesh.icosphere([0, 0, 0], 1, 1); })();
-    // The two volumes and twenty meshes; how soon is the engine's to choose.
+    // The two volumes and twenty meshes; the engine decides when.
     while (freed.size < 22) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
     const { iteration } = await run;
     console.log(iteration > 0, (await mesh.info()).components > 0, (await held.info()).genus);
-    // The model that ran, too.
+    // The model that ran as well.
     while (freed.size < 23) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
     console.log(freed.size, (await mesh.info()).components > 0);`;
   expect(node(script, '--expose-gc').split('\n')).toEqual(['true true 0', '23 true']);

@@ -12,7 +12,7 @@ function state(name: 'running' | 'done' | 'error', text: string): void {
  * draw.
  */
 export function shown({ iteration, phase, vertices, components }: StepReport): Promise<unknown> {
-  const parts = components === 1 ? '1 part' : `${components} parts`;
+  const parts = components === 1 ? '1 component' : `${components} components`;
   state('running', `Step ${iteration}, ${phase}: ${vertices.toLocaleString('en')} vertices, ${parts}`);
   return new Promise(requestAnimationFrame);
 }
@@ -21,7 +21,7 @@ export function shown({ iteration, phase, vertices, components }: StepReport): P
 export async function page(work: () => Promise<StepReport>): Promise<void> {
   try {
     const { iteration, vertices } = await work();
-    state('done', `At rest after ${iteration} steps, ${vertices.toLocaleString('en')} vertices.`);
+    state('done', `Converged after ${iteration} steps: ${vertices.toLocaleString('en')} vertices.`);
   } catch (error) {
     state('error', error instanceof Error ? error.message : String(error));
   }

@@ -1,4 +1,5 @@
 import type { Failure } from './protocol';
+import { text } from './texts';
 
 /**
  * A request that a worker could not fulfil. `code` is that of the library's VesicleError, or 'internal' if the engine
@@ -20,46 +21,46 @@ export function toFailure(error: unknown): Failure {
   return { code: 'page', message: error instanceof Error ? error.message : String(error) };
 }
 
-interface Waiting {
+interface PendingRequest {
   resolve: (body: never) => void;
   reject: (error: RequestError) => void;
 }
 
 /** Constraint on a protocol's request table: for each request its name, body and reply. */
-type Asked<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
+type RequestTable<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
-/** A worker started before any channel needed it; see {@link spawnAhead}. */
-let ahead: { spawn: () => Worker; worker: Worker } | undefined;
+/** A worker started before any channel needed it; see {@link preloadWorker}. */
+let preloaded: { spawn: () => Worker; worker: Worker } | undefined;
 
 /**
  * Starts a worker for the next channel with the same `spawn`, so that it loads in parallel with the page's own code.
  */
-export function spawnAhead(spawn: () => Worker): void {
-  if (ahead?.spawn === spawn) return;
+export function preloadWorker(spawn: () => Worker): void {
+  if (preloaded?.spawn === spawn) return;
   // It belongs to a lab that was closed before it had opened.
-  ahead?.worker.terminate();
+  preloaded?.worker.terminate();
   const worker = spawn();
-  ahead = { spawn, worker };
+  preloaded = { spawn, worker };
   // Forget it: the channel then starts its own worker, and reports what is wrong.
   worker.onerror = () => {
-    ahead = undefined;
+    preloaded = undefined;
   };
 }
 
 function takeWorker(spawn: () => Worker): Worker {
-  if (ahead?.spawn !== spawn) return spawn();
-  const { worker } = ahead;
-  ahead = undefined;
+  if (preloaded?.spawn !== spawn) return spawn();
+  const { worker } = preloaded;
+  preloaded = undefined;
   return worker;
 }
 
 /** The page's connection to a worker: requests return promises, events go to one listener. */
-export class Channel<Requests extends Asked<Requests>, Event extends { event: string }> {
+export class Channel<Requests extends RequestTable<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
-  readonly #waiting = new Map<number, Waiting>();
+  readonly #pending = new Map<number, PendingRequest>();
   #worker: Worker;
   /** Failure that broke the worker; every request is rejected with it until the worker is restarted. */
   #failure: Failure | undefined;
@@ -79,13 +80,13 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     if (this.#failure) return Promise.reject(new RequestError(this.#failure));
     const id = ++this.#lastId;
     return new Promise((resolve, reject) => {
-      this.#waiting.set(id, { resolve, reject });
+      this.#pending.set(id, { resolve, reject });
       this.#worker.postMessage({ id, kind, body }, transfer);
     });
   }
 
   /** Posts a message that has no reply. */
-  protected tell(message: { kind: string }, transfer: Transferable[] = []): void {
+  protected post(message: { kind: string }, transfer: Transferable[] = []): void {
     this.#worker.postMessage(message, transfer);
   }
 
@@ -100,7 +101,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   /** Terminates the worker and frees its memory. Pending requests are never settled, since the lab is being closed. */
   close(): void {
     this.#worker.terminate();
-    this.#waiting.clear();
+    this.#pending.clear();
   }
 
   #start(): Worker {
@@ -109,9 +110,9 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     worker.onerror = (event) => {
       // The page shows the error; the console need not repeat it.
       event.preventDefault();
-      this.#broken(event.message || 'the worker could not be started');
+      this.#broken(event.message || text('shell.workerFailed'));
     };
-    worker.onmessageerror = () => this.#broken('a message could not be read');
+    worker.onmessageerror = () => this.#broken(text('shell.messageUnreadable'));
     return worker;
   }
 
@@ -121,10 +122,10 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   }
 
   #settle(reply: Reply): void {
-    const waiting = this.#waiting.get(reply.id);
-    this.#waiting.delete(reply.id);
-    if (reply.ok) waiting?.resolve(reply.body as never);
-    else waiting?.reject(new RequestError(reply.failure));
+    const request = this.#pending.get(reply.id);
+    this.#pending.delete(reply.id);
+    if (reply.ok) request?.resolve(reply.body as never);
+    else request?.reject(new RequestError(reply.failure));
   }
 
   #broken(message: string): void {
@@ -137,7 +138,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   }
 
   #fail(failure: Failure): void {
-    for (const { reject } of this.#waiting.values()) reject(new RequestError(failure));
-    this.#waiting.clear();
+    for (const { reject } of this.#pending.values()) reject(new RequestError(failure));
+    this.#pending.clear();
   }
 }

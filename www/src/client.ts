@@ -14,8 +14,8 @@ export class Client extends Channel<Requests, WorkerEvent> {
   }
 
   /** Returns the buffers of a snapshot to the worker, which also tells it that the page is ready for the next one. */
-  giveBack({ positions, normals, indices }: SurfaceBuffers): void {
+  returnBuffers({ positions, normals, indices }: SurfaceBuffers): void {
     const message: ReturnMessage = { kind: 'return', buffers: { positions, normals, indices } };
-    this.tell(message, [positions.buffer, normals.buffer, indices.buffer]);
+    this.post(message, [positions.buffer, normals.buffer, indices.buffer]);
   }
 }

@@ -1,5 +1,6 @@
 import type { ParamValues } from './protocol';
 import type { Shape } from './shapes';
+import { text } from './texts';
 
 /** Unit of lengths in world space; empty if the file does not state one. */
 export type Unit = 'mm' | 'µm' | '';
@@ -19,15 +20,14 @@ export interface Example {
   credit: string;
 }
 
-const HEAD_CREDIT =
-  'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT). Walls thinner than a voxel, as before the frontal sinus, come out with gaps.';
+const HEAD_CREDIT = text('extractPresets.headCredit');
 const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
 /** The example volumes. The first one opens by default. */
 export const EXAMPLES: [Example, ...Example[]] = [
   {
     id: 'head-bone',
-    name: 'Head, CT: bone',
+    name: text('extractPresets.headBoneName'),
     source: { file: 'visible-human-head.nii.gz' },
     unit: 'mm',
     levels: 1,
@@ -38,7 +38,7 @@ export const EXAMPLES: [Example, ...Example[]] = [
   },
   {
     id: 'head-skin',
-    name: 'Head, CT: skin',
+    name: text('extractPresets.headSkinName'),
     source: { file: 'visible-human-head.nii.gz' },
     unit: 'mm',
     levels: 3,
@@ -47,7 +47,7 @@ export const EXAMPLES: [Example, ...Example[]] = [
   },
   {
     id: 'head-full',
-    name: 'Head, CT at full size: bone',
+    name: text('extractPresets.headFullName'),
     source: { file: 'visible-human-head-full.nii.gz' },
     unit: 'mm',
     levels: 2,
@@ -56,40 +56,40 @@ export const EXAMPLES: [Example, ...Example[]] = [
   },
   {
     id: 'tooth',
-    name: 'Tooth, CT',
+    name: text('extractPresets.toothName'),
     source: { file: 'tooth.nrrd' },
     unit: '',
     levels: 2,
     // Halfway between the intensities of the holder of the tooth and of dentine.
     params: { iso: 600, isoForce: -1, rigidity: 0.2 },
-    credit: 'Tooth CT: Scientific Computing and Imaging Institute, University of Utah, Seg3D data (MIT).',
+    credit: text('extractPresets.toothCredit'),
   },
   {
     id: 'ovule',
-    name: 'Plant ovule, microscope',
+    name: text('extractPresets.ovuleName'),
     source: { file: 'ovule.nrrd' },
     unit: 'µm',
     levels: 1,
     params: { iso: 120, isoForce: -1, rigidity: 0.2 },
-    credit: 'Cell membranes of an ovule: Heidelberg Collaboratory for Image Processing, PlantSeg (MIT).',
+    credit: text('extractPresets.ovuleCredit'),
   },
   {
     id: 'linked-rings',
-    name: 'Two linked rings',
+    name: text('extractPresets.linkedRingsName'),
     source: { shape: 'linked rings' },
     unit: '',
     levels: 1,
     params: { iso: 127.5, isoForce: -1, rigidity: 0.1, stiffness: 0.1 },
-    credit: 'Computed. One surface goes in; two come out, each with one hole: χ = 0.',
+    credit: text('extractPresets.linkedRingsCredit'),
   },
   {
     id: 'sponge',
-    name: 'Menger sponge',
+    name: text('extractPresets.spongeName'),
     source: { shape: 'sponge' },
     unit: '',
     levels: 3,
     params: { iso: 102, isoForce: -1, rigidity: 0.05, stiffness: 0.001 },
-    credit: 'Computed. A cube pierced on two scales has 81 tunnels: one component, χ = −160.',
+    credit: text('extractPresets.spongeCredit'),
   },
 ];
 

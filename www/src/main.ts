@@ -1,9 +1,10 @@
+import { text } from './texts';
 import './style.css';
-import { spawnAhead } from './channel';
+import { preloadWorker } from './channel';
 import { spawnExtract } from './client';
 import { GUIDES } from './guides';
 import { labOf } from './labs/address';
-import type { Lab, LabKind, PassedOn } from './labs/labs';
+import type { Handoff, Lab, LabKind } from './labs/labs';
 import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
@@ -14,32 +15,32 @@ import { h } from './ui/dom';
 const LABS: [LabKind, ...LabKind[]] = [
   {
     id: 'extract',
-    name: 'Extract',
-    tagline: 'A closed surface that splits and merges as it grows onto your data. Nothing leaves this machine.',
+    name: text('shell.extract'),
+    tagline: text('shell.extractTagline'),
     guide: GUIDES.extract,
     spawn: spawnExtract,
     load: async () => (await import('./labs/extract')).ExtractLab,
   },
   {
     id: 'reconstruct',
-    name: 'Reconstruct',
-    tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
+    name: text('shell.reconstruct'),
+    tagline: text('shell.reconstructTagline'),
     guide: GUIDES.reconstruct,
     spawn: spawnReconstruct,
     load: async () => (await import('./labs/reconstruct')).ReconstructLab,
   },
   {
     id: 'track',
-    name: 'Track',
-    tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
+    name: text('shell.track'),
+    tagline: text('shell.trackTagline'),
     guide: GUIDES.track,
     spawn: spawnTrack,
     load: async () => (await import('./labs/track')).TrackLab,
   },
   {
     id: 'sculpt',
-    name: 'Sculpt',
-    tagline: 'A detailed surface that follows ellipsoids, as far as you like. Nothing leaves this machine.',
+    name: text('shell.sculpt'),
+    tagline: text('shell.sculptTagline'),
     guide: GUIDES.sculpt,
     spawn: spawnSculpt,
     load: async () => (await import('./labs/sculpt')).SculptLab,
@@ -76,7 +77,7 @@ class Labs {
     if (kind ? kind !== this.#kind : !this.#kind) void this.#open(kind ?? LABS[0]);
   }
 
-  async #open(kind: LabKind, passedOn?: PassedOn): Promise<void> {
+  async #open(kind: LabKind, passedOn?: Handoff): Promise<void> {
     this.#lab?.close();
     this.#lab = undefined;
     this.#kind = kind;
@@ -85,18 +86,20 @@ class Labs {
     this.#root.dataset.state = 'loading';
     try {
       // The engine loads in parallel with the lab's own code.
-      spawnAhead(kind.spawn);
+      preloadWorker(kind.spawn);
       const Kind = await kind.load();
       if (turn !== this.#turn) return;
       this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
-      this.#root.textContent = `This page needs WebAssembly and Web Workers, and could not use them here; another or a newer browser may. It said: ${error instanceof Error ? error.message : error}`;
+      this.#root.textContent = text('shell.unsupported', {
+        message: error instanceof Error ? error.message : String(error),
+      });
     }
   }
 
-  #passOn(passedOn: PassedOn): void {
+  #passOn(passedOn: Handoff): void {
     this.#remember();
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
     // pushState fires no hashchange: the lab is opened here, with the data passed on.
@@ -110,7 +113,7 @@ class Labs {
   }
 
   #present({ id, name, tagline, guide }: LabKind): void {
-    document.title = `Vesicle: ${name}`;
+    document.title = text('shell.title', { lab: name });
     for (const [one, link] of this.#links) {
       if (one === id) {
         link.setAttribute('aria-current', 'page');
@@ -120,8 +123,8 @@ class Labs {
     }
     const title = document.getElementById('lab-name');
     if (title) title.textContent = name;
-    const text = document.getElementById('tagline');
-    if (text) text.textContent = tagline;
+    const summary = document.getElementById('tagline');
+    if (summary) summary.textContent = tagline;
     document.getElementById('guide')?.setAttribute('href', guide);
   }
 }
@@ -129,5 +132,12 @@ class Labs {
 const lab = document.getElementById('lab');
 const help = document.getElementById('help');
 const nav = document.getElementById('labs');
-if (lab && help && nav) new Labs(lab, help, nav);
+if (lab && help && nav) {
+  nav.setAttribute('aria-label', text('shell.labs'));
+  help.textContent = text('shell.shortcuts');
+  help.setAttribute('aria-label', text('shell.shortcutsLabel'));
+  const newTab = h('span', { class: 'visually-hidden' }, text('shell.newTab'));
+  document.getElementById('guide')?.replaceChildren(text('shell.guide'), newTab);
+  new Labs(lab, help, nav);
+}
 workOffline();

@@ -1,5 +1,5 @@
 /** Seconds after the page has loaded before files are cached, so that caching does not slow the first example down. */
-const PATIENCE = 3;
+const CACHE_DELAY_SECONDS = 3;
 
 /**
  * Registers the service worker that caches the page's files, so that later visits need no network. If the browser does
@@ -8,14 +8,16 @@ const PATIENCE = 3;
 export function workOffline(): void {
   // During development, files must not come from a cache.
   if (!import.meta.env.PROD || !('serviceWorker' in navigator)) return;
-  window.addEventListener('load', () => setTimeout(() => void begin().catch(() => undefined), 1000 * PATIENCE));
+  window.addEventListener('load', () =>
+    setTimeout(() => void begin().catch(() => undefined), 1000 * CACHE_DELAY_SECONDS),
+  );
 }
 
 async function begin(): Promise<void> {
   await navigator.serviceWorker.register('./offline.js', { updateViaCache: 'none' });
   const { active } = await navigator.serviceWorker.ready;
-  const tell = (urls: string[]) => active?.postMessage(urls);
-  tell([location.href]);
-  const observer = new PerformanceObserver((list) => tell(list.getEntries().map(({ name }) => name)));
+  const post = (urls: string[]) => active?.postMessage(urls);
+  post([location.href]);
+  const observer = new PerformanceObserver((list) => post(list.getEntries().map(({ name }) => name)));
   observer.observe({ type: 'resource', buffered: true });
 }

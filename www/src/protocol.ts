@@ -58,7 +58,7 @@ export interface LevelView {
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
-export type Shade = 'speed' | 'mean curvature' | 'gaussian curvature';
+export type VertexQuantity = 'speed' | 'mean curvature' | 'gaussian curvature';
 
 /** A saved run, from which the worker can restore it; kept by the page for undo. */
 export interface SavedRun {
@@ -106,7 +106,7 @@ export interface Surface extends SurfaceBuffers {
   /** Numbers of vertices and triangles in use; the buffers may be longer. */
   vertices: number;
   triangles: number;
-  /** One value per vertex, if a shade was requested. */
+  /** One value per vertex, if a quantity was requested. */
   values?: Float32Array;
   /** Colours of the vertices, rgb in 0..1, if the mesh has them. */
   colors?: Float32Array;
@@ -136,7 +136,7 @@ export interface MeasuredCoverage extends Coverage {
 }
 
 /** Result and cost of one of the two runs of a comparison, direct or coarse to fine. */
-export interface ComparedRun {
+export interface ExtractionRun {
   levels: number;
   /** Number of iterations, and milliseconds per part, of each level; the coarsest first. */
   byLevel: { level: number; iterations: number; times: Record<string, number> }[];
@@ -168,13 +168,13 @@ export interface Requests {
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
   /** Sets the quantity sent for each vertex from now on. */
-  shade: { body: Shade | undefined; reply: undefined };
+  quantity: { body: VertexQuantity | undefined; reply: undefined };
   /** Saves the present state of the run, also while it is running. */
   save: { body: undefined; reply: SavedRun };
   /** Restores a saved run of the same volume. */
   restore: { body: SavedRun; reply: Ready };
   /** Runs the same extraction twice, direct and coarse to fine; undefined if cancelled. */
-  compare: { body: Setup; reply: { direct: ComparedRun; coarseToFine: ComparedRun } | undefined };
+  compare: { body: Setup; reply: { direct: ExtractionRun; coarseToFine: ExtractionRun } | undefined };
   cancelCompare: { body: undefined; reply: undefined };
   /** Measures how much of the iso-surface the present surface covers, also during a run; undefined if cancelled. */
   coverage: { body: undefined; reply: MeasuredCoverage | undefined };
@@ -229,13 +229,13 @@ export interface FailureEvent {
   failure: Failure;
 }
 /** Progress of a comparison: one step of one of its runs. */
-export interface ComparingEvent {
+export interface ComparisonProgressEvent {
   event: 'comparing';
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
 /** Progress of a coverage measurement, 0..1. */
-export interface CoveringEvent {
+export interface CoverageProgressEvent {
   event: 'covering';
   share: number;
 }
@@ -245,6 +245,6 @@ export type WorkerEvent =
   | SectionsEvent
   | StateEvent
   | FailureEvent
-  | ComparingEvent
-  | CoveringEvent;
+  | ComparisonProgressEvent
+  | CoverageProgressEvent;
 export type FromWorker = ReplyMessage | WorkerEvent;

@@ -4,7 +4,7 @@ export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 /** A value with subscribers. Setting an equal value notifies nobody. */
 export class Observable<T> {
   #value: T;
-  readonly #followers = new Set<(value: T) => void>();
+  readonly #subscribers = new Set<(value: T) => void>();
 
   constructor(value: T) {
     this.#value = value;
@@ -17,13 +17,13 @@ export class Observable<T> {
   set value(value: T) {
     if (Object.is(value, this.#value)) return;
     this.#value = value;
-    for (const follower of this.#followers) follower(value);
+    for (const follower of this.#subscribers) follower(value);
   }
 
-  /** Calls `follower` now and at every change; returns a function that unsubscribes it. */
-  follow(follower: (value: T) => void): () => void {
-    this.#followers.add(follower);
-    follower(this.#value);
-    return () => this.#followers.delete(follower);
+  /** Calls `subscriber` now and at every change; returns a function that unsubscribes it. */
+  subscribe(subscriber: (value: T) => void): () => void {
+    this.#subscribers.add(subscriber);
+    subscriber(this.#value);
+    return () => this.#subscribers.delete(subscriber);
   }
 }

@@ -1,4 +1,5 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
+
 import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
   Attractor,
@@ -15,17 +16,18 @@ import type {
   Requests,
   SavedRun,
   Setup,
-  Shade,
   SurfaceBuffers,
   ToWorker,
+  VertexQuantity,
   VolumeSource,
   WorkerEvent,
 } from './protocol';
+import { text } from './texts';
 import { compare } from './worker/compare';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
-import { noArrays, surfaceIn, transferOf } from './worker/room';
-import { answer, buffersOf, givingAway, stop, type Work } from './worker/serving';
+import { buffersOf, reply, stop, type Task, withTransfer } from './worker/serving';
+import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
 /**
@@ -62,8 +64,8 @@ class Session {
   /** The intensities displayed as black and as white. */
   #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
-  #shade: Shade | undefined;
-  #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, noArrays);
+  #quantity: VertexQuantity | undefined;
+  #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyArrays);
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #done = false;
@@ -71,9 +73,9 @@ class Session {
   /** Pyramid levels the model was built with. */
   #levels = 0;
   #measuredAt = 0;
-  #run: Work | undefined;
-  #comparison: Work | undefined;
-  #survey: Work | undefined;
+  #run: Task | undefined;
+  #comparison: Task | undefined;
+  #coverageRun: Task | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -90,13 +92,13 @@ class Session {
     export: ({ format }) => this.#export(format),
     pyramid: ({ levels }) => this.#pyramid(levels),
     setAttractors: (attractors) => this.#setAttractors(attractors),
-    shade: (shade) => this.#setShade(shade),
+    quantity: (quantity) => this.#setQuantity(quantity),
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     compare: (setup) => this.#compare(setup),
     cancelCompare: () => this.#cancelCompare(),
     coverage: () => this.#coverage(),
-    cancelCoverage: () => stop(this.#survey),
+    cancelCoverage: () => stop(this.#coverageRun),
     seed: () => this.#seed(),
   };
 
@@ -110,11 +112,11 @@ class Session {
     try {
       const view = viewOf(volume, name);
       // No checks: the page starts the run at once, and would not show their result.
-      const ready = this.#adopt(buildModel(volume, setup), 'measured');
+      const ready = this.#replaceModel(buildModel(volume, setup), 'measured');
       this.#volume?.free();
       this.#volume = volume;
       this.#window = view.window;
-      return givingAway({ ...ready, volume: view }, [view.voxels]);
+      return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
       volume.free();
       throw error;
@@ -123,11 +125,11 @@ class Session {
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
-    return this.#adopt(buildModel(this.#image(), setup));
+    return this.#replaceModel(buildModel(this.#image(), setup));
   }
 
-  #adopt(model: DeformableModel, detail: Detail = 'checked'): Ready {
-    this.#survey?.abort.abort();
+  #replaceModel(model: DeformableModel, detail: Detail = 'checked'): Ready {
+    this.#coverageRun?.abort.abort();
     this.#model?.free();
     this.#model = model;
     this.#levels = model.level;
@@ -139,12 +141,12 @@ class Session {
   }
 
   #current(): DeformableModel {
-    if (!this.#model) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('extract.noVolume'));
     return this.#model;
   }
 
   #image(): Volume {
-    if (!this.#volume) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
+    if (!this.#volume) throw new Refusal('invalid-argument', text('extract.noVolume'));
     return this.#volume;
   }
 
@@ -164,7 +166,7 @@ class Session {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
     this.#run = undefined;
-    this.#standStill();
+    this.#reportStopped();
   }
 
   #stepped(report: StepReport): void {
@@ -172,7 +174,7 @@ class Session {
     this.#done = report.done;
     this.#iteration = report.iteration;
     if (this.#free.length === 0) {
-      this.#tell();
+      this.#flushReports();
       return;
     }
     const due = performance.now() - this.#measuredAt > MEASURE_EVERY;
@@ -183,7 +185,7 @@ class Session {
    * Sends reports in batches while snapshots are skipped: a thousand reports in one message cost the page a tenth of a
    * second.
    */
-  #tell(): void {
+  #flushReports(): void {
     if (this.#reports.length < MOST_REPORTS) return;
     send({ event: 'progress', reports: this.#reports });
     this.#reports = [];
@@ -198,10 +200,10 @@ class Session {
     await this.#pause();
     const model = this.#current();
     for (let i = 0; i < count && !this.#done; i++) this.#stepped(model.step(1));
-    this.#standStill();
+    this.#reportStopped();
   }
 
-  #standStill(): void {
+  #reportStopped(): void {
     this.#snapshot('checked');
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
@@ -220,26 +222,26 @@ class Session {
 
   #export(format: MeshFormat): Uint8Array {
     const bytes = this.#current().mesh.toBytes(format);
-    return givingAway(bytes, [bytes]);
+    return withTransfer(bytes, [bytes]);
   }
 
   #pyramid(levels: number): LevelView[] {
     const views = levelsOf(this.#image(), levels, this.#window);
-    return givingAway(
+    return withTransfer(
       views,
       views.map(({ voxels }) => voxels),
     );
   }
 
-  #setShade(shade: Shade | undefined): undefined {
-    this.#shade = shade;
+  #setQuantity(quantity: VertexQuantity | undefined): undefined {
+    this.#quantity = quantity;
     if (this.#model && !this.#run) this.#snapshot('checked');
   }
 
   #save(): SavedRun {
     const model = this.#current();
     const state = model.save();
-    return givingAway({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
+    return withTransfer({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
   }
 
   /**
@@ -255,7 +257,7 @@ class Session {
     this.#iteration = iteration;
     this.#reports = [];
     this.#done = done;
-    this.#standStill();
+    this.#reportStopped();
     return { params: { ...model.params }, delta: model.delta };
   }
 
@@ -268,7 +270,7 @@ class Session {
       model.free();
       throw error;
     }
-    this.#survey?.abort.abort();
+    this.#coverageRun?.abort.abort();
     this.#model?.free();
     this.#model = model;
   }
@@ -292,24 +294,24 @@ class Session {
   }
 
   async #coverage(): Promise<MeasuredCoverage | undefined> {
-    await stop(this.#survey);
+    await stop(this.#coverageRun);
     const iteration = this.#iteration;
     const abort = new AbortController();
-    let toldAt = 0;
+    let reportedAt = 0;
     const onProgress = (share: number) => {
-      if (performance.now() - toldAt < TELL_EVERY) return;
-      toldAt = performance.now();
+      if (performance.now() - reportedAt < TELL_EVERY) return;
+      reportedAt = performance.now();
       send({ event: 'covering', share });
     };
-    const work: Work = { abort, ended: this.#current().coverage({ signal: abort.signal, onProgress }) };
-    this.#survey = work;
+    const work: Task = { abort, ended: this.#current().coverage({ signal: abort.signal, onProgress }) };
+    this.#coverageRun = work;
     try {
       return { ...((await work.ended) as Coverage), iteration };
     } catch (error) {
       if (abort.signal.aborted) return undefined;
       throw error;
     } finally {
-      if (this.#survey === work) this.#survey = undefined;
+      if (this.#coverageRun === work) this.#coverageRun = undefined;
     }
   }
 
@@ -317,7 +319,7 @@ class Session {
     await this.#pause();
     const report = this.#current().seed();
     this.#stepped(report);
-    this.#standStill();
+    this.#reportStopped();
     return report.events.seeds;
   }
 
@@ -336,12 +338,12 @@ class Session {
   #snapshot(detail: Detail): void {
     const model = this.#current();
     const { mesh, level } = model;
-    const surface = surfaceIn(this.#free.pop() ?? noArrays(), mesh);
+    const surface = copySurface(this.#free.pop() ?? emptyArrays(), mesh);
     const sections = this.#sections(mesh);
     const measures = detail === 'plain' ? undefined : this.#measure(mesh, detail === 'checked');
     const reports = this.#reports;
     this.#reports = [];
-    if (this.#shade) surface.values = valuesFor(model, this.#shade);
+    if (this.#quantity) surface.values = valuesFor(model, this.#quantity);
     send({ event: 'snapshot', surface, level, sections, reports, ...(measures && { measures }) }, [
       ...transferOf(surface),
       ...buffersOf(sections),
@@ -363,5 +365,5 @@ const session = new Session();
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'return') session.takeBack(data.buffers);
-  else void answer(session.handlers, data);
+  else void reply(session.handlers, data);
 };

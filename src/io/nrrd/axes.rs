@@ -6,7 +6,7 @@
 //! last.
 
 use super::FORMAT;
-use super::axis::{Axis, KINDS, Kind, axes, words};
+use super::axis::{Axis, AxisKind, KINDS, axes, words};
 use super::fields::Fields;
 use super::world::World;
 use crate::io::FormatError;
@@ -31,15 +31,15 @@ impl Axes {
         let axes = axes(fields, &world)?;
         let directions = fields.get("spacedirections");
         let frames = match &directions {
-            Some(field) => undirected(field, &axes)?,
-            None => least_in_space(&axes)?,
+            Some(field) => frame_axis_by_direction(field, &axes)?,
+            None => frame_axis_by_kind(&axes)?,
         };
         let in_space: Vec<&Axis> = in_space(&axes, frames).collect();
         let columns = match directions {
-            Some(_) => with_normals(&in_space),
-            None => spaced(fields, &in_space)?,
+            Some(_) => columns_from_directions(&in_space),
+            None => columns_from_spacings(fields, &in_space)?,
         };
-        let affine = placed(fields, &world, columns)?;
+        let affine = affine_of(fields, &world, columns)?;
         Ok(Self { axes, frames, world, affine, space_units: words(fields, "spaceunits") })
     }
 
@@ -49,7 +49,7 @@ impl Axes {
         for (size, axis) in dims.iter_mut().zip(in_space(&self.axes, self.frames)) {
             *size = axis.size;
         }
-        dims[3] = self.of_frames().map_or(1, |axis| axis.size);
+        dims[3] = self.frame_axis().map_or(1, |axis| axis.size);
         dims
     }
 
@@ -86,12 +86,12 @@ impl Axes {
 
     /// Returns the seconds between frames; 0 if the file does not give the time.
     pub(super) fn frame_seconds(&self) -> f64 {
-        let Some(axis) = self.of_frames().filter(|axis| axis.size > 1) else { return 0.0 };
+        let Some(axis) = self.frame_axis().filter(|axis| axis.size > 1) else { return 0.0 };
         let step = axis.direction.map_or(axis.spacing, |direction| direction.time);
         let unit = if axis.unit.is_empty() { self.space_units.get(3) } else { Some(&axis.unit) };
         let second = match unit.map_or("", String::as_str) {
             // Without a unit, only an axis that is declared as time is in seconds.
-            "" => f64::from(u8::from(axis.kind == Kind::Time || self.world.timed)),
+            "" => f64::from(u8::from(axis.kind == AxisKind::Time || self.world.has_time)),
             unit => seconds(unit).unwrap_or(0.0),
         };
         let apart = step * second;
@@ -99,7 +99,7 @@ impl Axes {
     }
 
     /// Returns the axis that counts frames, if there is one.
-    fn of_frames(&self) -> Option<&Axis> {
+    fn frame_axis(&self) -> Option<&Axis> {
         self.axes.get(self.frames?)
     }
 }
@@ -110,11 +110,11 @@ fn in_space(axes: &[Axis], frames: Option<usize>) -> impl Iterator<Item = &Axis>
 }
 
 /// Returns the index of the axis without a direction in space, which counts frames, if there is one.
-fn undirected(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatError> {
+fn frame_axis_by_direction(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let mut frames = Vec::new();
     for (i, axis) in axes.iter().enumerate() {
         match axis.direction {
-            Some(v) if v.time == 0.0 && axis.kind.is_of_frames() => {
+            Some(v) if v.time == 0.0 && axis.kind.counts_frames() => {
                 let found = format!("list or time for axis {i}, which has a direction in space,");
                 return Err(FormatError::unsupported(FORMAT, "kinds", found, KINDS));
             }
@@ -128,16 +128,16 @@ fn undirected(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatE
     match frames[..] {
         [] if axes.len() <= 3 => Ok(None),
         [one] if axes.len() >= 2 => Ok(Some(one)),
-        _ => Err(field.invalid("one to three axes in space and at most one of frames are needed")),
+        _ => Err(field.invalid("must have one to three spatial axes and at most one frame axis")),
     }
 }
 
 /// Returns the index of the axis that counts frames according to kinds, units and spacings, if there is one; used if
 /// the file has no directions.
-fn least_in_space(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
+fn frame_axis_by_kind(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let signs = |axis: &Axis| (axis.kind, seconds(&axis.unit).is_some(), axis.spacing.is_nan());
     let Some(most) = axes.iter().map(signs).max() else { return Ok(None) };
-    if axes.len() < 4 && !most.0.is_of_frames() && !most.1 {
+    if axes.len() < 4 && !most.0.counts_frames() && !most.1 {
         return Ok(None);
     }
     let alike: Vec<usize> = (0..axes.len()).filter(|&i| signs(&axes[i]) == most).collect();
@@ -145,8 +145,7 @@ fn least_in_space(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
         [one] if axes.len() >= 2 => Ok(Some(one)),
         [.., last] if last >= 1 && last == axes.len() - 1 => Ok(Some(last)),
         _ => {
-            let problem =
-                "which axis is of frames is not clear, or there is no other; 'list' or 'time' says it";
+            let problem = "ambiguous frame axis; mark it as 'list' or 'time'";
             Err(FormatError::invalid(FORMAT, "kinds", problem))
         }
     }
@@ -164,7 +163,7 @@ fn seconds(unit: &str) -> Option<f64> {
 
 /// Returns the columns of the affine from one to three directions; missing axes get unit vectors perpendicular to the
 /// others.
-fn with_normals(axes: &[&Axis]) -> [DVec3; 3] {
+fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
     let directions: Vec<DVec3> = axes.iter().filter_map(|axis| axis.direction).map(|v| v.space).collect();
     match directions[..] {
         [x, y, z] => [x, y, z],
@@ -179,7 +178,7 @@ fn with_normals(axes: &[&Axis]) -> [DVec3; 3] {
 
 /// Returns the columns of the affine for axes parallel to the world's, of the lengths in `spacings`; 1 if missing or
 /// NaN.
-fn spaced(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
+fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     let Some(field) = fields.get("spacings") else {
         return match fields.get("axismaxs") {
             None => Ok([DVec3::X, DVec3::Y, DVec3::Z]),
@@ -194,13 +193,13 @@ fn spaced(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
         *length = axis.spacing;
     }
     if lengths.iter().any(|&l| l == 0.0 || !l.is_finite()) {
-        return Err(field.invalid("finite numbers other than 0 are needed"));
+        return Err(field.invalid("must be finite and not 0"));
     }
     Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
 }
 
 /// Returns the affine from the columns and the file's origin, converted to RAS or LPS.
-fn placed(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
+fn affine_of(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
     let origin = fields.get("spaceorigin").map(|field| world.vector(&field, field.text)).transpose()?;
     let origin = origin.flatten().map(|v| v.space).filter(|v| !v.is_nan()).unwrap_or(DVec3::ZERO);
     let affine = DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), origin);

@@ -7,12 +7,12 @@ use crate::io::FormatError;
 use crate::io::text::Field;
 
 /// Supported kinds of axes, listed in error messages.
-pub(super) const KINDS: &str = "domain or space for axes in space, list or time for one of frames";
+pub(super) const KINDS: &str = "domain or space for axes in space, list or time for the frame axis";
 
 /// One axis of an NRRD, as described by the header.
 pub(super) struct Axis {
     pub(super) size: usize,
-    pub(super) kind: Kind,
+    pub(super) kind: AxisKind,
     /// NaN if it is unknown.
     pub(super) spacing: f64,
     /// Empty if the header gives none.
@@ -22,7 +22,7 @@ pub(super) struct Axis {
 
 /// Kind of an axis, in ascending order of how unlikely it is to be spatial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Kind {
+pub(super) enum AxisKind {
     Space,
     Domain,
     Unknown,
@@ -30,10 +30,10 @@ pub(super) enum Kind {
     Time,
 }
 
-impl Kind {
+impl AxisKind {
     /// Returns whether an axis of this kind counts frames, so that it cannot be spatial.
-    pub(super) fn is_of_frames(self) -> bool {
-        self >= Kind::List
+    pub(super) fn counts_frames(self) -> bool {
+        self >= AxisKind::List
     }
 }
 
@@ -70,31 +70,31 @@ pub(super) fn words(fields: &Fields, key: &'static str) -> Vec<String> {
 }
 
 /// Returns the kind of each axis; an error if one holds the components of a voxel, or if two count frames.
-fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<Kind>, FormatError> {
-    let Some(field) = fields.get("kinds") else { return Ok(vec![Kind::Unknown; sizes.len()]) };
+fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<AxisKind>, FormatError> {
+    let Some(field) = fields.get("kinds") else { return Ok(vec![AxisKind::Unknown; sizes.len()]) };
     let words: Vec<&str> = field.text.split_whitespace().collect();
     if words.len() != sizes.len() {
-        return Err(field.invalid(&format!("{} kinds are needed", sizes.len())));
+        return Err(field.invalid(&format!("must have {} kinds", sizes.len())));
     }
-    let kinds: Result<Vec<Kind>, _> =
+    let kinds: Result<Vec<AxisKind>, _> =
         words.iter().zip(sizes).enumerate().map(|(axis, (word, &size))| kind(axis, word, size)).collect();
     let kinds = kinds?;
-    if kinds.iter().filter(|kind| kind.is_of_frames()).count() > 1 {
-        return Err(field.invalid("at most one axis of frames can be read"));
+    if kinds.iter().filter(|kind| kind.counts_frames()).count() > 1 {
+        return Err(field.invalid("at most one axis may count frames"));
     }
     Ok(kinds)
 }
 
 /// Returns the kind that a word of the header names.
-fn kind(axis: usize, word: &str, size: usize) -> Result<Kind, FormatError> {
+fn kind(axis: usize, word: &str, size: usize) -> Result<AxisKind, FormatError> {
     match word.to_ascii_lowercase().as_str() {
-        "space" => Ok(Kind::Space),
-        "domain" => Ok(Kind::Domain),
-        "none" | "???" | "unknown" => Ok(Kind::Unknown),
-        "list" => Ok(Kind::List),
+        "space" => Ok(AxisKind::Space),
+        "domain" => Ok(AxisKind::Domain),
+        "none" | "???" | "unknown" => Ok(AxisKind::Unknown),
+        "list" => Ok(AxisKind::List),
         // A placeholder for an axis with a single frame.
-        "stub" | "scalar" if size == 1 => Ok(Kind::List),
-        "time" => Ok(Kind::Time),
+        "stub" | "scalar" if size == 1 => Ok(AxisKind::List),
+        "time" => Ok(AxisKind::Time),
         _ => {
             let found = format!("'{word}' for axis {axis}, more than one number per voxel,");
             Err(FormatError::unsupported(FORMAT, "kinds", found, KINDS))
@@ -103,14 +103,18 @@ fn kind(axis: usize, word: &str, size: usize) -> Result<Kind, FormatError> {
 }
 
 /// Returns the direction of each axis, `None` for an axis without one; an empty list if the file has no directions.
-fn directions(fields: &Fields, world: &World, kinds: &[Kind]) -> Result<Vec<Option<Vector>>, FormatError> {
+fn directions(
+    fields: &Fields,
+    world: &World,
+    kinds: &[AxisKind],
+) -> Result<Vec<Option<Vector>>, FormatError> {
     let Some(field) = fields.get("spacedirections") else { return Ok(Vec::new()) };
     let vectors = vectors(&field, world)?;
     if vectors.len() != kinds.len() {
-        return Err(field.invalid(&format!("{} entries are needed", kinds.len())));
+        return Err(field.invalid(&format!("must have {} entries", kinds.len())));
     }
-    let stated = |(vector, &kind): (Option<Vector>, &Kind)| {
-        let none = |v: &Vector| v.is_unknown() || v.is_zero() && means_none(kind, kinds.len());
+    let stated = |(vector, &kind): (Option<Vector>, &AxisKind)| {
+        let none = |v: &Vector| v.is_unknown() || v.is_zero() && zero_means_none(kind, kinds.len());
         vector.filter(|v| !none(v))
     };
     Ok(vectors.into_iter().zip(kinds).map(stated).collect())
@@ -118,8 +122,8 @@ fn directions(fields: &Fields, world: &World, kinds: &[Kind]) -> Result<Vec<Opti
 
 /// Returns whether a zero direction means that an axis is not spatial. With three axes it may also mean that the
 /// distance of the slices was unknown; such a file has no position in world space.
-fn means_none(kind: Kind, rank: usize) -> bool {
-    kind.is_of_frames() || rank == 4 && kind != Kind::Space
+fn zero_means_none(kind: AxisKind, rank: usize) -> bool {
+    kind.counts_frames() || rank == 4 && kind != AxisKind::Space
 }
 
 /// Reads the vectors of a field, `None` for each `none`.

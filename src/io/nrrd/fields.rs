@@ -81,7 +81,7 @@ impl Fields {
                 return Err(FormatError::invalid(
                     FORMAT,
                     "header",
-                    format!("'{shown}' is no 'field: value' line"),
+                    format!("'{shown}' is not a 'field: value' line"),
                 ));
             }
         };

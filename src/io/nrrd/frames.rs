@@ -9,21 +9,21 @@ use crate::volume::Voxels;
 ///
 /// # Errors
 /// [`FormatError::TooLarge`] if there is not enough memory.
-pub(super) fn one_after_the_other(voxels: Voxels, run: usize, frames: usize) -> Result<Voxels, FormatError> {
+pub(super) fn deinterleave_frames(voxels: Voxels, run: usize, frames: usize) -> Result<Voxels, FormatError> {
     if run * frames == voxels.len() {
         return Ok(voxels);
     }
     macro_rules! of_each_type {
         ($($kind:ident),+) => {
             match voxels {
-                $(Voxels::$kind(values) => Voxels::$kind(separated(&values, run, frames)?),)+
+                $(Voxels::$kind(values) => Voxels::$kind(deinterleaved(&values, run, frames)?),)+
             }
         };
     }
     Ok(of_each_type!(U8, I8, U16, I16, U32, I32, F32, F64))
 }
 
-fn separated<T: Copy>(values: &[T], run: usize, frames: usize) -> Result<Vec<T>, FormatError> {
+fn deinterleaved<T: Copy>(values: &[T], run: usize, frames: usize) -> Result<Vec<T>, FormatError> {
     let mut out = Vec::new();
     let too_large = |_| FormatError::too_large(DATA.format, DATA.field, size_of_val(values) as u64);
     out.try_reserve_exact(values.len()).map_err(too_large)?;
@@ -55,7 +55,7 @@ mod tests {
     fn frames_wherever_their_axis_was() {
         let expected: Vec<u8> = (0..24).map(|i| (10 * (i % 6) + i / 6) as u8).collect();
         for run in [1, 2, 6] {
-            let found = one_after_the_other(Voxels::U8(alternating(run)), run, 4);
+            let found = deinterleave_frames(Voxels::U8(alternating(run)), run, 4);
             assert_eq!(found, Ok(Voxels::U8(expected.clone())), "{run} in a row");
         }
     }
@@ -63,8 +63,8 @@ mod tests {
     #[test]
     fn numbers_keep_their_type() {
         let numbers = Voxels::F64(vec![0.5, 1.5, 2.5, 3.5]);
-        assert_eq!(one_after_the_other(numbers, 1, 2), Ok(Voxels::F64(vec![0.5, 2.5, 1.5, 3.5])));
+        assert_eq!(deinterleave_frames(numbers, 1, 2), Ok(Voxels::F64(vec![0.5, 2.5, 1.5, 3.5])));
         let still = Voxels::I16(vec![-1, 2, -3]);
-        assert_eq!(one_after_the_other(still.clone(), 3, 1), Ok(still));
+        assert_eq!(deinterleave_frames(still.clone(), 3, 1), Ok(still));
     }
 }

@@ -17,16 +17,16 @@ mod world;
 
 use super::FormatError;
 use super::gzip::gunzip;
-use super::raw::{Place, SLACK, Scalar, decode, decode_text, exact, payload_size, refused};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
 use super::text::{Field, Lines};
 use crate::math::DAffine3;
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 use axes::Axes;
 use fields::Fields;
-use frames::one_after_the_other;
+use frames::deinterleave_frames;
 
 const FORMAT: &str = "NRRD";
-const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 
 /// Returns whether the bytes start with the signature of NRRD, to detect the format.
 pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
         (None, _) => lines.rest(),
         (Some(_), Some(payload)) => payload,
         (Some(file), None) => {
-            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
         }
     };
     header.volume(source)
@@ -103,7 +103,7 @@ impl Header {
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let voxels = self.voxels(self.after_lines(source)?)?;
         let volume = Volume::new(VolumeInit {
-            voxels: one_after_the_other(voxels, self.run, self.dims[3])?,
+            voxels: deinterleave_frames(voxels, self.run, self.dims[3])?,
             dims: self.dims,
             affine: self.affine,
             slope: 1.0,
@@ -111,7 +111,7 @@ impl Header {
             frame_seconds: self.frame_seconds,
             space: self.space,
         });
-        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
     /// Returns the bytes after the lines to skip.
@@ -120,7 +120,7 @@ impl Header {
         for _ in 0..self.line_skip {
             let end = rest.iter().position(|&b| b == b'\n');
             let end =
-                end.ok_or_else(|| FormatError::invalid(FORMAT, "line skip", "fewer lines than that"))?;
+                end.ok_or_else(|| FormatError::invalid(FORMAT, "line skip", "more lines than the file has"))?;
             rest = &rest[end + 1..];
         }
         Ok(rest)
@@ -133,7 +133,7 @@ impl Header {
         match self.encoding {
             Encoding::Raw => self.binary(source, size),
             Encoding::Gzip => {
-                let limit = size.saturating_add(self.byte_skip.unwrap_or(0)).saturating_add(SLACK);
+                let limit = size.saturating_add(self.byte_skip.unwrap_or(0)).saturating_add(MAX_PADDING);
                 self.binary(&gunzip(FORMAT, source, limit)?, size)
             }
             Encoding::Hex => self.binary(&unhex(self.after_bytes(source, size)?, size)?, size),
@@ -144,7 +144,7 @@ impl Header {
     /// Decodes binary voxels; `size` is their number of bytes.
     fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
         let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
-        decode(DATA, exact(DATA, skipped, size)?, self.scalar, self.big)
+        decode(DATA, payload(DATA, skipped, size)?, self.scalar, self.big)
     }
 
     /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
@@ -206,7 +206,7 @@ fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<boo
     match field.text.to_ascii_lowercase().as_str() {
         "big" => Ok(true),
         "little" => Ok(false),
-        _ => Err(field.invalid("'big' or 'little' is needed")),
+        _ => Err(field.invalid("must be 'big' or 'little'")),
     }
 }
 
@@ -215,13 +215,13 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
     let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
     match field.integer(-1)? {
         -1 if encoding == Encoding::Raw => Ok(None),
-        -1 => Err(field.invalid("-1 goes with encoding raw only")),
+        -1 => Err(field.invalid("-1 is only valid with encoding raw")),
         _ => Ok(Some(field.offset()?)),
     }
 }
 
 /// Decodes pairs of hexadecimal digits to bytes, ignoring whitespace; an error if there are more than `size` plus
-/// [`SLACK`].
+/// [`MAX_PADDING`].
 fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
     let digits = text.iter().filter(|b| !b.is_ascii_whitespace());
     let mut out = Vec::new();
@@ -231,14 +231,14 @@ fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
             return Err(FormatError::invalid(
                 FORMAT,
                 "voxel data",
-                "a character that is no hexadecimal digit",
+                "contains a character that is not a hexadecimal digit",
             ));
         };
         match high.take() {
             None => high = Some(value as u8),
             Some(first) => out.push(first << 4 | value as u8),
         }
-        if out.len() > size.saturating_add(SLACK) {
+        if out.len() > size.saturating_add(MAX_PADDING) {
             return Err(FormatError::invalid(
                 FORMAT,
                 "voxel data",

@@ -16,7 +16,7 @@ pub(super) struct World {
     /// Whether the sign of x must be flipped to convert to `space`.
     pub(super) flip_x: bool,
     /// Whether its name declares time as fourth dimension.
-    pub(super) timed: bool,
+    pub(super) has_time: bool,
     /// Number of components of a vector, if the header gives it.
     dimension: Option<usize>,
 }
@@ -32,10 +32,10 @@ impl World {
     /// Reads the world space from the header; RAS if it names none.
     pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
         match fields.get("space") {
-            Some(field) => named(&field),
+            Some(field) => parse_space(&field),
             None => {
                 let dimension = fields.get("spacedimension").map(|field| dimension(&field)).transpose()?;
-                Ok(Self { space: Space::Ras, flip_x: false, timed: false, dimension })
+                Ok(Self { space: Space::Ras, flip_x: false, has_time: false, dimension })
             }
         }
     }
@@ -49,9 +49,9 @@ impl World {
         let inner = text.strip_prefix('(').and_then(|t| t.strip_suffix(')'));
         let numbers: Option<Vec<f64>> =
             inner.and_then(|t| t.split(',').map(|word| word.trim().parse().ok()).collect());
-        let numbers = numbers.ok_or_else(|| field.invalid("vectors like (1,0,0) are needed"))?;
+        let numbers = numbers.ok_or_else(|| field.invalid("must be vectors such as (1,0,0)"))?;
         if self.dimension.is_some_and(|n| n != numbers.len()) {
-            return Err(field.invalid("vectors of as many numbers as the space has dimensions are needed"));
+            return Err(field.invalid("vectors must have as many numbers as the space has dimensions"));
         }
         match numbers[..] {
             [x, y] => Ok(Some(Vector { space: DVec3::new(x, y, 0.0), time: 0.0 })),
@@ -77,7 +77,7 @@ impl Vector {
 }
 
 /// Returns the space with a name, which may have spaces or nothing instead of hyphens, or be abbreviated like RAST.
-fn named(field: &Field<'_>) -> Result<World, FormatError> {
+fn parse_space(field: &Field<'_>) -> Result<World, FormatError> {
     let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
     let name: String = letters.flat_map(char::to_lowercase).collect();
     let untimed = name.strip_suffix("time").or_else(|| name.strip_suffix('t'));
@@ -91,8 +91,8 @@ fn named(field: &Field<'_>) -> Result<World, FormatError> {
             return Err(FormatError::unsupported(FORMAT, "space", found, SPACES));
         }
     };
-    let timed = untimed.is_some();
-    Ok(World { space, flip_x, timed, dimension: Some(if timed { 4 } else { 3 }) })
+    let has_time = untimed.is_some();
+    Ok(World { space, flip_x, has_time, dimension: Some(if has_time { 4 } else { 3 }) })
 }
 
 /// Returns the dimension of the space, 2 to 4.
@@ -115,7 +115,8 @@ mod tests {
 
     #[test]
     fn names_in_all_their_spellings() {
-        let facts = |text| named(&field("space", text)).map(|w| (w.space, w.flip_x, w.timed)).unwrap();
+        let facts =
+            |text| parse_space(&field("space", text)).map(|w| (w.space, w.flip_x, w.has_time)).unwrap();
         for text in ["right-anterior-superior", "Right Anterior Superior", "rightanteriorsuperior", "RAS"] {
             assert_eq!(facts(text), (Space::Ras, false, false), "{text}");
         }
@@ -127,24 +128,24 @@ mod tests {
             assert_eq!(facts(text), (Space::Ras, false, true), "{text}");
         }
         for text in ["", "time", "t", "left", "superior-anterior-right"] {
-            assert!(named(&field("space", text)).is_err(), "{text}");
+            assert!(parse_space(&field("space", text)).is_err(), "{text}");
         }
     }
 
     #[test]
     fn vectors_have_the_dimension_of_the_space() {
         let read = |world: &World, text| world.vector(&field("space origin", text), text);
-        let timed = named(&field("space", "RAST")).unwrap();
+        let has_time = parse_space(&field("space", "RAST")).unwrap();
         let found = Vector { space: DVec3::new(1.0, 2.0, -3.0), time: 0.5 };
-        assert_eq!(read(&timed, "( 1, 2,-3e0, .5 )"), Ok(Some(found)));
-        assert_eq!(read(&timed, "none"), Ok(None));
-        let still = named(&field("space", "RAS")).unwrap();
+        assert_eq!(read(&has_time, "( 1, 2,-3e0, .5 )"), Ok(Some(found)));
+        assert_eq!(read(&has_time, "none"), Ok(None));
+        let still = parse_space(&field("space", "RAS")).unwrap();
         for (world, text) in
-            [(&timed, "(1,2,3)"), (&still, "(1,2,3,4)"), (&still, "(1,2)"), (&still, "(1,,3)")]
+            [(&has_time, "(1,2,3)"), (&still, "(1,2,3,4)"), (&still, "(1,2)"), (&still, "(1,,3)")]
         {
             assert!(read(world, text).is_err(), "{text}");
         }
-        let unknown = World { space: Space::Ras, flip_x: false, timed: false, dimension: None };
+        let unknown = World { space: Space::Ras, flip_x: false, has_time: false, dimension: None };
         for (text, fits) in [("(1)", false), ("(1,2)", true), ("(1,2,3,4)", true), ("(1,2,3,4,5)", false)] {
             assert_eq!(read(&unknown, text).is_ok(), fits, "{text}");
         }

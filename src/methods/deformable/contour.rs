@@ -67,7 +67,7 @@ pub(super) fn contour(
             marching_cubes(&Grid { dims: grid.dims, values }, -iso)?
         }
     };
-    Ok(placed(surface, position).without_parts_below(smallest_part))
+    Ok(placed(surface, position).without_components_below(smallest_part))
 }
 
 /// Simplifies a contour by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are

@@ -153,7 +153,7 @@ impl CoverageSurvey {
             triangles: uncovered.map(|(triangle, _)| *triangle).collect(),
             ..TriangleMesh::default()
         };
-        let part_of = rest.part_of_each_vertex();
+        let part_of = rest.component_of_each_vertex();
         let mut sums = vec![(DVec3::ZERO, 0.0); rest.positions.len()];
         let area_and_middle = |corners: [Vec3; 3]| {
             let [a, b, c] = corners.map(|p| self.to_world.transform_point3(p.as_dvec3()));

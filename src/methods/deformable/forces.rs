@@ -5,7 +5,7 @@ use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator, RestLength};
 use crate::math::{Mat3, Vec3};
 use crate::mesh::{Ring, VertexId};
-use crate::volume::KnownCell;
+use crate::volume::CellCache;
 
 /// The speed along the normal, in δ per unit of time, above which the tangential part of rigidity acts in full.
 ///
@@ -101,7 +101,7 @@ pub(super) struct Forces {
     /// to it.
     pub(super) slope: Vec<f32>,
     /// The image cell around each vertex at its last sample.
-    cells: Vec<KnownCell>,
+    cells: Vec<CellCache>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
     /// The time spent on force evaluation and not yet reported, in milliseconds.
@@ -111,7 +111,7 @@ pub(super) struct Forces {
 impl Forces {
     /// Discards the cached image cells, since the image changes.
     pub(super) fn forget_image(&mut self) {
-        self.cells.fill(KnownCell::default());
+        self.cells.fill(CellCache::default());
     }
 
     /// Computes normals and L of some vertices.
@@ -120,7 +120,7 @@ impl Forces {
         self.normal.resize(rings.len(), Vec3::ZERO);
         self.force.resize(rings.len(), Vec3::ZERO);
         self.slope.resize(rings.len(), 0.0);
-        self.cells.resize(rings.len(), KnownCell::default());
+        self.cells.resize(rings.len(), CellCache::default());
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
             let Some(&last) = ring.as_slice().last() else { continue };
@@ -208,7 +208,7 @@ impl Forces {
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
-        let at = |p| image.intensity(p, scale.background, &mut KnownCell::default());
+        let at = |p| image.intensity(p, scale.background, &mut CellCache::default());
         (at(x + half) - at(x - half)).abs()
     }
 

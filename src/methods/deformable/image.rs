@@ -5,7 +5,7 @@
 
 use crate::math::Vec3;
 use crate::methods::MethodError;
-use crate::volume::{Grid, KnownCell, VectorGrid, Volume};
+use crate::volume::{CellCache, Grid, VectorGrid, Volume};
 
 /// The reduction factor ρ of the pyramid, which belongs to √3 refinement (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
@@ -37,7 +37,7 @@ impl LevelImage {
     /// Returns Π, the trilinearly interpolated intensity in 0..1, and `background` outside the image, so that every
     /// object ends at its border. `known` caches the image cell of the last call for the same vertex.
     #[inline]
-    pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut KnownCell) -> f32 {
+    pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
         self.grid.sample_padded(self.index(p), background, known)
     }
 

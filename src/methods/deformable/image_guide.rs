@@ -10,7 +10,7 @@ use super::image::LevelImage;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{TopologyGuide, Unguided};
-use crate::volume::KnownCell;
+use crate::volume::CellCache;
 
 /// The positions of the image samples between two vertices in contact, as shares of the distance.
 const SAMPLES: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
@@ -42,7 +42,7 @@ impl<'a> ImageGuide<'a> {
     }
 
     fn depth(&self, p: Vec3) -> f32 {
-        let intensity = self.image.intensity(p, self.object.background(), &mut KnownCell::default());
+        let intensity = self.image.intensity(p, self.object.background(), &mut CellCache::default());
         self.object.depth(intensity, self.iso)
     }
 

@@ -240,7 +240,7 @@ impl DeformableModel {
             image_force_factor: 1.0,
             mesh,
             keys,
-            resolver: Resolver::with_room_for(domain.most_vertices(delta_at(finest_delta, 0))),
+            resolver: Resolver::with_max_vertices(domain.most_vertices(delta_at(finest_delta, 0))),
             motion: Motion::default(),
             iteration: 0,
             convergence: Convergence::default(),
@@ -316,7 +316,7 @@ impl DeformableModel {
         let (clock, mut embedding) = (self.clock, 0.0);
         let displace = |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
             let begin = clock();
-            let held = self.resolver.carry_some(mesh, Sampling::new(delta), moving, displacements);
+            let held = self.resolver.move_some(mesh, Sampling::new(delta), moving, displacements);
             embedding = clock() - begin;
             held
         };
@@ -387,8 +387,8 @@ impl DeformableModel {
 
     fn reorder(&mut self) {
         let names = self.mesh.reorder();
-        let waiting = self.resolver.waiting().renamed(&names);
-        self.resolver.set_waiting(waiting);
+        let waiting = self.resolver.pending().renumbered(&names);
+        self.resolver.set_pending(waiting);
     }
 
     fn count_components(&mut self, changes: Changes) {

@@ -7,7 +7,7 @@
 
 use super::contour::{ObjectIs, contour, simplified};
 use super::{DeformableModel, Topology};
-use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
+use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
@@ -58,16 +58,16 @@ impl DeformableModel {
         let surface = self.mesh.to_triangles();
         let tree = TriangleTree::new(&surface)?;
         let (part_of_contour, part_of_surface) =
-            (contour.part_of_each_vertex(), surface.part_of_each_vertex());
+            (contour.component_of_each_vertex(), surface.component_of_each_vertex());
         let first = contour.positions.len();
-        let mut groups = Groups::new(first + surface.positions.len());
+        let mut groups = DisjointSets::new(first + surface.positions.len());
         let mut is_left_out = vec![false; first];
         let mut near = Vec::new();
         let label = |t: u32| part_of_surface[surface.triangles[t as usize][0] as usize];
         for (&p, &part) in contour.positions.iter().zip(&part_of_contour) {
             tree.labels_within(p, f64::from(covered_distance), label, &mut near);
             is_left_out[part as usize] |= near.is_empty();
-            near.iter().for_each(|&other| groups.join(part as usize, first + other as usize));
+            near.iter().for_each(|&other| groups.union(part as usize, first + other as usize));
         }
         let mut is_renewed = vec![false; first + surface.positions.len()];
         let mut has_contour = is_renewed.clone();
@@ -76,7 +76,8 @@ impl DeformableModel {
             has_contour[group] = true;
             is_renewed[group] |= is_left_out[part as usize];
         }
-        let added = contour.parts_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
+        let added =
+            contour.components_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
         // A component near no contour would be inside of a new component, or around it.
         let mut is_removed = |v: usize| {
             let group = groups.find(first + v);

@@ -153,7 +153,7 @@ impl DeformableModel {
         let mut changes = self.restore_bounds(&all, times);
         let sampling = self.sampling();
         let guide = image_guide::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
-        changes.vanished += self.resolver.sweep(&mut self.mesh, sampling, &*guide);
+        changes.vanished += self.resolver.remove_negligible(&mut self.mesh, sampling, &*guide);
         drop(guide);
         self.mark_checked();
         changes
@@ -183,12 +183,12 @@ impl DeformableModel {
     /// Tries [`Self::descend_renewed`] and returns whether it succeeded; if not, mesh, level and pending vertices are
     /// restored.
     fn try_to_renew(&mut self, renewal: &Renewal) -> bool {
-        let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.waiting());
+        let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.pending());
         let is_renewed = self.descend_renewed(renewal).is_ok();
         if !is_renewed {
             let failed = std::mem::replace(&mut self.mesh, coarse);
-            self.mesh.count_on_from(&failed);
-            self.resolver.set_waiting(waiting);
+            self.mesh.advance_versions_past(&failed);
+            self.resolver.set_pending(waiting);
             self.level = level;
         }
         is_renewed
@@ -219,7 +219,7 @@ impl DeformableModel {
 
     fn refine(&mut self) -> Result<(), MethodError> {
         if self.params.topology == Topology::Adaptive {
-            let most = self.resolver.most_vertices();
+            let most = self.resolver.max_vertices();
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
                 return Err(MethodError::TooManyVertices { most });
             }

@@ -10,7 +10,7 @@ use super::coverage::Missing;
 use super::image::LevelImage;
 use super::{DeformableModel, Topology};
 use crate::math::Vec3;
-use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
+use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
@@ -79,7 +79,7 @@ impl DeformableModel {
     pub(super) fn add_components(&mut self, parts: &Mesh) -> Result<(Changes, Vec<VertexId>), MethodError> {
         self.check_vertex_limit(parts)?;
         let sampling = self.sampling();
-        let guard = self.resolver.guard(&self.mesh, sampling);
+        let guard = self.resolver.embedding(&self.mesh, sampling);
         let (mut added, crossing) = guard.append(&mut self.mesh, parts)?;
         let mut count = parts.component_count();
         let mut is_new = vec![false; self.mesh.slots()];
@@ -100,7 +100,7 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::TooManyVertices`].
     pub(super) fn check_vertex_limit(&self, parts: &Mesh) -> Result<(), MethodError> {
-        let most = self.resolver.most_vertices();
+        let most = self.resolver.max_vertices();
         let fits = self.mesh.vertex_count() + parts.vertex_count() <= most;
         if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
     }
@@ -170,7 +170,7 @@ impl Comparison<'_> {
         if kind == Missing::Cavity {
             parts.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        Ok(parts.without_parts_below(smallest))
+        Ok(parts.without_components_below(smallest))
     }
 
     /// Whether the contour assigns a voxel to the object if matter is missing, or to the background if cavities are.
@@ -186,7 +186,7 @@ impl Comparison<'_> {
         }
         let dims = self.image.grid().0.dims;
         let mut cells = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
-        missing.iter().for_each(|&voxel| cells.add(coordinates(dims, voxel)));
+        missing.iter().for_each(|&voxel| cells.insert_around(coordinates(dims, voxel)));
         let tree = TriangleTree::new(&self.surface_near(&cells))?;
         missing.retain(|&voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE));
         Ok(missing)
@@ -338,7 +338,7 @@ fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) 
 
 /// Groups voxels, given in order, into clusters connected over faces, edges or corners; each is in order.
 fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
-    let mut groups = Groups::new(voxels.len());
+    let mut groups = DisjointSets::new(voxels.len());
     for (i, &voxel) in voxels.iter().enumerate() {
         let at = indices(dims, voxel);
         // The 13 neighbours that come before it.
@@ -348,7 +348,7 @@ fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
             if (0..3).all(|axis| neighbour[axis] < dims[axis]) {
                 let other = neighbour[0] + dims[0] * (neighbour[1] + dims[1] * neighbour[2]);
                 if let Ok(j) = voxels[..i].binary_search(&other) {
-                    groups.join(i, j);
+                    groups.union(i, j);
                 }
             }
         }

@@ -11,7 +11,7 @@ use super::contour::ObjectIs;
 use crate::math::Vec3;
 use crate::mesh::VertexId;
 use crate::remesh::Sampling;
-use crate::volume::KnownCell;
+use crate::volume::CellCache;
 
 /// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many
 /// vertices as marching cubes; with 0.5, small features are sampled no better than without sizes.
@@ -102,7 +102,7 @@ impl DeformableModel {
     /// Returns the difference between the intensity at a point and the iso value, positive in the object.
     fn depth(&self, p: Vec3) -> f32 {
         let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
-        object.depth(image.intensity(p, object.background(), &mut KnownCell::default()), self.level_iso)
+        object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
     }
 
     fn bound_gradation(&self, members: &[VertexId], sizes: &mut [f32]) {

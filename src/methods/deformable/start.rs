@@ -5,10 +5,10 @@ use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
 use super::{DeformableModel, image_guide};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
-use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided, Waiting};
+use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
@@ -117,7 +117,10 @@ impl Start {
         };
         let mut resolver = resolve_all(&mut mesh, context.most_vertices(), context.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
-            return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
+            return Err(MeshError::SelfIntersecting {
+                pairs: count_self_intersections(&mesh.to_triangles()),
+            }
+            .into());
         }
         Ok(mesh)
     }
@@ -138,27 +141,27 @@ impl DeformableModel {
         let mut tested = CellSet::new(TESTED_CELL * self.sampling().longest());
         let mut runs = 0;
         loop {
-            self.resolver.test_in((runs < MAX_RUNS).then(|| tested.clone()));
+            self.resolver.set_tested_cells((runs < MAX_RUNS).then(|| tested.clone()));
             let resolved = self.resolve_sized();
             // Later calls have no contour to return to, so all their edits are tested, also after an error.
-            self.resolver.test_in(None);
+            self.resolver.set_tested_cells(None);
             resolved?;
             let sampling = self.sampling();
-            let guard = self.resolver.guard(&self.mesh, sampling);
-            let crossing = guard.crossing(&self.mesh);
+            let guard = self.resolver.embedding(&self.mesh, sampling);
+            let crossing = guard.intersecting_vertices(&self.mesh);
             if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
                 self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
             }
             if runs == MAX_RUNS {
-                let pairs = count_crossings(&self.mesh.to_triangles());
+                let pairs = count_self_intersections(&self.mesh.to_triangles());
                 return Err(MeshError::SelfIntersecting { pairs }.into());
             }
             runs += 1;
-            crossing.into_iter().for_each(|v| tested.add(self.mesh.position(v)));
+            crossing.into_iter().for_each(|v| tested.insert_around(self.mesh.position(v)));
             let intersecting = std::mem::replace(&mut self.mesh, contour.clone());
-            self.mesh.count_on_from(&intersecting);
-            self.resolver.set_waiting(Waiting::default());
+            self.mesh.advance_versions_past(&intersecting);
+            self.resolver.set_pending(Pending::default());
             self.convergence.sized = false;
         }
     }
@@ -187,7 +190,7 @@ fn resolve_all(
     sampling: Sampling,
     guide: &dyn TopologyGuide,
 ) -> Result<Resolver, MethodError> {
-    let mut resolver = Resolver::with_room_for(most_vertices);
+    let mut resolver = Resolver::with_max_vertices(most_vertices);
     resolve_with(&mut resolver, mesh, sampling, guide)?;
     Ok(resolver)
 }
@@ -200,7 +203,7 @@ fn resolve_with(
 ) -> Result<(), MethodError> {
     resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
     for _ in 0..MAX_CALLS {
-        if !resolver.is_waiting() {
+        if !resolver.has_pending_edges() {
             break;
         }
         resolver.resolve_guided(mesh, sampling, &[], guide);
@@ -208,7 +211,7 @@ fn resolve_with(
     if let Some(most) = resolver.take_overflow() {
         return Err(MethodError::TooManyVertices { most });
     }
-    resolver.sweep(mesh, sampling, guide);
+    resolver.remove_negligible(mesh, sampling, guide);
     Ok(())
 }
 
@@ -248,7 +251,7 @@ fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
 /// box; `None` if there is no object.
 fn around_object(context: &StartContext) -> Option<(Vec3, Vec3)> {
     let ends = context.image.ends_of_rows(context.brighter_than?);
-    let Bounds { min, max } = Bounds::of(&ends);
+    let Bounds { min, max } = Bounds::from_points(&ends);
     if ends.is_empty() {
         return None;
     }
@@ -300,7 +303,7 @@ fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<M
         return Err(MethodError::invalid("start.seeds", problem));
     }
     let ball = world_ball(context, radius)?;
-    let ball_bounds = Bounds::of(ball.positions());
+    let ball_bounds = Bounds::from_points(ball.positions());
     let domain_bounds = context.domain.bounds;
     let centres: Vec<Vec3> =
         points.iter().map(|p| context.from_world.transform_point3(*p).as_vec3()).collect();

@@ -7,7 +7,7 @@ use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, encode};
-use crate::remesh::{Resolver, Waiting};
+use crate::remesh::{Pending, Resolver};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ struct State {
     finest_delta: f64,
     level: usize,
     mesh: Mesh,
-    waiting: Waiting,
+    waiting: Pending,
     iteration: u32,
     convergence: Convergence,
     energy: f64,
@@ -41,7 +41,7 @@ impl DeformableModel {
             finest_delta: self.finest_delta,
             level: self.level,
             mesh: self.mesh.clone(),
-            waiting: self.resolver.waiting(),
+            waiting: self.resolver.pending(),
             iteration: self.iteration,
             convergence: self.convergence,
             energy: self.speed.energy,
@@ -86,7 +86,7 @@ impl DeformableModel {
         if let Some(v) = state.mesh.vertices().find(lost) {
             return bad("mesh", format!("{v:?} is outside the image's domain"));
         }
-        let named = state.waiting.queue.iter().chain(&state.waiting.stirred);
+        let named = state.waiting.queue.iter().chain(&state.waiting.dirty);
         if let Some(v) = named.into_iter().find(|v| v.index() >= state.mesh.slots()) {
             return bad("queue", format!("{v:?} does not exist"));
         }
@@ -107,10 +107,11 @@ impl DeformableModel {
         next.level = state.level;
         next.domain = self.domain_for(state.finest_delta);
         next.mesh = state.mesh;
-        next.mesh.count_on_from(&self.mesh);
-        next.resolver = Resolver::with_room_for(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
+        next.mesh.advance_versions_past(&self.mesh);
+        next.resolver =
+            Resolver::with_max_vertices(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
         next.watch_output();
-        next.resolver.set_waiting(state.waiting);
+        next.resolver.set_pending(state.waiting);
         next.iteration = state.iteration;
         next.convergence = state.convergence;
         next.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };

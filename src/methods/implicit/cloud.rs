@@ -164,7 +164,7 @@ pub struct BoxMap {
 impl BoxMap {
     /// Returns the map that puts the bounding box of `points`, which must not all be equal, into the normalised box.
     pub fn of(points: &[Vec3]) -> Self {
-        let bounds = Bounds::of(points);
+        let bounds = Bounds::from_points(points);
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
     }
@@ -300,7 +300,7 @@ pub mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn unit(random: &mut Random) -> f32 {
-        random.bits() as f32 / 2_147_483_648.0 - 1.0
+        random.next_u32() as f32 / 2_147_483_648.0 - 1.0
     }
 
     /// Returns random points on the unit sphere.
@@ -322,7 +322,7 @@ pub mod tests {
                 .collect();
             let map = BoxMap::of(&points);
             let inside: Vec<Vec3> = points.iter().map(|&p| map.in_box(p)).collect();
-            let bounds = Bounds::of(&inside);
+            let bounds = Bounds::from_points(&inside);
             assert!((bounds.max - bounds.min).max_element() <= 2.0 + 1e-6 && bounds.max.x >= 1.0 - 1e-6);
             for (p, q) in points.iter().zip(&inside) {
                 let back = map.in_world(map.in_box_exactly(p.as_dvec3()));

@@ -153,7 +153,7 @@ const GRAZING: f32 = 0.2;
 
 /// Returns points spread evenly on a sphere around the bounding box of `points`, along a spiral.
 fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
-    let bounds = Bounds::of(points);
+    let bounds = Bounds::from_points(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
     let radius = 0.5 * SPHERE * max.distance(min);
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -184,7 +184,7 @@ struct OccupancyGrid {
 
 impl OccupancyGrid {
     fn new(points: &[Vec3], edge: f32) -> Self {
-        let bounds = Bounds::of(points);
+        let bounds = Bounds::from_points(points);
         let size = bounds.max - bounds.min;
         let least = size.max_element() / MAX_VOXELS;
         let edge = if edge > least { edge } else { least };

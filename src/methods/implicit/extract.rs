@@ -8,7 +8,7 @@ use super::field::Field;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
-use crate::volume::{Follower, Lattice};
+use crate::volume::{Lattice, SurfaceExtractor};
 
 /// Minimum and maximum default number of cells along the longest side of the points' bounding box.
 const CELLS: [f64; 2] = [64.0, 160.0];
@@ -30,7 +30,7 @@ pub struct Extraction {
     field: FastField,
     map: BoxMap,
     level: f64,
-    extractor: Follower,
+    extractor: SurfaceExtractor,
     stage: Stage,
 }
 
@@ -65,12 +65,12 @@ impl Extraction {
         points: &[Vec3],
         cell: f64,
     ) -> Result<Self, MethodError> {
-        let bounds = Bounds::of(points);
+        let bounds = Bounds::from_points(points);
         let margin = DVec3::splat(MARGIN * 2.0 / map.scale());
         let low = bounds.min.as_dvec3() - margin;
         let high = bounds.max.as_dvec3() + margin;
         let dims = ((high - low) / cell).to_array().map(|nodes| (nodes.ceil() as usize).saturating_add(1));
-        let mut extractor = Follower::new(Lattice { origin: low, edge: cell, dims })
+        let mut extractor = SurfaceExtractor::new(Lattice { origin: low, edge: cell, dims })
             .map_err(|error| MethodError::invalid("cell", error.to_string()))?;
         points.iter().for_each(|p| {
             extractor.seed(p.as_dvec3());
@@ -138,6 +138,6 @@ impl Extraction {
 
     /// Returns the number of connected components that no point is near; the coarse scan found them.
     pub fn spurious_components(&self) -> usize {
-        self.extractor.found_by_scan()
+        self.extractor.components_found_by_scan()
     }
 }

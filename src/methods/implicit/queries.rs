@@ -99,7 +99,7 @@ impl ImplicitSurface {
     /// Returns the centre of the first voxel and the voxel size, in world units, of a grid of `dims` voxels around
     /// points and surface.
     fn grid(&self, dims: [usize; 3]) -> (DVec3, DVec3) {
-        let bounds = Bounds::of(&self.points()).joined(&Bounds::of(&self.mesh.positions));
+        let bounds = Bounds::from_points(&self.points()).union(&Bounds::from_points(&self.mesh.positions));
         let margin = DVec3::splat(GRID_MARGIN * 2.0 / self.map.scale());
         let (low, high) = (bounds.min.as_dvec3() - margin, bounds.max.as_dvec3() + margin);
         (low, (high - low) / DVec3::from_array(dims.map(|n| (n - 1) as f64)))

@@ -99,7 +99,7 @@ struct PoissonDisc {
 impl PoissonDisc {
     fn new(points: &[Vec3], most: usize, seed: u64) -> Self {
         let mut poisson_disc = Self {
-            order: Random::new(seed).order(points.len()),
+            order: Random::new(seed).permutation(points.len()),
             most,
             round: 0,
             // First guess: n points at a distance r cover an area of about nr², here a square of side 2.

@@ -12,7 +12,7 @@ use crate::mesh::{Mesh, MeshError, TriangleMesh};
 use crate::methods::MethodError;
 use crate::remesh::{Embedding, Unchecked, restructure};
 use crate::spatial::SurfacePoint;
-use crate::volume::{Follower, Lattice};
+use crate::volume::{Lattice, SurfaceExtractor};
 use std::rc::Rc;
 
 /// Maximum number of smoothing rounds of a decomposition; a bust settles in twelve.
@@ -76,7 +76,7 @@ fn no_base() -> MethodError {
 
 fn is_embedded(mesh: &Mesh) -> bool {
     let mut guard = Embedding::default();
-    guard.follow_with(mesh, super::typical_edge(mesh));
+    guard.sync_with_edge(mesh, super::typical_edge(mesh));
     guard.is_embedded(mesh)
 }
 
@@ -128,7 +128,7 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
         return Err(MethodError::invalid("ellipsoids", problem));
     }
     let lattice = Lattice { origin: DVec3::splat(-radius), edge: cell, dims: [nodes as usize; 3] };
-    let mut follower = Follower::new(lattice)?;
+    let mut follower = SurfaceExtractor::new(lattice)?;
     for e in ellipsoids {
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
             follower.seed(e.at_unit(axis) - centre);
@@ -166,7 +166,7 @@ pub(super) fn edge_for(area: f64, triangles: f64) -> f64 {
 /// # Errors
 /// [`MeshError::SelfIntersecting`] with the number of crossing pairs of triangles.
 pub(super) fn check_embedded(mesh: &TriangleMesh) -> Result<(), MeshError> {
-    match crate::mesh::count_crossings(mesh) {
+    match crate::mesh::count_self_intersections(mesh) {
         0 => Ok(()),
         pairs => Err(MeshError::SelfIntersecting { pairs }),
     }

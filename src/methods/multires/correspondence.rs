@@ -77,13 +77,13 @@ fn nearest(
         let [a, b, c] = walker.corners(found.triangle);
         (b - a).cross(c - a).dot(normal) >= 0.0
     };
-    let walked = start.map(|start| walker.march(start, p));
+    let walked = start.map(|start| walker.walk(start, p));
     match walked.filter(|found| found.distance <= farthest && faces_same_way(found)) {
         Some(found) => found,
         // Positions are finite, so a closest point exists.
         None => {
-            let found = if start.is_some() { walker.closest(p) } else { walker.closest_of_all(p) };
-            found.unwrap_or_else(|| walker.march(0, p))
+            let found = if start.is_some() { walker.closest(p) } else { walker.closest_brute_force(p) };
+            found.unwrap_or_else(|| walker.walk(0, p))
         }
     }
 }
@@ -95,7 +95,7 @@ fn carry_over(current: &Current, base: &SurfaceWalker, at: &SurfacePoint) -> Bas
     let weights = at.barycentric;
     let point = corners[0].point * weights.x + corners[1].point * weights.y + corners[2].point * weights.z;
     let heaviest = (0..3).fold(0, |best, k| if weights[k] > weights[best] { k } else { best });
-    to_base_point(base, &base.march(corners[heaviest].triangle, point))
+    to_base_point(base, &base.walk(corners[heaviest].triangle, point))
 }
 
 /// Visits every vertex, starting each component at any vertex and continuing with neighbours. `visit` is passed its
@@ -152,7 +152,7 @@ fn distributed(
         total += density(w);
     }
     let here = correspondence[v.index()];
-    if total > 0.0 { to_base_point(base, &base.march(here.triangle, sum * (1.0 / total))) } else { here }
+    if total > 0.0 { to_base_point(base, &base.walk(here.triangle, sum * (1.0 / total))) } else { here }
 }
 
 /// Whether the image of a triangle on the base is flipped or has no area.

@@ -152,7 +152,7 @@ pub(super) fn detailed(
         fine.refine(bands, sampling.longest);
     }
     let detailed = displace(fine, bands, guard);
-    if sampling.rounds > 0 && guard.left_crossing(&detailed.mesh) {
+    if sampling.rounds > 0 && guard.still_intersects(&detailed.mesh) {
         // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
         return displace(DetailSamples::new(surface, correspondence, bands), bands, guard);
     }
@@ -169,13 +169,13 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
             let normal = if k == 0 { normals[v.index()] } else { mesh.area_normal(v).normalize_or_zero() };
             displacements[v.index()] = normal * detail[v.index()].lambdas[k];
         }
-        guard.follow_with(&mesh, super::typical_edge(&mesh));
+        guard.sync_with_edge(&mesh, super::typical_edge(&mesh));
         let intended = displacements.clone();
-        let back = guard.carry(&mut mesh, &mut displacements);
+        let back = guard.move_all(&mut mesh, &mut displacements);
         held_vertices += back.len();
         if !back.is_empty() {
             let mut displacements = spread_hold_back(&mesh, &intended, &back);
-            guard.carry(&mut mesh, &mut displacements);
+            guard.move_all(&mut mesh, &mut displacements);
         }
     }
     let missed = mesh.vertices().filter(|v| detail[v.index()].is_missed).count();
@@ -278,7 +278,7 @@ impl DetailSamples {
     /// Returns the midpoint of an edge, with its detail.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.correspondence[u.index()], &self.correspondence[v.index()]);
-        let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
+        let on_base = bands.base().walker.walk(from.triangle, (from.point + to.point) * 0.5);
         let base_point: BasePoint = on_base.into();
         Sample {
             position: (self.mesh.position(u) + self.mesh.position(v)) * 0.5,

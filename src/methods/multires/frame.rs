@@ -103,8 +103,8 @@ impl MultiresolutionModel {
         }
         let mut next = self.surface.clone();
         let mut displacements = displacements_to(&next, prediction.predicted.positions());
-        self.guard.follow_with(&next, typical_edge(&next));
-        if !self.guard.carry(&mut next, &mut displacements).is_empty() {
+        self.guard.sync_with_edge(&next, typical_edge(&next));
+        if !self.guard.move_all(&mut next, &mut displacements).is_empty() {
             return None;
         }
         if deepest > ROUNDING {
@@ -171,7 +171,7 @@ impl MultiresolutionModel {
 
     fn move_guarded(&self, prediction: &Prediction) -> (Mesh, Changes) {
         let mut next = self.surface.clone();
-        let resolver = &mut Resolver::with_room_for(MAX_VERTICES);
+        let resolver = &mut Resolver::with_max_vertices(MAX_VERTICES);
         let changes = move_guarded(
             &mut next,
             prediction.predicted.positions(),
@@ -198,7 +198,7 @@ impl MultiresolutionModel {
         {
             return None;
         }
-        self.guard.follow_with(&mesh, typical_edge(&mesh));
+        self.guard.sync_with_edge(&mesh, typical_edge(&mesh));
         if !self.guard.is_embedded(&mesh) {
             return None;
         }

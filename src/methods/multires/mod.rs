@@ -116,11 +116,11 @@ impl MultiresolutionModel {
         let mut surface = base;
         check_size(area(&surface), &params)?;
         let mut guard = Embedding::default();
-        guard.follow_with(&surface, typical_edge(&surface));
+        guard.sync_with_edge(&surface, typical_edge(&surface));
         restructure(&mut surface, params.bounds(), &mut guard);
         let positions = pushed_positions(&surface, &moving.now());
         let mut displacements = displacements_to(&surface, &positions);
-        guard.carry(&mut surface, &mut displacements);
+        guard.move_all(&mut surface, &mut displacements);
         let walker = &bands.base().walker;
         let identity = identity(walker);
         let before = Current { walker, correspondence: &identity };
@@ -301,7 +301,7 @@ impl MultiresolutionModel {
             detail_sampling(&self.params),
         );
         let replaced = std::mem::replace(&mut self.detailed, detailed);
-        self.detailed.mesh.count_on_from(&replaced.mesh);
+        self.detailed.mesh.advance_versions_past(&replaced.mesh);
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {

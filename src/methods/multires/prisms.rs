@@ -5,7 +5,7 @@ use super::correspondence::{BasePoint, normal_at};
 use super::detail::Band;
 use crate::math::triangle::Line;
 use crate::math::{Bounds, DVec3, Vec3};
-use crate::spatial::{FirstHit, SurfacePoint};
+use crate::spatial::{NearestHit, SurfacePoint};
 
 /// For each triangle of one surface, the triangles of another that intersect its prism: the points of the triangle
 /// moved along its interpolated normals by up to a depth, to either side.
@@ -38,7 +38,7 @@ impl PrismLookup {
             prisms.depths.push(depth as f32);
             if depth > 0.0 {
                 let prism = Prism::new(from, t, depth);
-                to.walker.tree().meeting(&prism.bounds(), |other| {
+                to.walker.tree().for_each_overlapping(&prism.bounds(), |other| {
                     if prism.may_intersect(to.walker.corners(other)) {
                         prisms.candidates.push(other);
                     }
@@ -60,11 +60,11 @@ impl PrismLookup {
     ) -> Option<SurfacePoint> {
         let t = at.triangle as usize;
         let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
-        let mut nearest = FirstHit::within(f64::from(self.depths[t]));
+        let mut nearest = NearestHit::within(f64::from(self.depths[t]));
         for &other in &self.candidates[self.first[t] as usize..self.first[t + 1] as usize] {
-            nearest.look_at(other, line.hit(to.walker.corners(other)));
+            nearest.add(other, line.hit(to.walker.corners(other)));
         }
-        let found = nearest.found(|other| to.walker.corners(other));
+        let found = nearest.point(|other| to.walker.corners(other));
         found.or_else(|| to.walker.tree().line_hit(at.point, normal, search_distance))
     }
 }

@@ -69,7 +69,7 @@ impl MultiresolutionModel {
         };
         (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);
         let replaced = std::mem::replace(&mut self.surface, state.surface);
-        self.surface.count_on_from(&replaced);
+        self.surface.advance_versions_past(&replaced);
         (self.iteration, self.refreshed_frames) = (state.iteration, state.passing);
         (self.components, self.residual) = (state.components, state.residual);
         self.reconstruct_detail();

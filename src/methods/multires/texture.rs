@@ -36,7 +36,7 @@ fn triangle_corner_uvs(corners: [VertexId; 3], points: &Correspondence, finest: 
         return own;
     }
     // All three from one side of the seam, that of the centroid.
-    let middle: BasePoint = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
+    let middle: BasePoint = finest.walk(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
     at.map(|at| extrapolated_uv(finest, middle.triangle, at.point))
 }
 

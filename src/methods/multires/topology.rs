@@ -8,7 +8,7 @@ use super::membrane::{pushed_positions, relaxed};
 use super::params::{MultiresParams, Topology};
 use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
-use crate::remesh::{Changes, Contact, EdgeBounds, Resolver, Sampling, restructure};
+use crate::remesh::{Changes, ContactPolicy, EdgeBounds, Resolver, Sampling, restructure};
 
 /// Rounds of moves and remeshing in a frame. With one, edges out of bounds remain.
 const ROUNDS: usize = 2;
@@ -39,7 +39,7 @@ pub(super) fn move_guarded(
 /// Restores the edge bounds, and makes the topology changes at necks and contacts that the parameters allow.
 fn remesh_and_resolve(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Changes {
     let bounds = params.bounds();
-    let mut changes = restructure(mesh, bounds, resolver.guard(mesh, sampling(bounds)));
+    let mut changes = restructure(mesh, bounds, resolver.embedding(mesh, sampling(bounds)));
     let active: Vec<VertexId> = match params.topology {
         Topology::Never => return changes,
         Topology::Split => pinched(mesh, bounds),
@@ -55,7 +55,7 @@ pub(super) fn cut_threads(mesh: &mut Mesh, params: &MultiresParams, most_vertice
     if params.topology == Topology::Never || active.is_empty() {
         return Changes::default();
     }
-    resolve(mesh, params, &mut Resolver::with_room_for(most_vertices), &active)
+    resolve(mesh, params, &mut Resolver::with_max_vertices(most_vertices), &active)
 }
 
 fn resolve(
@@ -65,7 +65,7 @@ fn resolve(
     active: &[VertexId],
 ) -> Changes {
     let joins = params.topology == Topology::SplitAndJoin;
-    resolver.set_contact(if joins { Contact::Join } else { Contact::Leave });
+    resolver.set_contact_policy(if joins { ContactPolicy::Join } else { ContactPolicy::Leave });
     resolver.resolve(mesh, sampling(params.bounds()), active)
 }
 
@@ -80,14 +80,14 @@ fn pinched(mesh: &Mesh, bounds: EdgeBounds) -> Vec<VertexId> {
     let shortest = bounds.min * bounds.min;
     let is_pinched = |u: VertexId, v: VertexId| {
         mesh.position(u).distance_squared(mesh.position(v)) < shortest
-            && (mesh.is_tetrahedron(u) || matches!(mesh.can_collapse(u, v), Err(EditError::NeckInTheWay(_))))
+            && (mesh.is_tetrahedron(u) || matches!(mesh.can_collapse(u, v), Err(EditError::LinkCondition(_))))
     };
     mesh.vertices().filter(|&u| mesh.ring(u).as_slice().iter().any(|&v| is_pinched(u, v))).collect()
 }
 
 fn move_to(mesh: &mut Mesh, positions: &[Vec3], resolver: &mut Resolver, sampling: Sampling) {
     let mut displacements = displacements_to(mesh, positions);
-    resolver.carry(mesh, sampling, &mut displacements);
+    resolver.move_all(mesh, sampling, &mut displacements);
 }
 
 /// Returns the displacement of each vertex to its position in `positions`, by slot.

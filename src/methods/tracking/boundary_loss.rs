@@ -6,7 +6,7 @@
 use super::frame_tracker::{FrameContext, FrameStatistics, FrameTracker, Support, neighbour_mean};
 use super::project::Onto;
 use crate::math::Vec3;
-use crate::math::order::{by_both, rank, sort_by_rank};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
@@ -96,16 +96,16 @@ impl FrameTracker {
     /// Collapses the vertices of sheets into their neighbours, from the innermost to the rim; returns the number of
     /// collapses.
     fn collapse_sheets(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
-        self.guard.follow_with(mesh, self.bounds.max);
+        self.guard.sync_with_edge(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
         let mut order = sheets.to_vec();
-        sort_by_rank(&mut order, |v| by_both(!depth[v.index()], v.0));
+        sort_by_rank(&mut order, |v| combined_rank(!depth[v.index()], v.0));
         let mut collapsed = 0;
         for v in order {
             let from = mesh.position(v);
             let ring = mesh.ring(v).as_slice().iter().copied();
             let mut outer: Vec<VertexId> = ring.filter(|w| depth[w.index()] < depth[v.index()]).collect();
-            sort_by_rank(&mut outer, |&w| rank(mesh.position(w).distance_squared(from)).into());
+            sort_by_rank(&mut outer, |&w| rank_f32(mesh.position(w).distance_squared(from)).into());
             let drawn = outer.into_iter().any(|w| {
                 let position = mesh.position(w);
                 self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, position)).is_ok()

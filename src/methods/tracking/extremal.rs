@@ -27,7 +27,7 @@ const MIN_TIME_SPREAD: f64 = 1e-6;
 pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
     let [mean, covariance] = mean_and_covariance(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
-    let normal = DVec3::from(symmetric::least([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]));
+    let normal = DVec3::from(symmetric::least_eigenvector([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]));
     let distance = normal.dot(DVec3::new(mean[0], mean[1], mean[2]));
     Some(PlaneFit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
@@ -45,7 +45,7 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
         [c[2], c[5], c[7], c[8]],
         [c[3], c[6], c[8], c[9]],
     ];
-    let n = symmetric::least(matrix);
+    let n = symmetric::least_eigenvector(matrix);
     let distance = (0..4).map(|k| n[k] * mean[k]).sum();
     Some(PlaneFit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }

@@ -246,8 +246,8 @@ impl FrameTracker {
 
     /// Moves the vertices by `displacements` under the collision guard. Returns the number held back.
     pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
-        self.guard.follow_with(mesh, self.bounds.max);
-        self.guard.carry(mesh, &mut displacements).len()
+        self.guard.sync_with_edge(mesh, self.bounds.max);
+        self.guard.move_all(mesh, &mut displacements).len()
     }
 }
 

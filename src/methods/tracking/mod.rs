@@ -205,7 +205,7 @@ impl SurfaceTracker {
         self.meshes.clear();
         self.statistics.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
-        self.mesh.count_on_from(&replaced);
+        self.mesh.advance_versions_past(&replaced);
     }
 
     /// Sets the parameters during a run. A change of the boundary (`threshold`, `window`, `windowFrames`, `cyclic`)

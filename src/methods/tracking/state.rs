@@ -90,7 +90,7 @@ impl SurfaceTracker {
         self.params = params;
         self.restart();
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
-        self.mesh.count_on_from(&replaced);
+        self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
         (self.cycle_closure_error, self.steps) = (state.cycle_closure_error, state.steps);

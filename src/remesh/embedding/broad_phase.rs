@@ -18,9 +18,9 @@ impl Embedding {
         let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
         let many = MANY * count >= mesh.vertex_count();
         if many {
-            self.grid.empty_cells();
+            self.grid.unlink_cells();
         } else if count > 0 {
-            self.grid.fill_cells();
+            self.grid.link_cells();
         }
         for &v in dirty {
             if !is_entered {
@@ -29,7 +29,7 @@ impl Embedding {
             if self.is_searched_around(v) {
                 self.nearby[v.index()].clear();
                 self.may_touch[v.index()] = false;
-                self.motion_bounds[v.index()].set(Check::Search, SEARCH_SKIN * self.edge);
+                self.motion_bounds[v.index()].set(Check::Search, SEARCH_SKIN * self.ordinary_edge);
                 if !is_entered {
                     self.enter(mesh, v);
                 }
@@ -68,8 +68,8 @@ impl Embedding {
             let mut bounds = Bounds::EMPTY;
             let mut longest = 0.0f32;
             for ball in cell.iter().map(|&(_, v)| self.grid.ball(v)) {
-                bounds = bounds.joined(&Bounds::of(&[ball.position]));
-                longest = if ball.longest > longest { ball.longest } else { longest };
+                bounds = bounds.union(&Bounds::from_points(&[ball.position]));
+                longest = if ball.radius > longest { ball.radius } else { longest };
             }
             self.grid.near_balls(&bounds, longest, proximity, &mut near);
             for &(_, v) in cell {
@@ -80,7 +80,7 @@ impl Embedding {
 
     fn add_pairs_of(&mut self, mesh: &Mesh, own: &VertexBall, near: &[VertexBall], proximity: Proximity) {
         for ball in near {
-            let reach = proximity.between(own.longest, ball.longest);
+            let reach = proximity.distance_for(own.radius, ball.radius);
             let square = ball.position.distance_squared(own.position);
             if square <= reach * reach && !self.is_checked_from(ball.vertex, own.vertex, Check::Search) {
                 self.add_pair(mesh, own, ball, proximity);
@@ -114,9 +114,9 @@ impl Embedding {
     /// Returns the distance below which two vertices can intersect or touch before either is searched around again.
     fn proximity(&self) -> Proximity {
         // Distance and edges change by twice the skin at most.
-        let change = 2.0 * (SEARCH_SKIN * self.edge + self.finest());
+        let change = 2.0 * (SEARCH_SKIN * self.ordinary_edge + self.exact_below());
         Proximity {
-            least: NEAREST_CORNER * self.edge + change,
+            least: NEAREST_CORNER * self.ordinary_edge + change,
             margin: change * (1.0 + PIERCING),
             share: PIERCING,
         }
@@ -124,7 +124,7 @@ impl Embedding {
 
     /// Returns the vertices in a box, sorted.
     pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
-        self.follow(mesh);
+        self.sync(mesh);
         let mut found = Vec::new();
         self.grid.near_box(bounds, 0.0, |v| found.push(v));
         found.retain(|&v| bounds.contains(mesh.position(v)));

@@ -16,7 +16,7 @@ const ORDINARY: usize = ORDINARY_RING / 2;
 
 /// The largest clearance that is stored, relative to the ordinary edge: more than is ever used up between two edits
 /// around a vertex.
-const MOST: f32 = 1.0;
+const MAX_CLEARANCE: f32 = 1.0;
 
 /// A certificate is reused while its remainder for each vertex exceeds this, relative to the ordinary edge; otherwise a
 /// new test may give a larger one.
@@ -27,7 +27,7 @@ const ROUNDING: f32 = 4e-7;
 
 /// The largest reading of an odometer, relative to the ordinary edge: beyond it single precision is too coarse, and all
 /// certificates are discarded.
-const LONGEST: f32 = 500.0;
+const MAX_ODOMETER: f32 = 500.0;
 
 /// The odometers, and the certificates of all pairs of adjacent one-rings. Those of non-adjacent pairs are stored with
 /// the pairs.
@@ -58,7 +58,7 @@ impl Certificates {
         self.along_edges.resize(slots, SmallVec::new());
     }
 
-    /// Returns whether an odometer exceeds [`LONGEST`], so that the certificates must be reset.
+    /// Returns whether an odometer exceeds [`MAX_ODOMETER`], so that the certificates must be reset.
     pub(super) fn are_worn(&self) -> bool {
         self.worn
     }
@@ -67,14 +67,14 @@ impl Certificates {
     pub(super) fn advance(&mut self, v: VertexId, displacement: f32) {
         let odometer = &mut self.odometer[v.index()];
         *odometer = (*odometer + displacement).next_up();
-        self.worn |= *odometer > LONGEST * self.edge;
+        self.worn |= *odometer > MAX_ODOMETER * self.edge;
     }
 
     /// Invalidates all certificates of a vertex, which an edit created or changed.
     pub(super) fn revoke(&mut self, v: VertexId) {
         self.along_edges[v.index()].clear();
         self.own[v.index()] = 0.0;
-        self.advance(v, 2.0 * MOST * self.edge);
+        self.advance(v, 2.0 * MAX_CLEARANCE * self.edge);
     }
 
     /// Prepares for tests of a vertex with the given valence; if `anew`, its certificates are discarded.
@@ -104,7 +104,7 @@ impl Certificates {
     /// Returns the sum of readings up to which a clearance certifies a pair.
     pub(super) fn until(&self, pair: [VertexId; 2], clearance: f32) -> f32 {
         let sum = self.sum(pair);
-        let until = (sum + 2.0 * lower(MOST * self.edge, clearance)) * (1.0 - ROUNDING);
+        let until = (sum + 2.0 * lower(MAX_CLEARANCE * self.edge, clearance)) * (1.0 - ROUNDING);
         // An odometer that has overflowed certifies nothing.
         if until < f32::INFINITY { until } else { 0.0 }
     }

@@ -26,17 +26,17 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
         mesh.ring(hub).pairs().filter(move |&(a, b)| a != not && b != not).map(move |(a, b)| [hub, a, b])
     };
     let others: SmallVec<[([VertexId; 3], Triangle, Bounds); ORDINARY_RING]> = triangles_at(v, u)
-        .map(|names| (names, names.map(at)))
-        .map(|(names, points)| (names, points, Bounds::of(&points)))
+        .map(|corners| (corners, corners.map(at)))
+        .map(|(corners, points)| (corners, points, Bounds::from_points(&points)))
         .collect();
     let mut clearance = f32::INFINITY;
     let mut axis = Vec3::ZERO;
-    for names in triangles_at(u, v) {
-        let triangle = names.map(at);
-        let bounds = Bounds::of(&triangle);
-        for (other_names, other, other_bounds) in &others {
+    for corners in triangles_at(u, v) {
+        let triangle = corners.map(at);
+        let bounds = Bounds::from_points(&triangle);
+        for (other_corners, other, other_bounds) in &others {
             // `u` and `v` themselves are corners of one of the two only.
-            if names[1..].iter().any(|w| other_names[1..].contains(w)) {
+            if corners[1..].iter().any(|w| other_corners[1..].contains(w)) {
                 continue;
             }
             let wanted = 2.0 * (lower(enough, clearance) + ROUNDING);
@@ -173,13 +173,13 @@ fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
 /// Returns whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal
 /// to one of its edges. Most triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is
 /// the longest distance between two of their corners.
-pub(super) fn are_beside(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
+pub(super) fn are_apart_in_plane(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
-    is_beside_edge(s, t, gap) || is_beside_edge(t, s, gap)
+    is_beyond_edge(s, t, gap) || is_beyond_edge(t, s, gap)
 }
 
 /// Returns whether `t` is beyond an edge of `s` by more than `gap`.
-fn is_beside_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
+fn is_beyond_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
     let normal = (s[1] - s[0]).cross(s[2] - s[0]);
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
         let outwards = unit((s[to] - s[from]).cross(normal));
@@ -229,7 +229,7 @@ mod tests {
     use super::super::one_ring::{intersections_around, intersections_between, longest_edge};
     use super::*;
     use crate::math::Random;
-    use crate::math::predicates::triangles_cross;
+    use crate::math::predicates::triangles_intersect;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -241,8 +241,8 @@ mod tests {
     fn rough(random: &mut Random) -> Mesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.8).unwrap();
         let (rough, flat) = (0.6 * random.unit() as f32, [1.0, 0.1][random.below(2) as usize]);
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        for v in names {
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        for v in vertices {
             let p = (mesh.position(v) + any(random) * rough) * Vec3::new(1.0, 1.0, flat);
             mesh.set_position(v, p);
         }
@@ -252,8 +252,8 @@ mod tests {
     /// Returns the mesh with each vertex moved by nearly `displacement`.
     fn shaken(mesh: &Mesh, displacement: f32, random: &mut Random) -> Mesh {
         let mut mesh = mesh.clone();
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        for v in names {
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        for v in vertices {
             mesh.set_position(v, mesh.position(v) + any(random).normalize_or_zero() * (0.999 * displacement));
         }
         mesh
@@ -267,12 +267,12 @@ mod tests {
         random: &mut Random,
         mut intersections: impl FnMut(&Mesh, &mut Vec<VertexId>),
     ) {
-        let mut crossing = Vec::new();
-        intersections(mesh, &mut crossing);
+        let mut intersecting = Vec::new();
+        intersections(mesh, &mut intersecting);
         for _ in 0..3 {
-            intersections(&shaken(mesh, clearance, random), &mut crossing);
+            intersections(&shaken(mesh, clearance, random), &mut intersecting);
         }
-        assert!(crossing.is_empty(), "with clearance for {clearance}");
+        assert!(intersecting.is_empty(), "with clearance for {clearance}");
     }
 
     /// Returns two triangles beside each other or overlapping, sometimes exactly in one plane.
@@ -290,27 +290,27 @@ mod tests {
             let random = &mut Random::new(seed);
             let [s, t] = two_triangles(random);
             let margins = (1..=100).map(|k| 0.01 * k as f32);
-            let largest = margins.take_while(|&margin| are_beside(&s, &t, 4.0, margin)).last();
+            let largest = margins.take_while(|&margin| are_apart_in_plane(&s, &t, 4.0, margin)).last();
             found[usize::from(largest.is_some())] += 1;
             let Some(margin) = largest else { continue };
             for _ in 0..60 {
                 let towards = any(random).normalize_or_zero() * (0.499 * margin);
                 let [s, t] = [s.map(|p| p + towards), t.map(|p| p - towards)];
-                assert!(!triangles_cross(s, t), "seed {seed}");
+                assert!(!triangles_intersect(s, t), "seed {seed}");
             }
         }
         assert!(found.iter().all(|&count| count > 400), "{found:?}");
     }
 
     #[test]
-    fn triangles_do_not_cross_while_nothing_moves_further_than_they_are_clear() {
+    fn triangles_do_not_intersect_within_their_clearance() {
         let (mut clear, mut unclear) = ([0; 2], [0; 2]);
         for seed in 0..120 {
             let random = &mut Random::new(seed);
             let mesh = rough(random);
             let longest = mesh.vertices().map(|v| longest_edge(&mesh, v)).fold(0.0, higher);
-            let names: Vec<VertexId> = mesh.vertices().collect();
-            for &v in &names {
+            let vertices: Vec<VertexId> = mesh.vertices().collect();
+            for &v in &vertices {
                 let clearance = fan_clearance(&mesh, v, longest);
                 if clearance > 0.0 {
                     clear[0] += 1;
@@ -320,7 +320,7 @@ mod tests {
                 } else {
                     unclear[0] += 1;
                 }
-                let w = names[random.below(names.len() as u32) as usize];
+                let w = vertices[random.below(vertices.len() as u32) as usize];
                 let clearance = if v == w { 0.0 } else { triangle_clearance(&mesh, [v, w], longest, 0.01) };
                 if clearance > 0.0 && clearance < f32::INFINITY {
                     clear[1] += 1;

@@ -43,13 +43,13 @@ const NEAREST_CORNER: f32 = 0.577_351;
 const PIERCING: f32 = 0.763_763;
 
 /// The skin of the broad phase: the displacement of a one-ring after which its vertex is searched for neighbours again,
-/// relative to the ordinary edge (that of [`Embedding::follow_with`]). A wider skin gives more pairs, a narrower one
+/// relative to the ordinary edge (that of [`Embedding::sync_with_edge`]). A wider skin gives more pairs, a narrower one
 /// more searches. Few vertices of an ordinary mesh have any pair.
 const SEARCH_SKIN: f32 = 0.04;
 
 /// The smallest length that is distinguished: squares of shorter lengths lose their digits to rounding. Edges and
 /// displacements count as at least this long, and a smaller clearance as none.
-const FINEST: f32 = 1e-17;
+const MIN_LENGTH: f32 = 1e-17;
 
 /// A non-adjacent vertex found near another, and the sum of both odometers up to which the pair is certified.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ struct Nearby {
 pub struct Embedding {
     grid: VertexGrid,
     /// The ordinary edge: a length that most edges of the mesh do not exceed.
-    edge: f32,
+    ordinary_edge: f32,
     /// The longest edge of each vertex, as last measured.
     longest: Vec<f32>,
     /// The non-adjacent vertices that the broad phase found near each vertex.
@@ -77,7 +77,7 @@ pub struct Embedding {
     certificates: Certificates,
     /// The largest displacement in the one-ring of each vertex during a move; `touched` are the vertices where it is
     /// not 0.
-    travelled: Vec<f32>,
+    ring_displacement: Vec<f32>,
     touched: Vec<VertexId>,
     /// Vertices that edits created or changed since the last move; the pairs of their neighbours do not include them
     /// yet.
@@ -111,39 +111,39 @@ impl Embedding {
     }
 
     /// Returns the clearance below which triangles are tested by exact predicates.
-    fn finest(&self) -> f32 {
-        output::finest(self.output.as_ref())
+    fn exact_below(&self) -> f32 {
+        output::exact_below(self.output.as_ref())
     }
 
-    /// Synchronises with `mesh` as [`Self::follow`] does, and sets the ordinary edge: a length that most edges do not
+    /// Synchronises with `mesh` as [`Self::sync`] does, and sets the ordinary edge: a length that most edges do not
     /// exceed. It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are
     /// found.
-    pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
-        let edge = higher(FINEST, edge);
-        if self.edge != edge {
-            self.edge = edge;
+    pub fn sync_with_edge(&mut self, mesh: &Mesh, edge: f32) {
+        let edge = higher(MIN_LENGTH, edge);
+        if self.ordinary_edge != edge {
+            self.ordinary_edge = edge;
             self.version = None;
         }
-        self.sync(mesh);
+        self.sync_without_cells(mesh);
     }
 
     /// Synchronises with `mesh` after any changes.
-    pub fn follow(&mut self, mesh: &Mesh) {
-        self.sync(mesh);
-        self.grid.fill_cells();
+    pub fn sync(&mut self, mesh: &Mesh) {
+        self.sync_without_cells(mesh);
+        self.grid.link_cells();
     }
 
     /// Synchronises without filling the cells of the grid: a check of the whole mesh does not need them.
-    fn sync(&mut self, mesh: &Mesh) {
+    fn sync_without_cells(&mut self, mesh: &Mesh) {
         if self.version == Some(mesh.geometry_version()) && !self.certificates.are_worn() {
             return;
         }
-        self.grid = VertexGrid::new(self.edge, SEARCH_SKIN * self.edge, mesh.slots());
+        self.grid = VertexGrid::new(self.ordinary_edge, SEARCH_SKIN * self.ordinary_edge, mesh.slots());
         self.stuck = false;
         self.motion_bounds.clear();
         self.nearby.clear();
         self.may_touch.clear();
-        self.certificates.begin(self.edge, mesh.slots());
+        self.certificates.begin(self.ordinary_edge, mesh.slots());
         self.resize_for(mesh.slots());
         self.edited.clear();
         for v in mesh.vertices() {
@@ -157,7 +157,7 @@ impl Embedding {
     /// Performs one or more edits as a transaction, and rolls it back if triangles would intersect.
     ///
     /// # Errors
-    /// That of the edit; [`EditError::WouldCross`]. The mesh is unchanged on error.
+    /// That of the edit; [`EditError::WouldSelfIntersect`]. The mesh is unchanged on error.
     pub fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -167,7 +167,7 @@ impl Embedding {
     }
 
     /// Performs edits as [`Self::attempt`] does, but tests only pairs of triangles that share a corner.
-    /// [`Self::crossing`] finds the other intersections.
+    /// [`Self::intersecting_vertices`] finds the other intersections.
     ///
     /// # Errors
     /// As [`Self::attempt`].
@@ -185,7 +185,7 @@ impl Embedding {
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
         intersects: impl FnOnce(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<T, EditError> {
-        self.follow(mesh);
+        self.sync(mesh);
         mesh.begin();
         let done = edit(mesh).and_then(|done| self.accept_changes(mesh, intersects).map(|()| done));
         if done.is_ok() {
@@ -205,9 +205,9 @@ impl Embedding {
     ) -> Result<(), EditError> {
         let changed = mesh.changed_triangles();
         if intersects(self, mesh, &changed) {
-            return Err(EditError::WouldCross);
+            return Err(EditError::WouldSelfIntersect);
         }
-        self.follow_changes(mesh, &changed);
+        self.sync_changes(mesh, &changed);
         Ok(())
     }
 
@@ -218,7 +218,7 @@ impl Embedding {
     }
 
     /// Returns the corners of all triangles that intersect another, sorted.
-    pub fn crossing(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+    pub fn intersecting_vertices(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check_all(mesh)
     }
 
@@ -238,7 +238,7 @@ impl Embedding {
         mesh: &mut Mesh,
         components: &Mesh,
     ) -> Result<(Vec<VertexId>, Vec<VertexId>), MeshError> {
-        self.follow(mesh);
+        self.sync(mesh);
         let added = mesh.append(components)?;
         self.resize_for(mesh.slots());
         self.pending.resize(mesh.slots(), Checks::default());
@@ -250,14 +250,14 @@ impl Embedding {
             self.mark_dirty(v, Checks::ALL);
         }
         self.mark_edited_dirty(mesh);
-        let crossing = self.check_dirty(mesh);
+        let intersecting = self.check_dirty(mesh);
         self.version = Some(mesh.geometry_version());
-        Ok((added, crossing))
+        Ok((added, intersecting))
     }
 
     /// Deletes the component of `v`, and returns its number of vertices.
     pub fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) -> usize {
-        self.follow(mesh);
+        self.sync(mesh);
         let members = mesh.component_of(v, usize::MAX);
         members.iter().for_each(|&w| self.grid.remove(w));
         let count = mesh.remove_component(v);
@@ -285,9 +285,9 @@ impl Embedding {
     }
 
     /// Updates the grid and the motion bounds with the changes since [`Mesh::begin`].
-    fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
+    fn sync_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
         self.resize_for(mesh.slots());
-        for v in mesh.touched() {
+        for v in mesh.touched_vertices() {
             self.edited.push(v);
             self.forget(v);
             if mesh.is_live(v) {
@@ -298,15 +298,15 @@ impl Embedding {
             }
         }
         // Edges of the neighbours of moved vertices may have become longer.
-        for names in changed {
-            let [a, b, c] = names.map(|v| mesh.position(v));
+        for corners in changed {
+            let [a, b, c] = corners.map(|v| mesh.position(v));
             let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
             let edge = square.sqrt();
-            for &v in names {
+            for &v in corners {
                 self.forget(v);
                 let longest = &mut self.longest[v.index()];
                 *longest = if edge > *longest { edge } else { *longest };
-                self.grid.stretch(v, edge);
+                self.grid.raise_radius(v, edge);
             }
         }
     }

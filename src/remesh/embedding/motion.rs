@@ -8,18 +8,18 @@ use std::collections::BTreeMap;
 
 /// The factor on the displacement of vertices of intersecting triangles; if triangles still intersect, these vertices
 /// do not move.
-const LESS: f32 = 0.25;
+const HELD_BACK: f32 = 0.25;
 
 impl Embedding {
     /// Returns whether the mesh still intersects itself after a move, which happens only if it did before.
-    pub fn left_crossing(&mut self, mesh: &Mesh) -> bool {
+    pub fn still_intersects(&mut self, mesh: &Mesh) -> bool {
         self.stuck && !self.is_embedded(mesh)
     }
 
-    /// Moves all vertices, as [`Self::carry_some`] does.
-    pub fn carry(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+    /// Moves all vertices, as [`Self::move_some`] does.
+    pub fn move_all(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        self.carry_some(mesh, &all, displacements)
+        self.move_some(mesh, &all, displacements)
     }
 
     /// Moves the vertices `moving` by `displacements`, given by slot; those whose triangles would intersect move by a
@@ -27,13 +27,13 @@ impl Embedding {
     /// were held back, sorted, and the share of its displacement by which each moved.
     ///
     /// A mesh without self-intersections has none afterwards: in the worst case no vertex moves.
-    pub fn carry_some(
+    pub fn move_some(
         &mut self,
         mesh: &mut Mesh,
         moving: &[VertexId],
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
-        self.sync(mesh);
+        self.sync_without_cells(mesh);
         let mut from = std::mem::take(&mut self.from);
         from.resize(mesh.slots(), Vec3::ZERO);
         let positions = mesh.positions_mut();
@@ -43,13 +43,13 @@ impl Embedding {
         }
         self.pending.resize(mesh.slots(), Checks::default());
         self.mark_edited_dirty(mesh);
-        self.spend_motion(mesh, moving.iter().map(|&v| (v, from[v.index()])));
+        self.apply_motion(mesh, moving.iter().map(|&v| (v, from[v.index()])));
         let mut shares = BTreeMap::new();
         loop {
             let mut held = self.check_dirty(mesh);
-            let crossing = held.len();
+            let intersecting = held.len();
             held.retain(|v| displacements[v.index()] != Vec3::ZERO);
-            self.stuck |= held.len() < crossing;
+            self.stuck |= held.len() < intersecting;
             if held.is_empty() {
                 break;
             }
@@ -57,15 +57,15 @@ impl Embedding {
             for (&v, &before) in held.iter().zip(&before) {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
-                let less = if *share == 1.0 { LESS } else { 0.0 };
-                (*share, displacements[i]) = (*share * less, displacements[i] * less);
+                let factor = if *share == 1.0 { HELD_BACK } else { 0.0 };
+                (*share, displacements[i]) = (*share * factor, displacements[i] * factor);
                 mesh.set_position(v, from[i] + displacements[i]);
                 if mesh.position(v) == before {
                     // A displacement lost in rounding uses up no motion bound.
                     self.mark_dirty(v, Checks::ALL);
                 }
             }
-            self.spend_motion(mesh, held.into_iter().zip(before));
+            self.apply_motion(mesh, held.into_iter().zip(before));
         }
         self.from = from;
         self.version = Some(mesh.geometry_version());
@@ -77,7 +77,7 @@ impl Embedding {
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::mesh::{TriangleMesh, count_crossings, shapes};
+    use crate::mesh::{TriangleMesh, count_self_intersections, shapes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -93,10 +93,10 @@ mod tests {
         let first = mesh.slots();
         mesh.append(&small).unwrap();
         let mut embedding = Embedding::default();
-        embedding.follow_with(&mesh, 1.2);
+        embedding.sync_with_edge(&mesh, 1.2);
         // The first move finds nothing near.
         let mut displacements = vec![Vec3::X * 0.02; mesh.slots()];
-        assert!(embedding.carry(&mut mesh, &mut displacements).is_empty());
+        assert!(embedding.move_all(&mut mesh, &mut displacements).is_empty());
         let moved: Vec<VertexId> = (first..mesh.slots()).map(VertexId::from_index).collect();
         let edit = |mesh: &mut Mesh| {
             moved.iter().for_each(|&v| mesh.set_position(v, mesh.position(v) - Vec3::Z * down));
@@ -105,8 +105,8 @@ mod tests {
         embedding.attempt(&mut mesh, edit).unwrap();
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         displacements[top.index()] = Vec3::Z * 0.03;
-        let held = embedding.carry_some(&mut mesh, &[top], &mut displacements);
-        assert_eq!(count_crossings(&mesh.to_triangles()), 0);
+        let held = embedding.move_some(&mut mesh, &[top], &mut displacements);
+        assert_eq!(count_self_intersections(&mesh.to_triangles()), 0);
         assert_eq!(held.len(), 1);
     }
 
@@ -131,17 +131,17 @@ mod tests {
                 })
                 .collect();
             let mut kept = Embedding::default();
-            kept.follow_with(&mesh, 0.9);
+            kept.sync_with_edge(&mesh, 0.9);
             for step in 0..25 {
                 let (mut same, mut anew) = (mesh.clone(), Embedding::default());
-                anew.follow_with(&same, 0.9);
-                let expected = anew.carry(&mut same, &mut displacements.clone());
-                let held = kept.carry(&mut mesh, &mut displacements.clone());
+                anew.sync_with_edge(&same, 0.9);
+                let expected = anew.move_all(&mut same, &mut displacements.clone());
+                let held = kept.move_all(&mut mesh, &mut displacements.clone());
                 assert_eq!(held, expected, "seed {seed}, step {step}");
                 assert_eq!(mesh.positions(), same.positions(), "seed {seed}, step {step}");
                 all_held += held.len();
             }
-            assert_eq!(count_crossings(&mesh.to_triangles()), 0, "seed {seed}");
+            assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "seed {seed}");
         }
         assert!(all_held > 1000, "{all_held} held back");
     }
@@ -156,7 +156,7 @@ mod tests {
             let mut mesh = octahedron(Vec3::ZERO, 1.0);
             mesh.append(&octahedron(Vec3::X * 2.4, 1.0)).unwrap();
             let mut kept = Embedding::default();
-            kept.follow_with(&mesh, 1.6);
+            kept.sync_with_edge(&mesh, 1.6);
             let mut any = || Vec3::from([(); 3].map(|()| 2.0 * random.unit() as f32 - 1.0));
             for step in 0..60 {
                 let turn = any() * 0.02;
@@ -169,9 +169,9 @@ mod tests {
                     })
                     .collect();
                 let (mut same, mut anew) = (mesh.clone(), Embedding::default());
-                anew.follow_with(&same, 1.6);
-                let expected = anew.carry(&mut same, &mut displacements.clone());
-                let held = kept.carry(&mut mesh, &mut displacements.clone());
+                anew.sync_with_edge(&same, 1.6);
+                let expected = anew.move_all(&mut same, &mut displacements.clone());
+                let held = kept.move_all(&mut mesh, &mut displacements.clone());
                 assert_eq!(held, expected, "seed {seed}, step {step}");
                 all_held += held.len();
             }
@@ -197,7 +197,7 @@ mod tests {
             let mut mesh = Mesh::icosahedron(Vec3::ZERO, scale);
             mesh.append(&octahedron(Vec3::X * 2.5 * scale, scale)).unwrap();
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, 1.2 * scale);
+            embedding.sync_with_edge(&mesh, 1.2 * scale);
             let mut held = 0;
             for step in 0..40 {
                 let unit = |random: &mut Random| random.unit() as f32 - 0.5;
@@ -208,8 +208,8 @@ mod tests {
                         together + Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)) * 0.8;
                     displacements[v.index()] = displacement * scale;
                 }
-                held += embedding.carry(&mut mesh, &mut displacements).len();
-                assert_eq!(count_crossings(&mesh.to_triangles()), 0, "10^{power}, step {step}");
+                held += embedding.move_all(&mut mesh, &mut displacements).len();
+                assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "10^{power}, step {step}");
             }
             assert!(held > 0, "10^{power}");
         }

@@ -4,7 +4,7 @@
 //! one-rings has moved by that distance. So they are tested again when the largest displacements in one of the two
 //! one-rings add up to the clearance.
 
-use super::{Embedding, FINEST};
+use super::{Embedding, MIN_LENGTH};
 use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
@@ -62,7 +62,7 @@ impl MotionBounds {
     }
 
     /// Subtracts a displacement; an infinite one uses up all bounds.
-    fn spend(&mut self, displacement: f32) {
+    fn subtract(&mut self, displacement: f32) {
         self.0.iter_mut().for_each(|bound| {
             *bound = if displacement < f32::INFINITY { *bound - displacement } else { 0.0 }
         });
@@ -77,16 +77,16 @@ impl MotionBounds {
 impl Embedding {
     /// Subtracts displacements from the motion bounds of all one-rings that contain a moved vertex, and marks those
     /// vertices dirty whose bounds are used up. `moved` contains the moved vertices and their previous positions.
-    pub(super) fn spend_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
-        self.travelled.resize(mesh.slots(), 0.0);
+    pub(super) fn apply_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
+        self.ring_displacement.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
         for (v, from) in moved {
             // The displacement after rounding of the position.
             let to = mesh.position(v);
             if from != to {
-                let displacement = higher(FINEST, to.distance(from));
+                let displacement = higher(MIN_LENGTH, to.distance(from));
                 for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
-                    let travelled = &mut self.travelled[w.index()];
+                    let travelled = &mut self.ring_displacement[w.index()];
                     if *travelled == 0.0 {
                         touched.push(w);
                     }
@@ -95,9 +95,9 @@ impl Embedding {
             }
         }
         for v in touched.drain(..) {
-            let travelled = std::mem::take(&mut self.travelled[v.index()]);
+            let travelled = std::mem::take(&mut self.ring_displacement[v.index()]);
             let bounds = &mut self.motion_bounds[v.index()];
-            bounds.spend(travelled);
+            bounds.subtract(travelled);
             self.certificates.advance(v, travelled);
             let used_up = bounds.used_up();
             self.mark_dirty(v, used_up);

@@ -20,7 +20,7 @@ impl Embedding {
     /// Runs all checks at every vertex, as [`Self::check_dirty`] does but regardless of certificates; returns the
     /// corners of all triangles that intersect another, sorted.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
-        self.sync(mesh);
+        self.sync_without_cells(mesh);
         self.pending.resize(mesh.slots(), Checks::default());
         mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
         self.check(mesh, true)
@@ -43,26 +43,26 @@ impl Embedding {
         for &v in dirty.iter().filter(|v| self.pending[v.index()].has(Check::OneRing)) {
             self.certificates.prepare(v, mesh.ring(v).valence(), anew);
         }
-        let mut crossing = Vec::new();
+        let mut intersecting = Vec::new();
         for &v in &dirty {
             let pending = self.pending[v.index()];
             if pending.has(Check::OneRing) {
-                self.check_one_ring(mesh, v, &mut crossing);
-                self.check_along_edges(mesh, v, &mut crossing);
+                self.check_one_ring(mesh, v, &mut intersecting);
+                self.check_along_edges(mesh, v, &mut intersecting);
             }
             if pending.has(Check::Nearby) {
-                self.check_nearby(mesh, v, &mut crossing);
+                self.check_nearby(mesh, v, &mut intersecting);
             }
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
         self.dirty = dirty;
         self.dirty.clear();
-        crossing.sort_unstable();
-        crossing.dedup();
-        crossing
+        intersecting.sort_unstable();
+        intersecting.dedup();
+        intersecting
     }
 
-    fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+    fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
         if let Some(left) = self.certificates.left_of_own(v) {
             return self.lower_bounds(Check::OneRing, [v, v], left);
         }
@@ -71,15 +71,15 @@ impl Embedding {
         if !self.is_ample(clearance) {
             clearance = higher(clearance, fan_clearance(mesh, v, longest));
         }
-        let clearance = self.or_none(clearance);
+        let clearance = self.or_zero(clearance);
         self.lower_bounds(Check::OneRing, [v, v], clearance);
         self.certificates.set_own(v, clearance);
         if clearance == 0.0 {
-            intersections_around(mesh, v, self.output.as_ref(), crossing);
+            intersections_around(mesh, v, self.output.as_ref(), intersecting);
         }
     }
 
-    fn check_along_edges(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+    fn check_along_edges(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
         let ring = mesh.ring(v).as_slice();
         let mut right = ring[ring.len() - 1];
         for (k, &w) in ring.iter().enumerate() {
@@ -88,7 +88,7 @@ impl Embedding {
                 self.lower_bounds(Check::OneRing, [v, w], remaining);
             } else if !self.is_checked_from(w, v, Check::OneRing) {
                 let clearance = self.clearance_along_edge(mesh, [v, w], [left, right]);
-                let until = self.settle_pair(mesh, [v, w], Check::OneRing, clearance, crossing);
+                let until = self.record_clearance(mesh, [v, w], Check::OneRing, clearance, intersecting);
                 self.certificates.set_along(v, k, until);
                 if let Some(position) = mesh.ring(w).position(v) {
                     self.certificates.set_along(w, position, until);
@@ -107,7 +107,7 @@ impl Embedding {
         self.or_triangle_clearance(mesh, pair, clearance)
     }
 
-    fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+    fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
         for k in 0..self.nearby[v.index()].len() {
             let Nearby { vertex: w, until } = self.nearby[v.index()][k];
             // Edits may have changed either vertex since the pair was found.
@@ -118,7 +118,7 @@ impl Embedding {
                 self.lower_bounds(Check::Nearby, [v, w], left);
             } else if !self.is_checked_from(w, v, Check::Nearby) {
                 let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
-                let until = self.settle_pair(mesh, [v, w], Check::Nearby, clearance, crossing);
+                let until = self.record_clearance(mesh, [v, w], Check::Nearby, clearance, intersecting);
                 self.nearby[v.index()][k].until = until;
                 if let Some(position) = self.position_of(w, v) {
                     self.nearby[w.index()][position].until = until;
@@ -129,18 +129,18 @@ impl Embedding {
 
     /// Records the clearance of two one-rings, and runs exact tests if there is none; returns the sum of odometer
     /// readings up to which the pair is certified.
-    fn settle_pair(
+    fn record_clearance(
         &mut self,
         mesh: &Mesh,
         pair: [VertexId; 2],
         check: Check,
         clearance: f32,
-        crossing: &mut Vec<VertexId>,
+        intersecting: &mut Vec<VertexId>,
     ) -> f32 {
-        let clearance = self.or_none(clearance);
+        let clearance = self.or_zero(clearance);
         self.lower_bounds(check, pair, clearance);
         if clearance == 0.0 {
-            intersections_between(mesh, pair, self.output.as_ref(), crossing);
+            intersections_between(mesh, pair, self.output.as_ref(), intersecting);
         }
         self.certificates.until(pair, clearance)
     }
@@ -173,12 +173,12 @@ impl Embedding {
         if self.is_ample(clearance) {
             return clearance;
         }
-        higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.edge))
+        higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.ordinary_edge))
     }
 
     /// Returns the clearance, or 0 if exact tests have to decide.
-    fn or_none(&self, clearance: f32) -> f32 {
-        if clearance > self.finest() { clearance } else { 0.0 }
+    fn or_zero(&self, clearance: f32) -> f32 {
+        if clearance > self.exact_below() { clearance } else { 0.0 }
     }
 
     fn lower_bounds(&mut self, check: Check, ends: [VertexId; 2], clearance: f32) {
@@ -186,7 +186,7 @@ impl Embedding {
     }
 
     fn is_ample(&self, clearance: f32) -> bool {
-        clearance > AMPLE * self.edge
+        clearance > AMPLE * self.ordinary_edge
     }
 
     /// Returns whether the pair `w`, `v` is tested from `w`, so that `v` can skip it.
@@ -209,7 +209,7 @@ fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
 mod tests {
     use super::*;
     use crate::math::{Random, Vec3};
-    use crate::mesh::{TriangleMesh, crossing_pairs, shapes};
+    use crate::mesh::{TriangleMesh, intersecting_pairs, shapes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -232,9 +232,9 @@ mod tests {
         let rough = one_of(random, [0.0, 1e-6, 0.05, 0.2, 1.0]);
         let squash = Vec3::new(1.0, 1.0, one_of(random, [1.0, 1.0, 1.0, 0.5, 1e-3, 1e-9, 0.0]));
         let size = one_of(random, [1.0, 1.0, 1.0, 0.1, 1e-4, 50.0]);
-        let place = any(random) * one_of(random, [0.0, 1.0, 3.0]);
+        let offset = any(random) * one_of(random, [0.0, 1.0, 3.0]);
         for p in mesh.positions_mut() {
-            *p = (*p + any(random) * rough) * squash * size + place;
+            *p = (*p + any(random) * rough) * squash * size + offset;
         }
         let count = mesh.slots() as u32;
         let [v, w] = [(); 2].map(|()| VertexId(random.below(count)));
@@ -260,28 +260,28 @@ mod tests {
     /// Returns the corners of the triangles that intersect, by testing all pairs.
     fn expected(mesh: &Mesh) -> Vec<VertexId> {
         let triangles = mesh.to_triangles();
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        let corners = |t: u32| triangles.triangles[t as usize].map(|v| names[v as usize]);
-        let mut crossing: Vec<VertexId> =
-            crossing_pairs(&triangles).into_iter().flatten().flat_map(corners).collect();
-        crossing.sort_unstable();
-        crossing.dedup();
-        crossing
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        let corners = |t: u32| triangles.triangles[t as usize].map(|v| vertices[v as usize]);
+        let mut intersecting: Vec<VertexId> =
+            intersecting_pairs(&triangles).into_iter().flatten().flat_map(corners).collect();
+        intersecting.sort_unstable();
+        intersecting.dedup();
+        intersecting
     }
 
     #[test]
     fn intersections_are_those_found_by_testing_all_pairs() {
-        let (mut sound, mut crossing) = (0, 0);
+        let (mut separate, mut intersecting) = (0, 0);
         for seed in 0..2000 {
             let random = &mut Random::new(seed);
             let mesh = crumpled(random);
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, one_of(random, [1.0, 0.3, 5.0, 1e-3]));
+            embedding.sync_with_edge(&mesh, one_of(random, [1.0, 0.3, 5.0, 1e-3]));
             let found = embedding.check_all(&mesh);
             assert_eq!(found, expected(&mesh), "seed {seed}");
-            if found.is_empty() { sound += 1 } else { crossing += 1 }
+            if found.is_empty() { separate += 1 } else { intersecting += 1 }
         }
-        assert!(sound > 200 && crossing > 200, "{sound} sound, {crossing} crossing");
+        assert!(separate > 200 && intersecting > 200, "{separate} separate, {intersecting} intersecting");
     }
 
     #[test]
@@ -290,14 +290,14 @@ mod tests {
             let random = &mut Random::new(seed);
             let mesh = crumpled(random);
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, one_of(random, [1.0, 0.3, 5.0]));
+            embedding.sync_with_edge(&mesh, one_of(random, [1.0, 0.3, 5.0]));
             let dirty: Vec<VertexId> = mesh.vertices().filter(|_| random.below(3) > 0).collect();
             embedding.pending.resize(mesh.slots(), Checks::default());
             dirty.iter().for_each(|&v| embedding.mark_dirty(v, Checks::ALL));
             embedding.may_touch.fill(false);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
             swept.sweep(&mesh);
-            searched.grid.fill_cells();
+            searched.grid.link_cells();
             searched.search(&mesh, &dirty);
             for v in mesh.vertices() {
                 let [swept, searched] = [&swept, &searched].map(|embedding| {
@@ -314,25 +314,25 @@ mod tests {
 
     #[test]
     fn appended_components_are_tested_against_everything() {
-        let (mut sound, mut intersecting) = (0, 0);
+        let (mut separate, mut intersecting) = (0, 0);
         for seed in 0..300 {
             let random = &mut Random::new(seed);
             let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.5).unwrap();
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, 0.6);
+            embedding.sync_with_edge(&mesh, 0.6);
             let mut displacements = vec![Vec3::X * 0.01; mesh.slots()];
-            embedding.carry(&mut mesh, &mut displacements);
+            embedding.move_all(&mut mesh, &mut displacements);
             let parts = Mesh::icosphere(any(random) * 1.6, 0.4, 0.3).unwrap();
             let (added, found) = embedding.append(&mut mesh, &parts).unwrap();
             assert_eq!(added.len(), parts.vertex_count());
             assert_eq!(found, expected(&mesh), "seed {seed}");
-            *if found.is_empty() { &mut sound } else { &mut intersecting } += 1;
+            *if found.is_empty() { &mut separate } else { &mut intersecting } += 1;
             // Motion bounds remain valid for old vertices, and new ones move like all others.
             let mut displacements = vec![Vec3::X * 0.02; mesh.slots()];
-            embedding.carry(&mut mesh, &mut displacements);
+            embedding.move_all(&mut mesh, &mut displacements);
             assert_eq!(embedding.check_all(&mesh), expected(&mesh), "seed {seed}");
         }
-        assert!(sound > 50 && intersecting > 50, "{sound} sound, {intersecting} intersecting");
+        assert!(separate > 50 && intersecting > 50, "{separate} sound, {intersecting} intersecting");
     }
 
     /// A new component reuses the slots of a removed one, and must not inherit its motion bounds.
@@ -345,7 +345,7 @@ mod tests {
             let first = mesh.slots();
             mesh.append(&Mesh::icosahedron(Vec3::X * 1.6, 0.8)).unwrap();
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, 1.2);
+            embedding.sync_with_edge(&mesh, 1.2);
             assert!(embedding.check_all(&mesh).is_empty());
             // Slots are reused in the order in which vertices are found.
             let members = mesh.component_of(VertexId::from_index(first), usize::MAX);

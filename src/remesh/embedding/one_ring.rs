@@ -4,9 +4,9 @@
 //! all vertices below which no pair of triangles can intersect, not positive if the filter does not apply. Filters
 //! allow for rounding by a wide margin.
 
-use super::FINEST;
+use super::MIN_LENGTH;
 use super::clearance::gap_between_corners;
-use super::output::{OutputSpace, bounds, finest, intersect};
+use super::output::{OutputSpace, bounds, exact_below, intersect};
 use crate::math::{Bounds, DVec3, Vec3, higher, lower};
 use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
@@ -28,14 +28,14 @@ const SMALL: f32 = 0.125;
 const LEFT_BY_TURN: f32 = 0.94;
 const TURN: f32 = 1.0 / 6.0;
 
-/// Returns the length of the longest edge at `v`; not less than [`FINEST`].
+/// Returns the length of the longest edge at `v`; not less than [`MIN_LENGTH`].
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let square = mesh.ring(v).as_slice().iter().fold(0.0f32, |longest, &w| {
         let square = p.distance_squared(mesh.position(w));
         if square > longest { square } else { longest }
     });
-    higher(FINEST, square.sqrt())
+    higher(MIN_LENGTH, square.sqrt())
 }
 
 /// Returns the unit vector in the direction of `offset`, or 0 for the null vector. In double precision if the squared
@@ -68,8 +68,8 @@ fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> 
     for (k, &w) in ring.iter().enumerate() {
         let offset = mesh.position(w) - centre;
         let length = offset.length();
-        let shown = previous.cross(offset).dot(direction) - rounding;
-        clearance = lower(clearance, shown / (previous_length + length + offset.distance(previous) + spare));
+        let area = previous.cross(offset).dot(direction) - rounding;
+        clearance = lower(clearance, area / (previous_length + length + offset.distance(previous) + spare));
         let behind = k > 0 && across.dot(offset) < 0.0;
         turns += u32::from(before && !behind);
         before = behind;
@@ -106,8 +106,8 @@ pub(super) fn spread_clearance(
 ) -> f32 {
     let at = |w: VertexId| mesh.position(w);
     let normal = unit((at(v) - at(u)).cross(at(left) - at(right)));
-    let shown = lower(facing_clearance(mesh, u, normal, longest), facing_clearance(mesh, v, normal, longest));
-    if shown <= 0.0 {
+    let area = lower(facing_clearance(mesh, u, normal, longest), facing_clearance(mesh, v, normal, longest));
+    if area <= 0.0 {
         return 0.0;
     }
     // Twice the smallest signed area of the triangles between a line and the vertices of a one-ring that must be on its
@@ -121,7 +121,7 @@ pub(super) fn spread_clearance(
     let at_left = higher(before_line(u, [v, left]), before_line(v, [left, u]));
     let at_right = higher(before_line(u, [right, v]), before_line(v, [u, right]));
     let rounding = ROUNDING * longest * longest;
-    lower(shown, (lower(at_left, at_right) - rounding) / (6.5 * longest))
+    lower(area, (lower(at_left, at_right) - rounding) / (6.5 * longest))
 }
 
 /// Returns the clearance between the triangles at `u` and those at `v` without a common corner, by a separating plane
@@ -212,18 +212,18 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
     least
 }
 
-/// Appends to `crossing` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
+/// Appends to `intersecting` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
 /// exact.
 pub(super) fn intersections_around(
     mesh: &Mesh,
     v: VertexId,
     output: Option<&OutputSpace>,
-    crossing: &mut Vec<VertexId>,
+    intersecting: &mut Vec<VertexId>,
 ) {
     let facets: Vec<Facet> = facets_at(mesh, v).collect();
     for (k, s) in facets.iter().enumerate() {
         for t in facets[..k].iter().filter(|t| intersect(s, t, output)) {
-            crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
+            intersecting.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
         }
     }
 }
@@ -238,10 +238,10 @@ pub(super) fn changes_intersect_around(
     output: Option<&OutputSpace>,
 ) -> bool {
     let is_changed =
-        |facet: &Facet| changed.iter().any(|names| names.iter().all(|w| facet.corners.contains(&w.0)));
+        |facet: &Facet| changed.iter().any(|corners| corners.iter().all(|w| facet.corners.contains(&w.0)));
     let facets: SmallVec<[(Facet, bool); ORDINARY_RING]> =
         facets_at(mesh, v).map(|facet| (facet, is_changed(&facet))).collect();
-    let margin = 2.0 * (finest(output) + ROUNDING * longest);
+    let margin = 2.0 * (exact_below(output) + ROUNDING * longest);
     let last = facets.len() - 1;
     facets.iter().enumerate().any(|(k, (s, s_changed))| {
         facets[..k].iter().enumerate().any(|(j, (t, t_changed))| {
@@ -259,26 +259,26 @@ fn are_apart_at_corner(corner: Vec3, s: &Facet, t: &Facet, margin: f32) -> bool 
     gap_between_corners(tips(s), tips(t)) > margin
 }
 
-/// Appends to `crossing` the corners of all pairs of intersecting triangles without a common corner, one at `u` and one
-/// at `v`; exact.
+/// Appends to `intersecting` the corners of all pairs of intersecting triangles without a common corner, one at `u` and
+/// one at `v`; exact.
 pub(super) fn intersections_between(
     mesh: &Mesh,
     [u, v]: [VertexId; 2],
     output: Option<&OutputSpace>,
-    crossing: &mut Vec<VertexId>,
+    intersecting: &mut Vec<VertexId>,
 ) {
     let others: SmallVec<[(Facet, Bounds); ORDINARY_RING]> =
         facets_at(mesh, v).map(|facet| (facet, bounds(&facet, output))).collect();
-    let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.joined(bounds));
+    let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.union(bounds));
     for s in facets_at(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
         let bounds = bounds(&s, output);
-        if !bounds.meets(&around_v) {
+        if !bounds.overlaps(&around_v) {
             continue;
         }
         for (t, other) in &others {
             let apart = t.corners.iter().all(|w| !s.corners.contains(w));
-            if apart && bounds.meets(other) && intersect(&s, t, output) {
-                crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
+            if apart && bounds.overlaps(other) && intersect(&s, t, output) {
+                intersecting.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
             }
         }
     }

@@ -4,9 +4,9 @@
 //! self-intersections may have some after it was mapped to world space. Triangles that rounding can bring together are
 //! tested there, too, after rounding.
 
-use super::FINEST;
+use super::MIN_LENGTH;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3, higher};
-use crate::mesh::{Facet, facets_cross};
+use crate::mesh::{Facet, facets_intersect};
 
 /// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and a safety
 /// factor of 2.
@@ -54,18 +54,18 @@ impl OutputSpace {
 }
 
 /// Returns the clearance below which triangles are tested by exact predicates.
-pub(super) fn finest(output: Option<&OutputSpace>) -> f32 {
-    output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
+pub(super) fn exact_below(output: Option<&OutputSpace>) -> f32 {
+    output.map_or(MIN_LENGTH, |space| higher(MIN_LENGTH, space.rounding()))
 }
 
 /// Returns whether two triangles intersect, in the space of the mesh or in its output space.
 pub(super) fn intersect(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> bool {
-    facets_cross(s, t) || output.is_some_and(|space| facets_cross(&space.facet(s), &space.facet(t)))
+    facets_intersect(s, t) || output.is_some_and(|space| facets_intersect(&space.facet(s), &space.facet(t)))
 }
 
 /// Returns the bounding box of a triangle, enlarged by the rounding of the output space.
 pub(super) fn bounds(facet: &Facet, output: Option<&OutputSpace>) -> Bounds {
-    let Bounds { min, max } = Bounds::of(&facet.points);
+    let Bounds { min, max } = Bounds::from_points(&facet.points);
     let margin = Vec3::splat(output.map_or(0.0, OutputSpace::rounding));
     Bounds { min: min - margin, max: max + margin }
 }

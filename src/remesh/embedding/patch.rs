@@ -1,8 +1,8 @@
 //! Tests whether the triangles changed by an edit intersect any others.
 
-use super::clearance::are_beside;
+use super::clearance::are_apart_in_plane;
 use super::one_ring::{changes_intersect_around, flat_clearance, longest_edge};
-use super::output::{OutputSpace, bounds, finest, intersect};
+use super::output::{OutputSpace, bounds, exact_below, intersect};
 use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
@@ -23,20 +23,20 @@ fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
 impl Embedding {
     /// Returns whether the triangles changed since [`Mesh::begin`], given by their corners, intersect each other or any
     /// others. The grid still holds the mesh before the edit.
-    pub(super) fn changes_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
+    pub(super) fn changes_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         let edited: Vec<Changed> =
-            names.iter().map(|&names| changed(mesh.facet(names), self.output.as_ref())).collect();
+            triangles.iter().map(|&corners| changed(mesh.facet(corners), self.output.as_ref())).collect();
         // Counted even if the cheap tests below reject the edit.
         self.effort += 1;
-        self.any_one_ring_intersects(mesh, names)
+        self.any_one_ring_intersects(mesh, triangles)
             || intersect_each_other(&edited, self.output.as_ref())
             || self.intersect_others(mesh, &edited)
     }
 
     /// Does the same as [`Self::changes_intersect`], for pairs of triangles with a common corner only.
-    pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
+    pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         self.effort += UNSEARCHED;
-        self.any_one_ring_intersects(mesh, names)
+        self.any_one_ring_intersects(mesh, triangles)
     }
 
     /// Returns whether two triangles with a common corner intersect, at the corners of the changed triangles.
@@ -46,14 +46,14 @@ impl Embedding {
         hubs.dedup();
         hubs.into_iter().any(|hub| {
             let longest = longest_edge(mesh, hub);
-            flat_clearance(mesh, hub, longest) <= self.finest()
+            flat_clearance(mesh, hub, longest) <= self.exact_below()
                 && changes_intersect_around(mesh, hub, longest, changed, self.output.as_ref())
         })
     }
 
     /// Returns whether a changed triangle intersects an unchanged one without a common corner.
     fn intersect_others(&mut self, mesh: &Mesh, edited: &[Changed]) -> bool {
-        let whole = edited.iter().fold(Bounds::EMPTY, |whole, (_, bounds)| whole.joined(bounds));
+        let whole = edited.iter().fold(Bounds::EMPTY, |whole, (_, bounds)| whole.union(bounds));
         let mut near = std::mem::take(&mut self.found);
         near.clear();
         self.grid.near_box(&whole, NEAREST_CORNER, |v| near.push(v));
@@ -67,7 +67,7 @@ impl Embedding {
             let is_new = |&(a, b): &(VertexId, VertexId)| !self.is_marked(a) && !self.is_marked(b);
             let others = mesh.ring(v).pairs().filter(is_new).map(|(a, b)| mesh.facet([v, a, b]));
             others
-                .filter(|other| !is_beside(other, &whole))
+                .filter(|other| !is_outside_box(other, &whole))
                 .any(|other| intersects_one(&changed(other, output), edited, output))
         });
         self.found = near;
@@ -77,7 +77,7 @@ impl Embedding {
 
 /// Returns whether all corners of a triangle are beyond one side of the box.
 #[inline]
-fn is_beside(facet: &Facet, bounds: &Bounds) -> bool {
+fn is_outside_box(facet: &Facet, bounds: &Bounds) -> bool {
     let [a, b, c] = facet.points;
     let below = a.cmplt(bounds.min) & b.cmplt(bounds.min) & c.cmplt(bounds.min);
     let above = a.cmpgt(bounds.max) & b.cmpgt(bounds.max) & c.cmpgt(bounds.max);
@@ -96,19 +96,15 @@ fn intersects_one(other: &Changed, edited: &[Changed], output: Option<&OutputSpa
 
 /// Returns whether two triangles without a common corner intersect.
 fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bool {
-    s.1.meets(&t.1)
+    s.1.overlaps(&t.1)
         && s.0.corners.iter().all(|v| !t.0.corners.contains(v))
-        && !are_beside_each_other(s, t, output)
+        && !are_apart(s, t, output)
         && intersect(&s.0, &t.0, output)
 }
 
 /// Returns whether two triangles are known to be disjoint, including in the output space.
-fn are_beside_each_other(
-    (s, around_s): &Changed,
-    (t, around_t): &Changed,
-    output: Option<&OutputSpace>,
-) -> bool {
-    let whole = around_s.joined(around_t);
+fn are_apart((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&OutputSpace>) -> bool {
+    let whole = around_s.union(around_t);
     let reach = (whole.max - whole.min).max_element();
-    are_beside(&s.points, &t.points, reach, 2.0 * finest(output))
+    are_apart_in_plane(&s.points, &t.points, reach, 2.0 * exact_below(output))
 }

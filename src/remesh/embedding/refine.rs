@@ -17,18 +17,18 @@ impl Embedding {
         mesh.refine()?;
         let is_new = |v: &VertexId| v.index() >= before.slots();
         loop {
-            let crossing = self.check_all(mesh);
-            if crossing.is_empty() {
+            let intersecting = self.check_all(mesh);
+            if intersecting.is_empty() {
                 return Ok(true);
             }
             let mut flips = 0;
-            for v in crossing.into_iter().filter(is_new) {
+            for v in intersecting.into_iter().filter(is_new) {
                 let across: Vec<VertexId> = mesh.ring(v).as_slice().iter().copied().filter(is_new).collect();
                 flips += across.into_iter().filter(|&w| mesh.flip(v, w).is_ok()).count();
             }
             if flips == 0 {
                 let refined = std::mem::replace(mesh, before);
-                mesh.count_on_from(&refined);
+                mesh.advance_versions_past(&refined);
                 return Ok(false);
             }
         }

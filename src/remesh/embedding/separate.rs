@@ -2,7 +2,7 @@
 
 use super::Embedding;
 use crate::math::Vec3;
-use crate::mesh::{Groups, Mesh, VertexId};
+use crate::mesh::{DisjointSets, Mesh, VertexId};
 
 /// Displacements along the normals that are tried in turn, relative to the ordinary edge.
 const OFFSETS: [f32; 8] = [-0.02, 0.02, -0.06, 0.06, -0.12, 0.12, -0.2, 0.2];
@@ -11,10 +11,10 @@ const OFFSETS: [f32; 8] = [-0.02, 0.02, -0.06, 0.06, -0.12, 0.12, -0.2, 0.2];
 const SHARES: [f32; 2] = [0.5, 1.0];
 
 /// The largest distance between neighbouring vertices of one cluster, relative to the ordinary edge.
-const PLACE: f32 = 1.0;
+const CLUSTER_DISTANCE: f32 = 1.0;
 
 /// The largest number of corners of intersecting triangles: with more, moving a few vertices is no remedy.
-const MOST: usize = 4000;
+const MAX_VERTICES: usize = 4000;
 
 /// Vertices, each with its displacement before scaling.
 type Moves = Vec<(VertexId, Vec3)>;
@@ -24,40 +24,46 @@ impl Embedding {
     /// at the start from a contour. Returns whether none intersect afterwards; if some do, other clusters may have been
     /// changed.
     ///
-    /// `crossing` must contain all corners of intersecting triangles, as returned by [`Self::crossing`].
-    pub fn separate(&mut self, mesh: &mut Mesh, crossing: &[VertexId]) -> bool {
-        crossing.len() <= MOST
-            && places(mesh, crossing, PLACE * self.edge).iter().all(|place| self.separate_place(mesh, place))
+    /// `intersecting` must contain all corners of intersecting triangles, as returned by
+    /// [`Self::intersecting_vertices`].
+    pub fn separate(&mut self, mesh: &mut Mesh, intersecting: &[VertexId]) -> bool {
+        intersecting.len() <= MAX_VERTICES
+            && clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge)
+                .iter()
+                .all(|cluster| self.separate_cluster(mesh, cluster))
     }
 
     /// Separates one cluster: tries to move all its vertices along their normals, then those of one sheet, then
     /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet.
-    fn separate_place(&mut self, mesh: &mut Mesh, place: &[VertexId]) -> bool {
-        let normal = |v: VertexId| mesh.area_normal(v).normalize_or_zero() * self.edge;
-        let all: Moves = place.iter().map(|&v| (v, normal(v))).collect();
-        let facing = |way: Vec3| -> Moves {
-            all.iter().copied().filter(|(_, normal)| normal.dot(way) > 0.0).collect()
+    fn separate_cluster(&mut self, mesh: &mut Mesh, cluster: &[VertexId]) -> bool {
+        let normal = |v: VertexId| mesh.area_normal(v).normalize_or_zero() * self.ordinary_edge;
+        let all: Moves = cluster.iter().map(|&v| (v, normal(v))).collect();
+        let facing = |displacement: Vec3| -> Moves {
+            all.iter().copied().filter(|(_, normal)| normal.dot(displacement) > 0.0).collect()
         };
         let mut sheets = vec![all.clone()];
-        sheets.extend(all.iter().map(|&(_, way)| facing(way)));
-        let inwards: Moves = place.iter().map(|&v| (v, to_neighbours(mesh, v))).collect();
+        sheets.extend(all.iter().map(|&(_, displacement)| facing(displacement)));
+        let inwards: Moves = cluster.iter().map(|&v| (v, to_neighbours(mesh, v))).collect();
         let mut spikes: Vec<Moves> = vec![inwards.clone()];
         spikes.extend(inwards.into_iter().map(|spike| vec![spike]));
         let mut any_moves = |moves: &[Moves], shares: &[f32]| {
-            moves.iter().any(|moves| shares.iter().any(|&share| self.separates(mesh, place, moves, share)))
+            moves.iter().any(|moves| shares.iter().any(|&share| self.separates(mesh, cluster, moves, share)))
         };
         any_moves(&sheets, &OFFSETS) || any_moves(&spikes, &SHARES)
     }
 
     /// Moves vertices of a cluster by `share` times their displacements, if no triangle of the cluster then intersects
     /// any other; returns whether they were moved.
-    fn separates(&mut self, mesh: &mut Mesh, place: &[VertexId], moves: &Moves, share: f32) -> bool {
-        let triangles = mesh.triangles_at(place);
+    fn separates(&mut self, mesh: &mut Mesh, cluster: &[VertexId], moves: &Moves, share: f32) -> bool {
+        let triangles = mesh.triangles_at(cluster);
         let edit = |mesh: &mut Mesh| {
-            moves.iter().for_each(|&(v, way)| mesh.set_position(v, mesh.position(v) + way * share));
+            moves
+                .iter()
+                .for_each(|&(v, displacement)| mesh.set_position(v, mesh.position(v) + displacement * share));
             Ok(())
         };
-        self.attempt_with(mesh, edit, |guard, mesh, _| guard.changes_intersect(mesh, &triangles)).is_ok()
+        self.attempt_with(mesh, edit, |embedding, mesh, _| embedding.changes_intersect(mesh, &triangles))
+            .is_ok()
     }
 }
 
@@ -69,26 +75,26 @@ fn to_neighbours(mesh: &Mesh, v: VertexId) -> Vec3 {
 }
 
 /// Groups the vertices into clusters: those nearer than `distance`, directly or via others, are together.
-fn places(mesh: &Mesh, vertices: &[VertexId], distance: f32) -> Vec<Vec<VertexId>> {
-    let mut groups = Groups::new(vertices.len());
+fn clusters(mesh: &Mesh, vertices: &[VertexId], distance: f32) -> Vec<Vec<VertexId>> {
+    let mut groups = DisjointSets::new(vertices.len());
     for (i, &v) in vertices.iter().enumerate() {
         for (j, &w) in vertices[..i].iter().enumerate() {
             if mesh.position(v).distance_squared(mesh.position(w)) < distance * distance {
-                groups.join(i, j);
+                groups.union(i, j);
             }
         }
     }
-    let mut places = vec![Vec::new(); vertices.len()];
-    vertices.iter().enumerate().for_each(|(i, &v)| places[groups.find(i)].push(v));
-    places.retain(|place| !place.is_empty());
-    places
+    let mut clusters = vec![Vec::new(); vertices.len()];
+    vertices.iter().enumerate().for_each(|(i, &v)| clusters[groups.find(i)].push(v));
+    clusters.retain(|cluster| !cluster.is_empty());
+    clusters
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::mesh::{count_crossings, shapes};
+    use crate::mesh::{count_self_intersections, shapes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -107,22 +113,22 @@ mod tests {
 
     #[test]
     fn what_intersects_a_little_is_separated_and_nothing_else_moves() {
-        let mut mended = 0;
+        let mut count = 0;
         for seed in 0..40 {
             let mut mesh = overlapping(seed);
             let before = mesh.clone();
             let mut embedding = Embedding::default();
-            embedding.follow_with(&mesh, 0.9);
-            let crossing = embedding.crossing(&mesh);
-            let separated = embedding.separate(&mut mesh, &crossing);
-            mended += u32::from(separated && !crossing.is_empty());
-            assert_eq!(separated, count_crossings(&mesh.to_triangles()) == 0, "seed {seed}");
+            embedding.sync_with_edge(&mesh, 0.9);
+            let intersecting = embedding.intersecting_vertices(&mesh);
+            let separated = embedding.separate(&mut mesh, &intersecting);
+            count += u32::from(separated && !intersecting.is_empty());
+            assert_eq!(separated, count_self_intersections(&mesh.to_triangles()) == 0, "seed {seed}");
             assert!(embedding.is_embedded(&mesh) == separated, "seed {seed}");
-            for v in mesh.vertices().filter(|v| !crossing.contains(v)) {
+            for v in mesh.vertices().filter(|v| !intersecting.contains(v)) {
                 assert_eq!(mesh.position(v), before.position(v), "seed {seed}");
             }
         }
-        assert!(mended > 20, "{mended} mended");
+        assert!(count > 20, "{count} separated");
     }
 
     #[test]
@@ -130,9 +136,9 @@ mod tests {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 2.0, 0.8).unwrap();
         mesh.append(&Mesh::icosphere(Vec3::X * 1.5, 2.0, 0.8).unwrap()).unwrap();
         let mut embedding = Embedding::default();
-        embedding.follow_with(&mesh, 0.9);
-        let crossing = embedding.crossing(&mesh);
-        assert!(!crossing.is_empty() && !embedding.separate(&mut mesh, &crossing));
+        embedding.sync_with_edge(&mesh, 0.9);
+        let intersecting = embedding.intersecting_vertices(&mesh);
+        assert!(!intersecting.is_empty() && !embedding.separate(&mut mesh, &intersecting));
         assert_eq!(mesh.check(), Ok(()));
     }
 }

@@ -147,8 +147,8 @@ mod tests {
             let (at, inside) = nearest_in([a, b], p);
             let found = (a * at.a + b * at.b).distance(p);
             let corners = [Vec3::ZERO, a, b];
-            let weights = triangle::closest(corners, p);
-            let expected = triangle::at(corners, weights).distance(p.as_dvec3()) as f32;
+            let weights = triangle::closest_barycentric(corners, p);
+            let expected = triangle::point_at(corners, weights).distance(p.as_dvec3()) as f32;
             assert!((found - expected).abs() < 1e-4, "{corners:?} to {p}: {found} instead of {expected}");
             assert!(at.a >= 0.0 && at.b >= 0.0 && at.a + at.b <= 1.0 + 1e-6, "{at:?}");
             assert!(!inside || weights.min_element() > -1e-3);

@@ -48,7 +48,7 @@ impl Fan {
     fn exact_gap(&self) -> f32 {
         let distance = |&(a, b, _): &(Vec3, Vec3, Vec3)| {
             let corners = [self.to, a, b];
-            triangle::at(corners, triangle::closest(corners, self.from))
+            triangle::point_at(corners, triangle::closest_barycentric(corners, self.from))
                 .distance_squared(self.from.as_dvec3())
         };
         self.sides.iter().map(distance).fold(f64::INFINITY, f64::min).sqrt() as f32

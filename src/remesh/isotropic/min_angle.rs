@@ -1,10 +1,10 @@
 //! Minimum-angle optimisation: increases the smallest angles one by one, by a flip, a collapse or a move.
 
-use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, least_quality, moved};
+use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, min_quality, moved};
 use super::session::Session;
 use crate::math::Vec3;
-use crate::mesh::{Mesh, Opposite, VertexId};
-use crate::remesh::restructure::{LEAST_VALENCE, may_collapse, may_flip};
+use crate::mesh::{Mesh, OppositeVertices, VertexId};
+use crate::remesh::restructure::{MIN_VALENCE, may_collapse, may_flip};
 use crate::remesh::{Changes, EdgeBounds, EditPolicy};
 
 /// The squared sine of 33°: triangles with a smaller angle are improved.
@@ -18,7 +18,7 @@ const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
 const MOVES: usize = 4;
 
 /// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
-const MOST_VALENCE: usize = 10;
+const MAX_VALENCE: usize = 10;
 
 /// Improves angles below 33° by edits that keep edges within bounds or bring them nearer to them; returns the changes
 /// made.
@@ -64,7 +64,7 @@ fn improve_around<E: EditPolicy>(
     for &w in ring {
         changes.inversions += u32::from(flip(mesh, bounds, [v, w], session));
     }
-    let now = least_quality(mesh, v);
+    let now = min_quality(mesh, v);
     if now >= POOR {
         return changes;
     }
@@ -85,7 +85,7 @@ fn flip<E: EditPolicy>(
     [u, v]: [VertexId; 2],
     session: &mut Session<E>,
 ) -> bool {
-    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    let Ok(OppositeVertices { left, right }) = mesh.opposite_vertices(u, v) else { return false };
     let [p, q, a, b] = [u, v, left, right].map(|w| mesh.position(w));
     let lesser = |s: f32, t: f32| if s < t { s } else { t };
     let now = lesser(angle_quality([p, q, a]), angle_quality([q, p, b]));
@@ -94,8 +94,8 @@ fn flip<E: EditPolicy>(
     }
     let then = lesser(angle_quality([p, b, a]), angle_quality([q, a, b]));
     let valence = |w: VertexId| mesh.ring(w).valence();
-    let fits = [u, v].iter().all(|&w| valence(w) > LEAST_VALENCE)
-        && [left, right].iter().all(|&w| valence(w) < MOST_VALENCE);
+    let fits = [u, v].iter().all(|&w| valence(w) > MIN_VALENCE)
+        && [left, right].iter().all(|&w| valence(w) < MAX_VALENCE);
     then > now
         && fits
         && may_flip(mesh, bounds, [u, v], [left, right])
@@ -103,20 +103,20 @@ fn flip<E: EditPolicy>(
         && session.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok()
 }
 
-/// Collapses `gone` into `kept` if that increases the smallest angle around it from `now`.
+/// Collapses `removed` into `kept` if that increases the smallest angle around it from `now`.
 fn collapse<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
-    [kept, gone]: [VertexId; 2],
+    [kept, removed]: [VertexId; 2],
     now: f32,
     session: &mut Session<E>,
 ) -> bool {
     let position = mesh.position(kept);
     let others = |(a, b): &(VertexId, VertexId)| *a != kept && *b != kept;
-    let done = all_better(mesh, mesh.ring(gone).pairs().filter(others), position, now)
-        && may_collapse(mesh, bounds, kept, gone)
-        && session.may_collapse(mesh, kept, gone)
-        && session.attempt(mesh, |mesh| mesh.collapse(kept, gone, position)).is_ok();
+    let done = all_better(mesh, mesh.ring(removed).pairs().filter(others), position, now)
+        && may_collapse(mesh, bounds, kept, removed)
+        && session.may_collapse(mesh, kept, removed)
+        && session.attempt(mesh, |mesh| mesh.collapse(kept, removed, position)).is_ok();
     if done {
         session.collapsed(kept);
     }
@@ -127,10 +127,10 @@ fn collapse<E: EditPolicy>(
 fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, session: &mut Session<E>) {
     let mut step = 0;
     for _ in 0..MOVES {
-        let Some(star) = OneRing::of(mesh, v) else { return };
+        let Some(one_ring) = OneRing::of(mesh, v) else { return };
         while step < STEPS.len() {
             let reach = STEPS[step] * session.target_edge();
-            if best_step(mesh, bounds, v, &star, reach, session) {
+            if best_step(mesh, bounds, v, &one_ring, reach, session) {
                 break;
             }
             step += 1;
@@ -143,17 +143,17 @@ fn best_step<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
     v: VertexId,
-    star: &OneRing,
+    one_ring: &OneRing,
     reach: f32,
     session: &mut Session<E>,
 ) -> bool {
     let p = mesh.position(v);
     let mut best = None;
-    let mut most = least_quality(mesh, v);
+    let mut most = min_quality(mesh, v);
     let ring = mesh.ring(v).as_slice();
     let towards = ring.iter().map(|&w| mesh.position(w) - p).flat_map(|direction| [direction, -direction]);
     for direction in towards {
-        let position = p + star.along(direction.normalize_or(Vec3::ZERO) * reach);
+        let position = p + one_ring.along(direction.normalize_or(Vec3::ZERO) * reach);
         // The closest point is near `position`, so most steps can be rejected without computing it.
         if !all_better(mesh, mesh.ring(v).pairs(), position, most) {
             continue;

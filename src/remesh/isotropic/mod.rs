@@ -20,7 +20,7 @@ mod one_ring;
 mod relax;
 mod session;
 
-use super::restructure::{MOST_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
+use super::restructure::{MAX_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
 use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
 use crate::mesh::{Mesh, MeshError};
 use conflicts::ConflictMask;
@@ -34,18 +34,18 @@ const ROUNDS: usize = 5;
 const SWEEPS: usize = 2;
 
 /// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With
-/// a smaller ratio, halves of long edges are too short. `MOST_INSIDE` is the largest factor by which wider bounds are
+/// a smaller ratio, halves of long edges are too short. `MAX_NARROWING` is the largest factor by which wider bounds are
 /// narrowed.
 const INNER_RATIO: f32 = 5.0 / 3.0;
-const MOST_INSIDE: f32 = 1.2;
+const MAX_NARROWING: f32 = 1.2;
 
 /// The largest number of runs with unchecked edits. Usually the second one has no intersections; after this many, all
 /// edits are checked.
-const TRUSTING_RUNS: usize = 4;
+const UNCHECKED_RUNS: usize = 4;
 
 /// The index of the unsuccessful run after which the input is tested for self-intersections. The test takes longer than
 /// a run to long edges, and only an input that intersects itself fails often.
-const INPUT_TESTED: usize = 1;
+const INPUT_TEST_RUN: usize = 1;
 
 /// Remeshes isotropically: brings edge lengths within bounds and valences near six, preserving shape, components and χ;
 /// returns the changes made. Vertices are renumbered.
@@ -65,10 +65,10 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     let exponent = exponent.clamp(-EXPONENTS, EXPONENTS);
     let [shrink, grow] = [-exponent, exponent].map(|power| libm::ldexpf(1.0, power));
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
-    let changes = in_bounds(mesh, bounds.scaled(shrink));
-    if mesh.vertex_count() >= MOST_VERTICES {
+    let changes = remesh_scaled(mesh, bounds.scaled(shrink));
+    if mesh.vertex_count() >= MAX_VERTICES {
         mesh.clone_from(&before);
-        return Err(MeshError::TooLarge { bytes: bytes(MOST_VERTICES as f64) });
+        return Err(MeshError::TooLarge { bytes: bytes(MAX_VERTICES as f64) });
     }
     mesh.reorder();
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
@@ -79,18 +79,18 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
 const EXPONENTS: i32 = 120;
 
 /// Remeshes with unchecked edits, then with checked ones where needed.
-fn in_bounds(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
+fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
     let surface = mesh.clone();
     let target_edge = (bounds.min * bounds.max).sqrt();
     let mut conflicts = ConflictMask::new(&surface);
-    for run in 0..TRUSTING_RUNS {
+    for run in 0..UNCHECKED_RUNS {
         let mut session = Session::new(&surface, target_edge, conflicts.complement(), Unchecked);
         let mut changes = rounds(mesh, bounds, &mut session);
-        let mut embedding = followed(mesh, bounds.max);
-        let intersecting = embedding.crossing(mesh);
+        let mut embedding = embedding_of(mesh, bounds.max);
+        let intersecting = embedding.intersecting_vertices(mesh);
         let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting);
         let left_out = !conflicts.is_empty();
-        let near = if is_separated { intersecting } else { embedding.crossing(mesh) };
+        let near = if is_separated { intersecting } else { embedding.intersecting_vertices(mesh) };
         near.into_iter().for_each(|v| conflicts.add(session.anchor(v), mesh.position(v), target_edge));
         if is_separated {
             let mut checked = session.with(conflicts.dilated(target_edge), embedding);
@@ -102,23 +102,23 @@ fn in_bounds(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
             return changes;
         }
         mesh.clone_from(&surface);
-        if run == INPUT_TESTED && !followed(mesh, mesh.longest_edge()).is_embedded(mesh) {
+        if run == INPUT_TEST_RUN && !embedding_of(mesh, mesh.longest_edge()).is_embedded(mesh) {
             break;
         }
     }
-    let embedding = followed(mesh, bounds.max);
+    let embedding = embedding_of(mesh, bounds.max);
     rounds(mesh, bounds, &mut Session::new(&surface, target_edge, vec![true; surface.slots()], embedding))
 }
 
-fn followed(mesh: &Mesh, edge: f32) -> Embedding {
+fn embedding_of(mesh: &Mesh, edge: f32) -> Embedding {
     let mut embedding = Embedding::default();
-    embedding.follow_with(mesh, edge);
+    embedding.sync_with_edge(mesh, edge);
     embedding
 }
 
 fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = Changes::default();
-    let inner = inside(bounds);
+    let inner = inner_bounds(bounds);
     for round in 0..ROUNDS {
         let edits = pass(mesh, inner, session);
         if round == 0 {
@@ -144,15 +144,15 @@ fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut 
 /// Does the same as [`restructure`](super::restructure()), with a limit on the number of vertices.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
-    changes += split_long(mesh, bounds, MOST_VERTICES, session);
+    changes += split_long(mesh, bounds, MAX_VERTICES, session);
     changes += flip_for_valence(mesh, bounds, session);
     changes
 }
 
 /// Returns the bounds used in rounds, a little narrower than the requested ones, so that moves leave few edges out of
 /// bounds.
-fn inside(EdgeBounds { min, max }: EdgeBounds) -> EdgeBounds {
+fn inner_bounds(EdgeBounds { min, max }: EdgeBounds) -> EdgeBounds {
     let margin = (max / min / INNER_RATIO).sqrt();
-    let margin = if margin < MOST_INSIDE { margin } else { MOST_INSIDE };
+    let margin = if margin < MAX_NARROWING { margin } else { MAX_NARROWING };
     EdgeBounds { min: min * margin, max: max / margin }
 }

@@ -127,7 +127,7 @@ fn leaves(new: f32, old: f32, shortest: f32) -> bool {
 }
 
 /// Returns the lowest [`angle_quality`] around `v`.
-pub(super) fn least_quality(mesh: &Mesh, v: VertexId) -> f32 {
+pub(super) fn min_quality(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let of = |(a, b)| angle_quality([p, mesh.position(a), mesh.position(b)]);
     mesh.ring(v).pairs().map(of).fold(1.0, |least, here| if here < least { here } else { least })

@@ -1,7 +1,7 @@
 //! Tangential relaxation: each vertex moves along the surface to the centroid of its triangles, then to the closest point on the input
 //! surface (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004).
 
-use super::one_ring::{Move, OneRing, least_quality, moved};
+use super::one_ring::{Move, OneRing, min_quality, moved};
 use super::session::Session;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{EdgeBounds, EditPolicy};
@@ -21,14 +21,14 @@ pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session:
         if !mesh.is_live(v) || !session.is_free(v) {
             continue;
         }
-        let Some(star) = OneRing::of(mesh, v) else { continue };
-        let step = star.along(star.to_centroid);
+        let Some(one_ring) = OneRing::of(mesh, v) else { continue };
+        let step = one_ring.along(one_ring.to_centroid);
         if step.length_squared() < shortest * shortest {
             continue;
         }
         let closest = session.closest_point(v, mesh.position(v) + step);
         if let Some(Move { least_quality: after, deviation }) = moved(mesh, v, closest.point, bounds, session)
-            && (after >= GOOD || after >= least_quality(mesh, v))
+            && (after >= GOOD || after >= min_quality(mesh, v))
         {
             moves += usize::from(session.move_to(mesh, v, closest, deviation));
         }

@@ -10,7 +10,7 @@ use crate::remesh::EditPolicy;
 /// The largest deviation accumulated by collapses and moves, and the largest depth of a flip, as fractions of the
 /// target edge. Higher values shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces stay
 /// out of bounds.
-const MOST_DEVIATION: f32 = 0.25;
+const MAX_DEVIATION: f32 = 0.25;
 const FLIP_DEPTH: f32 = 0.15;
 
 /// State of a remeshing run, and the [`EditPolicy`] that keeps the mesh close to the input surface.
@@ -94,11 +94,11 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         moved.is_ok()
     }
 
-    /// Returns the distance of `gone` from the surface after its collapse; `None` if a triangle would not face
+    /// Returns the distance of `removed` from the surface after its collapse; `None` if a triangle would not face
     /// outwards.
-    fn gap_without(&self, mesh: &Mesh, kept: VertexId, gone: VertexId) -> Option<f32> {
-        let mut fan = Fan::new(mesh.position(gone), mesh.position(kept));
-        for (a, b) in mesh.ring(gone).pairs().filter(|&(a, b)| a != kept && b != kept) {
+    fn gap_without(&self, mesh: &Mesh, kept: VertexId, removed: VertexId) -> Option<f32> {
+        let mut fan = Fan::new(mesh.position(removed), mesh.position(kept));
+        for (a, b) in mesh.ring(removed).pairs().filter(|&(a, b)| a != kept && b != kept) {
             if !self.faces_outwards([kept, a, b], fan.push(mesh.position(a), mesh.position(b))) {
                 return None;
             }
@@ -109,14 +109,14 @@ impl<'a, E: EditPolicy> Session<'a, E> {
     /// Returns the deviation at `v` increased by `gap`; `None` if it exceeds the limit.
     pub fn deviation_after(&self, v: VertexId, gap: f32) -> Option<f32> {
         let deviation = self.deviation[v.index()] + gap;
-        (deviation <= MOST_DEVIATION * self.target_edge).then_some(deviation)
+        (deviation <= MAX_DEVIATION * self.target_edge).then_some(deviation)
     }
 
     /// Renumbers the mesh in memory order along its surface, together with the arrays by slot.
     pub fn reorder(&mut self, mesh: &mut Mesh) {
-        let names = mesh.reorder();
+        let new_ids = mesh.reorder();
         let (mut anchors, mut deviation) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);
-        for (old, new) in names.iter().enumerate() {
+        for (old, new) in new_ids.iter().enumerate() {
             if let Some(new) = new {
                 anchors[new.index()] = self.anchors[old];
                 deviation[new.index()] = self.deviation[old];
@@ -135,12 +135,12 @@ impl<E: EditPolicy> EditPolicy for Session<'_, E> {
         self.edits.attempt(mesh, edit)
     }
 
-    fn may_collapse(&mut self, mesh: &Mesh, kept: VertexId, gone: VertexId) -> bool {
-        if !self.is_free(kept) || !self.is_free(gone) {
+    fn may_collapse(&mut self, mesh: &Mesh, kept: VertexId, removed: VertexId) -> bool {
+        if !self.is_free(kept) || !self.is_free(removed) {
             return false;
         }
-        let Some(gap_without) = self.gap_without(mesh, kept, gone) else { return false };
-        let Some(deviation) = self.deviation_after(gone, gap_without) else { return false };
+        let Some(gap_without) = self.gap_without(mesh, kept, removed) else { return false };
+        let Some(deviation) = self.deviation_after(removed, gap_without) else { return false };
         self.pending_deviation = deviation.max(self.deviation[kept.index()]);
         true
     }

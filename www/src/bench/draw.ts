@@ -1,7 +1,8 @@
+import { LANGUAGE, text } from '../texts';
 import { h } from '../ui/dom';
 import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
-import { askedOf, type Bar, type Figure, meets, type Target, verdict, withUnit } from './targets';
+import { type Bar, type Figure, formatTarget, meetsTarget, type Target, verdict, withUnit } from './targets';
 
 /** Draws one benchmark: what was measured and how, its charts, and the same numbers as tables. */
 export function drawSection({ id, title, measured, command, notes, charts }: Section): HTMLElement {
@@ -14,11 +15,18 @@ export function drawSection({ id, title, measured, command, notes, charts }: Sec
     h('p', {}, h('code', {}, command)),
     ...list,
     ...charts.map((chart) => drawChart(chart)),
-    h('details', {}, h('summary', {}, 'As tables'), ...charts.map((chart) => tableOf(title, chart))),
+    h('details', {}, h('summary', {}, text('bench.asTables')), ...charts.map((chart) => tableOf(title, chart))),
   );
 }
 
-const WORDS = { linear: '', log: '; logarithmic', ratio: '; logarithmic, bars begin at 1×' };
+/** Verdicts as shown. */
+export const VERDICTS = {
+  met: text('bench.met'),
+  'not met': text('bench.notMet'),
+  'not measured': text('bench.notMeasured'),
+};
+
+const WORDS = { linear: '', log: text('bench.logarithmic'), ratio: text('bench.logarithmicRatio') };
 
 function drawChart(chart: Chart): HTMLElement {
   const { title, unit, kind, figures } = chart;
@@ -27,43 +35,54 @@ function drawChart(chart: Chart): HTMLElement {
     kind,
     values.filter((value) => value !== undefined),
   );
-  const drawn: Drawing = { unit, ...scale };
+  const drawn: ChartLayout = { unit, ...scale };
   return h(
     'figure',
     { class: 'bench-chart' },
-    h('figcaption', {}, h('h3', {}, title), ` ${unit === '×' ? 'as a ratio' : `in ${unit}`}${WORDS[kind]}`),
+    h(
+      'figcaption',
+      {},
+      h('h3', {}, title),
+      ` ${unit === '×' ? text('bench.asRatio') : text('bench.inUnit', { unit })}${WORDS[kind]}`,
+    ),
     ...figures.map((figure) => drawFigure(figure, drawn)),
     axis(drawn),
   );
 }
 
-interface Drawing {
+interface ChartLayout {
   unit: string;
   at: (value: number) => number;
   base: number;
   ticks: number[];
 }
 
-function drawFigure(figure: Figure, drawn: Drawing): HTMLElement {
+function drawFigure(figure: Figure, drawn: ChartLayout): HTMLElement {
   const { name, target, bars } = figure;
-  const asked = target ? [verdictMark(figure, askedOf(target, drawn.unit))] : [];
+  const verdictMarks = target ? [verdictMark(figure, formatTarget(target, drawn.unit))] : [];
   return h(
     'div',
     { class: 'bench-figure' },
-    h('p', { class: 'bench-name' }, h('span', {}, name), ...asked),
+    h('p', { class: 'bench-name' }, h('span', {}, name), ...verdictMarks),
     ...bars.map((bar) => drawBar(figure, bar, drawn)),
   );
 }
 
-function verdictMark(figure: Figure, asked: string): HTMLElement {
+function verdictMark(figure: Figure, target: string): HTMLElement {
   const found = verdict(figure);
-  return h('span', { class: 'verdict', 'data-verdict': found }, `asked: ${asked}; `, h('strong', {}, found));
+  return h(
+    'span',
+    { class: 'verdict', 'data-verdict': found },
+    text('bench.target', { target: target }),
+    h('strong', {}, VERDICTS[found]),
+  );
 }
 
-function drawBar(figure: Figure, bar: Bar, drawn: Drawing): HTMLElement {
+function drawBar(figure: Figure, bar: Bar, drawn: ChartLayout): HTMLElement {
   const { label, value, remark, skipped } = bar;
   const row = h('div', { class: 'bench-bar' }, h('span', { class: 'bench-label' }, label));
-  if (value === undefined) row.append(h('span', { class: 'bench-skipped' }, `skipped: ${skipped}`));
+  if (value === undefined)
+    row.append(h('span', { class: 'bench-skipped' }, text('bench.skipped', { reason: skipped ?? '' })));
   else {
     row.append(track(figure, bar, value, drawn), h('data', { value }, withUnit(value, drawn.unit)));
     if (remark) row.append(h('span', { class: 'bench-remark' }, remark));
@@ -72,8 +91,8 @@ function drawBar(figure: Figure, bar: Bar, drawn: Drawing): HTMLElement {
 }
 
 /** Draws the bar and the mark of its target; decorative, since the number beside it says the same. */
-function track(figure: Figure, bar: Bar, value: number, { at, base }: Drawing): HTMLElement {
-  const missed = meets(figure, bar) === false;
+function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayout): HTMLElement {
+  const missed = meetsTarget(figure, bar) === false;
   const [from, to] = [Math.min(at(value), base), Math.max(at(value), base)];
   const filled = h('div', { class: missed ? 'bench-fill missed' : 'bench-fill' });
   // Set by script: the page's content security policy allows no inline style in the markup.
@@ -98,12 +117,12 @@ function placed(kind: string, share: number, ...children: string[]): HTMLElement
   return element;
 }
 
-function axis({ ticks, at }: Drawing): HTMLElement {
+function axis({ ticks, at }: ChartLayout): HTMLElement {
   const label = (tick: number) => placed('bench-tick', at(tick), short(tick));
   return h('div', { class: 'bench-axis', 'aria-hidden': true }, h('div', {}, ...ticks.map(label)));
 }
 
-const short = (value: number) => new Intl.NumberFormat('en', { maximumSignificantDigits: 3 }).format(value);
+const short = (value: number) => new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 3 }).format(value);
 
 /** Creates the table of a chart: a row per figure if all have the same hosts, else a row per bar. */
 function tableOf(section: string, chart: Chart): HTMLElement {
@@ -111,7 +130,7 @@ function tableOf(section: string, chart: Chart): HTMLElement {
   const [head, rows] = kind === 'ratio' ? listed(chart) : byHost(chart);
   return scrolling(
     // Charts of different sections have the same title.
-    `${section}: ${title}`,
+    text('bench.chartTable', { section, title }),
     h(
       'table',
       { class: 'times bench-table' },
@@ -135,12 +154,17 @@ type Table = [head: string[], rows: string[][]];
 
 function byHost({ unit, figures }: Chart): Table {
   const hosts = [...new Set(figures.flatMap(({ bars }) => bars.map(({ label }) => label)))];
-  const asks = figures.some(({ target }) => target);
+  const hasTargets = figures.some(({ target }) => target);
   const row = (figure: Figure) => [figure.name, ...hosts.map((host) => shownAt(figure, host, unit))];
-  const asked = (figure: Figure) => (figure.target ? [askedOf(figure.target, unit), verdict(figure)] : ['–', '–']);
+  const targetCells = (figure: Figure) =>
+    figure.target ? [formatTarget(figure.target, unit), VERDICTS[verdict(figure)]] : ['–', '–'];
   return [
-    ['Measured', ...hosts, ...(asks ? ['Asked', 'Outcome'] : [])],
-    figures.map((figure) => [...row(figure), ...(asks ? asked(figure) : [])]),
+    [
+      text('bench.columnMeasured'),
+      ...hosts,
+      ...(hasTargets ? [text('bench.columnTarget'), text('bench.columnVerdict')] : []),
+    ],
+    figures.map((figure) => [...row(figure), ...(hasTargets ? targetCells(figure) : [])]),
   ];
 }
 
@@ -153,11 +177,16 @@ function listed({ unit, figures }: Chart): Table {
   const row = (name: string, { label, value, skipped, remark }: Bar) => [
     name,
     label,
-    value === undefined ? 'skipped' : withUnit(value, unit),
+    value === undefined ? text('bench.skippedShort') : withUnit(value, unit),
     remark ?? skipped ?? '',
   ];
   return [
-    ['Measured', 'Beside', 'Ours to theirs', 'What came of both'],
+    [
+      text('bench.columnMeasured'),
+      text('bench.columnCompared'),
+      text('bench.columnRatio'),
+      text('bench.columnResults'),
+    ],
     figures.flatMap(({ name, bars }) => bars.map((bar) => row(name, bar))),
   ];
 }

@@ -1,39 +1,46 @@
+import { text, textNodes } from '../texts';
 import '../style.css';
 import './bench.css';
 import json from '../../../bench.json';
+import { LAB_IDS } from '../labs/address';
 import { h } from '../ui/dom';
-import { drawSection, rowOf, scrolling } from './draw';
+import { drawSection, rowOf, scrolling, VERDICTS } from './draw';
 import type { Report } from './report';
 import { type Chart, type Section, sectionsOf } from './sections';
-import { askedOf, type Figure, verdict, withUnit } from './targets';
+import { type Figure, formatTarget, verdict, withUnit } from './targets';
 
 const report = json as unknown as Report;
 
-interface Asked {
+interface Targeted {
   chart: Chart;
   figure: Figure;
 }
 
-function askedIn({ charts }: Section): Asked[] {
+function targetsIn({ charts }: Section): Targeted[] {
   return charts.flatMap((chart) => chart.figures.filter(({ target }) => target).map((figure) => ({ chart, figure })));
 }
 
 /** Summarises all measurements with a target and their results. */
 function summary(sections: Section[]): HTMLElement {
-  const asked = sections.flatMap(askedIn);
-  const met = asked.filter(({ figure }) => verdict(figure) === 'met').length;
-  const heads = ['Measured', 'Outcome', 'Asked', 'Found at worst'].map((text) => h('th', { scope: 'col' }, text));
+  const targets = sections.flatMap(targetsIn);
+  const met = targets.filter(({ figure }) => verdict(figure) === 'met').length;
+  const heads = [
+    text('bench.columnMeasured'),
+    text('bench.columnVerdict'),
+    text('bench.columnTarget'),
+    text('bench.columnWorst'),
+  ].map((text) => h('th', { scope: 'col' }, text));
   return h(
     'section',
     { class: 'panel', id: 'summary' },
-    h('h2', {}, `${met} of ${asked.length} bounds kept`),
+    h('h2', {}, text('bench.targetsMet', { met, targets: targets.length })),
     scrolling(
-      'Summary',
+      text('bench.summary'),
       h(
         'table',
         { class: 'times bench-table summary' },
         h('thead', {}, h('tr', {}, ...heads)),
-        ...sections.filter((section) => askedIn(section).length > 0).map((section) => group(section)),
+        ...sections.filter((section) => targetsIn(section).length > 0).map((section) => group(section)),
       ),
     ),
   );
@@ -42,19 +49,24 @@ function summary(sections: Section[]): HTMLElement {
 function group(section: Section): HTMLElement {
   const link = h('a', { href: `#${section.id}` }, section.title);
   const head = h('tr', { class: 'group' }, h('th', { scope: 'rowgroup', colspan: 4 }, link));
-  return h('tbody', {}, head, ...askedIn(section).map((asked) => summaryRow(asked)));
+  return h('tbody', {}, head, ...targetsIn(section).map((targeted) => summaryRow(targeted)));
 }
 
-function summaryRow({ chart, figure }: Asked): HTMLElement {
+function summaryRow({ chart, figure }: Targeted): HTMLElement {
   const { name, target } = figure;
   const outcome = verdict(figure);
-  const row = rowOf([name, outcome, target ? askedOf(target, chart.unit) : '', foundIn(figure, chart.unit)]);
+  const row = rowOf([
+    name,
+    VERDICTS[outcome],
+    target ? formatTarget(target, chart.unit) : '',
+    worstValue(figure, chart.unit),
+  ]);
   row.dataset.verdict = outcome;
   return row;
 }
 
 /** Returns the value of the worst bar with a target. */
-function foundIn({ bars, target }: Figure, unit: string): string {
+function worstValue({ bars, target }: Figure, unit: string): string {
   const sign = target?.sense === 'least' ? -1 : 1;
   const judged = bars.filter(({ label, value }) => value !== undefined && label.startsWith(target?.host ?? ''));
   const [worst] = judged.sort((one, other) => sign * ((other.value ?? 0) - (one.value ?? 0)));
@@ -63,14 +75,29 @@ function foundIn({ bars, target }: Figure, unit: string): string {
 
 const hostsOf = ({ points, head }: Report) => (points ?? head ?? []).map(({ host }) => host);
 
+/** Fills the header of the page: its name, the links to the labs, and what it shows. */
+function fillHeader(): void {
+  const fill = (id: string, ...children: (Node | string)[]) => document.getElementById(id)?.append(...children);
+  const links = LAB_IDS.map((id) => h('a', { href: `./index.html#${id}` }, text(`shell.${id}`)));
+  fill('page-name', text('bench.pageName'));
+  fill('labs', ...links);
+  document.getElementById('labs')?.setAttribute('aria-label', text('shell.labs'));
+  fill('tagline', text('bench.tagline'));
+}
+
+fillHeader();
 const root = document.getElementById('bench');
 if (root) {
   const sections = sectionsOf(report);
-  const machine = report.processor ? ` on one core of ${report.processor}` : '';
-  const intro = `Measured${machine} by \`npm run bench\`, the best of ${report.bestOf} runs where nothing else is said; in WebAssembly in ${hostsOf(report).join(' and ')}, and some natively, too. A line across a bar is the bound that was set; bars that do not keep to it are striped.`;
-  const [before = '', command = '', after = ''] = intro.split('`');
+  const machine = report.processor ? text('bench.processor', { processor: report.processor }) : '';
+  const intro = textNodes('bench.intro', {
+    machine,
+    command: h('code', {}, 'npm run bench'),
+    runs: String(report.bestOf),
+    hosts: hostsOf(report).join(text('bench.and')),
+  });
   root.append(
-    h('p', { class: 'bench-intro' }, before, h('code', {}, command), after),
+    h('p', { class: 'bench-intro' }, ...intro),
     summary(sections),
     ...sections.map((section) => drawSection(section)),
   );

@@ -1,4 +1,5 @@
 /** Benchmarks of the app itself: start-up time, frame rate and memory. */
+import { text } from '../texts';
 import { count } from '../ui/format';
 import type { Report } from './report';
 import type { Section } from './sections';
@@ -13,43 +14,44 @@ export function pageSection(page: NonNullable<Report['page']>): Section {
   });
   const seconds = (name: string, milliseconds: number, target?: Target) => figure(name, milliseconds / 1000, target);
   const turning = (name: string, { fps, triangles }: { fps: number; triangles: number }) =>
-    figure(`${name}, ${count(triangles)} triangles`, fps, atLeast(30));
+    figure(text('bench.pageTriangles', { name, triangles: count(triangles) }), fps, atLeast(30));
   const held = {
-    'the page’s objects': memory.heap,
-    'its arrays': memory.arrays,
-    'the module': memory.wasm,
+    [text('bench.pageObjects')]: memory.heap,
+    [text('bench.pageArrays')]: memory.arrays,
+    [text('bench.pageModule')]: memory.wasm,
     GPU: memory.gpu,
   };
   return {
     id: 'page',
-    title: 'The app',
-    measured:
-      'The built app, drawn in software: its start, the longest task that holds up its main thread while a model runs, the view turned by hand, and what is held in memory when the head is done.',
+    title: text('bench.pageTitle'),
+    measured: text('bench.pageMeasured'),
     command: 'npm run bench -- page',
     notes: [],
     charts: [
       {
-        ...{ title: 'Start', unit: 's', kind: 'linear' },
+        ...{ title: text('bench.pageStart'), unit: 's', kind: 'linear' },
         figures: [
-          seconds('Controls can be used, first visit', cold.interactive, atMost(1)),
-          seconds('Controls can be used, later visits', warm.interactive, atMost(1)),
-          seconds('First surface, first visit', cold.surface),
-          seconds('First surface, later visits', warm.surface),
+          seconds(text('bench.pageUsableFirst'), cold.interactive, atMost(1)),
+          seconds(text('bench.pageUsableLater'), warm.interactive, atMost(1)),
+          seconds(text('bench.pageSurfaceFirst'), cold.surface),
+          seconds(text('bench.pageSurfaceLater'), warm.surface),
         ],
       },
       {
-        ...{ title: 'Longest task while a model runs', unit: 'ms', kind: 'linear' },
-        figures: runs.map(({ name, longest }) => figure(`Longest task, ${name}`, longest, atMost(50))),
+        ...{ title: text('bench.pageLongestTask'), unit: 'ms', kind: 'linear' },
+        figures: runs.map(({ name, longest }) =>
+          figure(text('bench.pageLongestTaskOf', { name }), longest, atMost(50)),
+        ),
       },
       {
-        ...{ title: 'Turning the view (more is better)', unit: 'frames/s', kind: 'linear' },
+        ...{ title: text('bench.pageRotation'), unit: 'frames/s', kind: 'linear' },
         figures: [
-          turning('View turned, model at rest', motion.resting),
-          turning('View turned, model running', motion.running),
+          turning(text('bench.pageRotationResting'), motion.resting),
+          turning(text('bench.pageRotationRunning'), motion.running),
         ],
       },
       {
-        ...{ title: 'Memory', unit: 'MB', kind: 'linear' },
+        ...{ title: text('bench.memory'), unit: 'MB', kind: 'linear' },
         figures: Object.entries(held).flatMap(([name, bytes]) =>
           bytes === undefined ? [] : [figure(name, bytes / 1e6)],
         ),

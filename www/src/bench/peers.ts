@@ -1,4 +1,5 @@
 /** Comparison of this library's measurements with those of other software. */
+import { text } from '../texts';
 import { count } from '../ui/format';
 import type { PeerRow, Report, Side } from './report';
 import type { Section } from './sections';
@@ -6,24 +7,23 @@ import { type Bar, type Figure, withUnit } from './targets';
 
 /** Short form of the notes at the head of bench/peers.py. */
 const NOTES = [
-  'Below 1× ours takes less time, above 1× more. No figure was asked for here.',
-  'Theirs is native code; ours is WebAssembly, but for remeshing, which is native on both sides. All have one thread.',
-  'Marching cubes of scikit-image make normals, too.',
-  'The level set starts 5 mm around the object and ends at ITK’s own criterion, on the voxels; ours starts outside the head and ends as a mesh.',
-  'SciPy solves exactly with a matrix of all pairs, ours iterates. With 50 neighbours it solves a small system for each place asked about instead of one for all.',
-  'MeshLab and CGAL do three rounds and stop there; ours goes on until all edges are in bounds, and keeps the surface from crossing itself.',
+  text('bench.peersRatioNote'),
+  text('bench.peersNativeNote'),
+  text('bench.peersNormalsNote'),
+  text('bench.peersLevelSetNote'),
+  text('bench.peersSolverNote'),
+  text('bench.peersRemeshingNote'),
 ];
 
 export function peerSection({ rows, load = 0, cores }: NonNullable<Report['peers']>): Section {
-  const busy = `The machine was busy: its load was ${load.toFixed(1)} on ${cores} cores when this was measured. Ratios waver.`;
+  const busy = text('bench.peersBusy', { load: load.toFixed(1), cores: cores ?? '–' });
   return {
     id: 'peers',
-    title: 'Beside other software',
-    measured:
-      'Other people’s software at comparable work on the same data, in the same run; the bars are our time to theirs.',
+    title: text('bench.peersTitle'),
+    measured: text('bench.peersMeasured'),
     command: 'npm run bench -- peers',
     notes: load > 1 ? [...NOTES, busy] : NOTES,
-    charts: [{ title: 'Our time to theirs (less is better)', unit: '×', kind: 'ratio', figures: figuresOf(rows) }],
+    charts: [{ title: text('bench.peersRatio'), unit: '×', kind: 'ratio', figures: figuresOf(rows) }],
   };
 }
 
@@ -35,13 +35,14 @@ function figuresOf(rows: PeerRow[]): Figure[] {
 
 function barOf(row: PeerRow): Bar {
   const label = row.version ? `${row.package} ${shortVersion(row.version)}` : row.package;
-  if (row.ratio === undefined || !row.theirs) return { label, skipped: row.skipped ?? 'skipped' };
-  const ours = ['ours', figureOf(row, row.ours), ...outcomeOf(row.ours)];
-  const theirs = ['theirs', figureOf(row, row.theirs), row.theirs.what, ...outcomeOf(row.theirs)];
-  return { label, value: row.ratio, remark: [ours, theirs].map(said).join('; ') };
+  if (row.ratio === undefined || !row.theirs) return { label, skipped: row.skipped ?? text('bench.skippedShort') };
+  const ours = [text('bench.ours'), figureOf(row, row.ours), ...outcomeOf(row.ours)];
+  const theirs = [text('bench.theirs'), figureOf(row, row.theirs), row.theirs.what, ...outcomeOf(row.theirs)];
+  return { label, value: row.ratio, remark: [ours, theirs].map(describeSide).join('; ') };
 }
 
-const said = ([whose, figure, ...rest]: string[]) => `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
+const describeSide = ([whose, figure, ...rest]: string[]) =>
+  `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
 /** Removes the post-release suffix of a version. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');
@@ -53,11 +54,11 @@ function figureOf({ unit }: PeerRow, { figure }: Side): string {
 
 /** Returns the results that show how far the two runs are comparable. */
 function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string[] {
-  if (refused) return ['not a closed surface'];
+  if (refused) return [text('bench.notClosedSurface')];
   const words = [];
-  if (triangles) words.push(`${count(triangles)} triangles`);
-  else if (vertices) words.push(`${count(vertices)} vertices`);
-  if (volume) words.push(`${count(volume / 1000)} cm³`);
-  if (minAngleDegrees !== undefined) words.push(`angles from ${count(minAngleDegrees)}°`);
+  if (triangles) words.push(text('bench.triangles', { count: count(triangles) }));
+  else if (vertices) words.push(text('bench.vertices', { count: count(vertices) }));
+  if (volume) words.push(text('bench.cubicCentimetres', { value: count(volume / 1000) }));
+  if (minAngleDegrees !== undefined) words.push(text('bench.anglesFrom', { value: count(minAngleDegrees) }));
   return words;
 }

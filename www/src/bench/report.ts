@@ -1,10 +1,10 @@
-/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds. */
+/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds unless noted. */
 export interface Report {
   processor?: string;
   bestOf: number;
   points?: (Host & PointFigures)[];
   remesh?: (Host & { rows: RemeshRow[] })[];
-  skin?: (Host & { rows: SkinRow[] })[];
+  skin?: (Host & { rows: SculptRow[] })[];
   track?: (Host & TrackFigures)[];
   steps?: (Host & { rows: StepRow[] })[];
   head?: (Host & HeadFigures)[];
@@ -42,7 +42,7 @@ export interface RemeshRow {
   triangles: number;
 }
 
-export interface SkinRow {
+export interface SculptRow {
   name: string;
   milliseconds: number;
   triangles: number;

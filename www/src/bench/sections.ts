@@ -1,8 +1,9 @@
 /** Selects the measurements of the report that are drawn, with their units and targets. */
-import { count, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count } from '../ui/format';
 import { pageSection } from './page';
 import { peerSection } from './peers';
-import type { HeadFigures, Host, Report, SkinRow, StepRow } from './report';
+import type { HeadFigures, Host, Report, SculptRow, StepRow } from './report';
 import type { Kind } from './scale';
 import { atLeast, atMost, type Bar, type Figure, shortHost, type Target } from './targets';
 
@@ -32,7 +33,7 @@ export function sectionsOf(report: Report): Section[] {
     phantom && headSection(PHANTOM, phantom),
     steps && stepSection(steps),
     points && pointSection(points),
-    skin && skinSection(skin),
+    skin && sculptSection(skin),
     track && trackSection(track),
     remesh && remeshSection(remesh),
     page && pageSection(page),
@@ -66,28 +67,28 @@ const chart = (title: string, unit: string, figures: Figure[], kind: Kind = 'lin
 
 const commandOf = (name: string) => `npm run bench -- ${name}`;
 
-const HEAD = { id: 'head', title: 'Head CT', of: 'A CT of a head at the intensity of bone' };
+const HEAD = { id: 'head', title: text('bench.headTitle'), of: text('bench.headOf') };
 const PHANTOM = {
-  ...{ id: 'phantom', title: 'Head phantom' },
-  of: 'Two nested shells with holes and noise, of the size of the paper’s tomography',
+  ...{ id: 'phantom', title: text('bench.phantomTitle') },
+  of: text('bench.phantomOf'),
 };
 
 function headSection({ id, title, of }: typeof HEAD, hosts: (Host & HeadFigures)[]): Section {
   const parts = Object.keys(hosts[0]?.model.parts ?? {});
   return {
     ...{ id, title, command: commandOf(id) },
-    measured: `${of}, ${hosts[0]?.dims.join(' × ')} voxels: marching cubes, and the deformable model from its start around the object until it rests, coarse to fine on three levels.`,
+    measured: text('bench.headMeasured', { of, dims: hosts[0]?.dims.join(' × ') ?? '' }),
     notes: hosts.map(outcome),
     charts: [
-      chart('Time', 's', [
-        figure('Deformable model until it rests', hosts, ({ model }) => model.milliseconds / SECOND, atMost(2)),
-        figure('Marching cubes', hosts, ({ cubes }) => cubes.milliseconds / SECOND),
+      chart(text('bench.time'), 's', [
+        figure(text('bench.modelTime'), hosts, ({ model }) => model.milliseconds / SECOND, atMost(2)),
+        figure(text('bench.marchingCubes'), hosts, ({ cubes }) => cubes.milliseconds / SECOND),
       ]),
-      chart('Against marching cubes in the same run', '×', [
-        figure('Deformable model to marching cubes', hosts, ({ ratio }) => ratio, atMost(25)),
+      chart(text('bench.againstCubes'), '×', [
+        figure(text('bench.modelToCubes'), hosts, ({ ratio }) => ratio, atMost(25)),
       ]),
       chart(
-        'Where the time of the model goes',
+        text('bench.modelParts'),
         's',
         parts.map((part) => figure(part, hosts, ({ model }) => (model.parts[part] ?? 0) / SECOND)),
       ),
@@ -96,32 +97,38 @@ function headSection({ id, title, of }: typeof HEAD, hosts: (Host & HeadFigures)
 }
 
 function outcome({ host, model }: Host & HeadFigures): string {
-  const rest = model.converged ? 'came to rest' : 'did not come to rest';
-  return `${shortHost(host)}: ${rest} after ${plural(model.iterations, 'iteration')} with ${count(model.vertices)} vertices, ${model.closed ? 'closed' : 'not closed'}, ${plural(model.selfIntersections, 'crossing')}.`;
+  const result = model.converged ? text('bench.converged') : text('bench.notConverged');
+  return text('bench.outcome', {
+    host: shortHost(host),
+    result,
+    iterations: plural('bench.iterations', model.iterations),
+    vertices: count(model.vertices),
+    closed: model.closed ? text('bench.closed') : text('bench.notClosed'),
+    selfIntersections: plural('bench.selfIntersections', model.selfIntersections),
+  });
 }
 
 type Steps = Host & { rows: StepRow[] };
 
-const verticesOf = ({ vertices }: StepRow) => `${count(vertices)} vertices`;
+const verticesOf = ({ vertices }: StepRow) => text('bench.vertices', { count: count(vertices) });
 
 function stepSection(hosts: Steps[]): Section {
   return {
     id: 'steps',
-    title: 'One step of the deformable model',
-    measured:
-      'A sphere closes in on a ball in 256³ voxels while all its vertices move, at three sizes: the best of six steps.',
+    title: text('bench.stepsTitle'),
+    measured: text('bench.stepsMeasured'),
     command: commandOf('steps'),
     notes: [],
     charts: [
       chart(
-        'Time of a step for each vertex',
+        text('bench.stepsTime'),
         'ns',
         figuresOfRows(hosts, verticesOf, ({ step }) => step),
       ),
-      chart('Dearest size to cheapest', '×', [
-        figure('Cost of a vertex over the three sizes', hosts, ({ rows }) => spread(rows), atMost(1.3)),
+      chart(text('bench.stepsSpread'), '×', [
+        figure(text('bench.stepsSpreadOf'), hosts, ({ rows }) => spread(rows), atMost(1.3)),
       ]),
-      chart('Topology in one step', 'ms', topologyFigures(hosts), 'log'),
+      chart(text('bench.stepsTopology'), 'ms', topologyFigures(hosts), 'log'),
       ...overNative(hosts),
     ],
   };
@@ -136,7 +143,7 @@ function spread(rows: StepRow[]): number {
 function topologyFigures(hosts: Steps[]): Figure[] {
   return figuresOfRows(
     hosts,
-    (row) => `Topology, ${verticesOf(row)}`,
+    (row) => text('bench.stepsTopologyOf', { vertices: verticesOf(row) }),
     ({ topology }) => topology,
     ({ vertices }) => (near(vertices, 65_000) ? atMost(10) : undefined),
   );
@@ -146,12 +153,12 @@ function topologyFigures(hosts: Steps[]): Figure[] {
 function overNative(hosts: Steps[]): Chart[] {
   const native = hosts.find(({ host }) => host === 'native');
   if (!native) return [];
-  const name = (row: StepRow) => `WebAssembly to native, ${verticesOf(row)}`;
+  const name = (row: StepRow) => text('bench.stepsNativeOf', { vertices: verticesOf(row) });
   const others = hosts.filter((host) => host !== native);
   const figures = native.rows.map((row, k) =>
     figure(name(row), others, ({ rows }) => (rows[k]?.step ?? Number.NaN) / row.step, atMost(1.3)),
   );
-  return [chart('WebAssembly against native', '×', figures)];
+  return [chart(text('bench.stepsNative'), '×', figures)];
 }
 
 const near = (value: number, other: number) => Math.abs(value / other - 1) < 0.15;
@@ -159,57 +166,55 @@ const near = (value: number, other: number) => Math.abs(value / other - 1) < 0.1
 function pointSection(hosts: NonNullable<Report['points']>): Section {
   const [one] = hosts;
   const size = (which: 'few' | 'many') =>
-    `${count((one?.[which].points ?? 0) + (one?.[which].exterior ?? 0))} constraints`;
+    text('bench.constraints', { count: count((one?.[which].points ?? 0) + (one?.[which].exterior ?? 0)) });
   const of = (name: string, value: (host: NonNullable<typeof one>) => number, limit?: number) =>
     figure(name, hosts, (host) => value(host) / SECOND, limit === undefined ? undefined : atMost(limit));
   return {
     id: 'points',
-    title: 'Points to a surface',
-    measured:
-      'Points of a torus, and one in ten more outside of it, to an implicit surface, taken from 128 cells along its box: the best of three, and the first, while code is still being compiled.',
+    title: text('bench.pointsTitle'),
+    measured: text('bench.pointsMeasured'),
     command: commandOf('points'),
     notes: [],
     charts: [
-      chart('Solving', 's', [
-        of(`Solving ${size('few')}`, ({ few }) => few.solve, 0.2),
-        of(`Solving ${size('few')}, the first time`, ({ few }) => few.first.solve),
-        of(`Solving ${size('many')}`, ({ many }) => many.solve, 3),
-        of(`Solving ${size('many')}, the first time`, ({ many }) => many.first.solve),
-        of(`Solving ${size('many')}, one point more by hand`, ({ many }) => many.solveAfterEdit),
+      chart(text('bench.solving'), 's', [
+        of(text('bench.solvingOf', { size: size('few') }), ({ few }) => few.solve, 0.2),
+        of(text('bench.solvingFirst', { size: size('few') }), ({ few }) => few.first.solve),
+        of(text('bench.solvingOf', { size: size('many') }), ({ many }) => many.solve, 3),
+        of(text('bench.solvingFirst', { size: size('many') }), ({ many }) => many.first.solve),
+        of(text('bench.solvingEdit', { size: size('many') }), ({ many }) => many.solveAfterEdit),
       ]),
-      chart('Taking the surface', 's', [
-        of(`Surface of ${size('few')}`, ({ few }) => few.extract, 1),
-        of(`Surface of ${size('many')}`, ({ many }) => many.extract, 1),
+      chart(text('bench.extraction'), 's', [
+        of(text('bench.extractionOf', { size: size('few') }), ({ few }) => few.extract, 1),
+        of(text('bench.extractionOf', { size: size('many') }), ({ many }) => many.extract, 1),
       ]),
-      chart('Memory of the module at the end', 'MB', [
-        figure(`Memory with ${size('many')}`, hosts, ({ bytes }) => bytes / MEGABYTE, atMost(250)),
+      chart(text('bench.memoryEnd'), 'MB', [
+        figure(text('bench.memoryOf', { size: size('many') }), hosts, ({ bytes }) => bytes / MEGABYTE, atMost(250)),
       ]),
     ],
   };
 }
 
 /** Returns the target of a row; only sizes near 20,000 triangles have one. */
-function asked({ name, triangles }: SkinRow): Target | undefined {
+function targetOf({ name, triangles }: SculptRow): Target | undefined {
   return near(triangles, 20_000) ? atLeast(name === 'lava lamp' ? 30 : 10) : undefined;
 }
 
-function skinSection(hosts: NonNullable<Report['skin']>): Section {
+function sculptSection(hosts: NonNullable<Report['skin']>): Section {
   return {
     id: 'skin',
-    title: 'Sculpting',
-    measured:
-      'Frames of the multiresolution model while its ellipsoids move: a lava lamp without detail, and a bust whose head is pulled about; one over the middle time of 60 frames.',
+    title: text('bench.sculptTitle'),
+    measured: text('bench.sculptMeasured'),
     command: commandOf('skin'),
     notes: [],
     charts: [
       chart(
-        'Frames a second (more is better)',
+        text('bench.sculptFrames'),
         'frames/s',
         figuresOfRows(
           hosts,
-          ({ name, triangles }) => `${name}, ${count(triangles)} triangles`,
+          ({ name, triangles }) => text('bench.pageTriangles', { name, triangles: count(triangles) }),
           ({ milliseconds }) => 1000 / milliseconds,
-          asked,
+          targetOf,
         ),
       ),
     ],
@@ -222,21 +227,26 @@ function trackSection(hosts: NonNullable<Report['track']>): Section {
     figure(name, hosts, ({ run }) => value(run) / SECOND);
   return {
     id: 'track',
-    title: 'Tracking',
-    measured: `A beating ventricle as cine MR shows it, ${one?.dims.join(' × ')} voxels and ${one?.frames} frames: from thick slices to a closed surface in every frame.`,
+    title: text('bench.trackTitle'),
+    measured: text('bench.trackMeasured', { dims: one?.dims.join(' × ') ?? '', frames: one?.frames ?? 0 }),
     command: commandOf('track'),
     notes: [],
     charts: [
-      chart('The whole', 's', [
-        figure(`All ${one?.frames} frames`, hosts, ({ run }) => run.milliseconds / SECOND, atMost(10)),
-        figure('Marching cubes on all frames', hosts, ({ cubes }) => cubes / SECOND),
+      chart(text('bench.trackTotal'), 's', [
+        figure(
+          text('bench.trackAll', { frames: one?.frames ?? 0 }),
+          hosts,
+          ({ run }) => run.milliseconds / SECOND,
+          atMost(10),
+        ),
+        figure(text('bench.trackCubes'), hosts, ({ cubes }) => cubes / SECOND),
       ]),
-      chart('Where the time goes', 's', [
-        of('in-between slices', ({ enrich }) => enrich),
-        of('before the votes', ({ begin }) => begin),
-        of('votes', ({ votes }) => votes),
-        of('surfaces', ({ tracked }) => tracked),
-        of('back to the first frame', ({ closingTime }) => closingTime),
+      chart(text('bench.trackParts'), 's', [
+        of(text('bench.trackBetween'), ({ enrich }) => enrich),
+        of(text('bench.trackBefore'), ({ begin }) => begin),
+        of(text('bench.trackVotes'), ({ votes }) => votes),
+        of(text('bench.trackSurfaces'), ({ tracked }) => tracked),
+        of(text('bench.trackBack'), ({ closingTime }) => closingTime),
       ]),
     ],
   };
@@ -245,18 +255,17 @@ function trackSection(hosts: NonNullable<Report['track']>): Section {
 function remeshSection(hosts: NonNullable<Report['remesh']>): Section {
   return {
     id: 'remesh',
-    title: 'Remeshing',
-    measured:
-      'A torus of uneven triangles and a gyroid as marching cubes give it, to edges half as long as they were in the mean, as long, and three times as long.',
+    title: text('bench.remeshTitle'),
+    measured: text('bench.remeshMeasured'),
     command: commandOf('remesh'),
     notes: [],
     charts: [
       chart(
-        'Time for each triangle that comes out',
+        text('bench.remeshTime'),
         'µs',
         figuresOfRows(
           hosts,
-          ({ name, factor }) => `${name}, edges × ${factor}`,
+          ({ name, factor }) => text('bench.remeshOf', { name, factor }),
           ({ milliseconds, triangles }) => (1000 * milliseconds) / triangles,
           () => atMost(5, 'native'),
         ),

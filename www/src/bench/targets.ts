@@ -1,3 +1,5 @@
+import { LANGUAGE } from '../texts';
+
 /** The target of a measurement. */
 export interface Target {
   limit: number;
@@ -26,14 +28,14 @@ export const atMost = (limit: number, host?: string): Target => ({ limit, sense:
 export const atLeast = (limit: number): Target => ({ limit, sense: 'least' });
 
 /** Returns whether a bar meets its figure's target; undefined if no target applies. */
-export function meets({ target }: Figure, { label, value }: Bar): boolean | undefined {
+export function meetsTarget({ target }: Figure, { label, value }: Bar): boolean | undefined {
   if (!target || value === undefined || (target.host && !label.startsWith(target.host))) return undefined;
   return target.sense === 'most' ? value <= target.limit : value >= target.limit;
 }
 
 /** Returns the verdict on a figure: met only if all bars with a target meet it. */
 export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
-  const judged = figure.bars.map((bar) => meets(figure, bar)).filter((met) => met !== undefined);
+  const judged = figure.bars.map((bar) => meetsTarget(figure, bar)).filter((met) => met !== undefined);
   if (judged.length === 0) return 'not measured';
   return judged.every(Boolean) ? 'met' : 'not met';
 }
@@ -42,11 +44,11 @@ export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
 export function withUnit(value: number, unit: string): string {
   if (unit === 's' && value < 0.1) return withUnit(1000 * value, 'ms');
   const digits = Math.abs(value) >= 100 ? { maximumFractionDigits: 0 } : { maximumSignificantDigits: 3 };
-  const number = new Intl.NumberFormat('en', digits).format(value);
+  const number = new Intl.NumberFormat(LANGUAGE, digits).format(value);
   return unit === '×' ? `${number}×` : `${number} ${unit}`;
 }
 
-export function askedOf({ limit, sense, host }: Target, unit: string): string {
+export function formatTarget({ limit, sense, host }: Target, unit: string): string {
   return `${sense === 'most' ? '≤' : '≥'} ${withUnit(limit, unit)}${host ? ` ${host}` : ''}`;
 }
 

@@ -1,4 +1,5 @@
 /** The page's address, whose hash tells which lab is open, and with what. */
+import { text } from '../texts';
 import type { StatusLine } from '../ui/status';
 
 /** Names of the labs in addresses. */
@@ -19,17 +20,17 @@ export function showAddress(hash: string): void {
 }
 
 /** Note to a copied link while one of the user's own files is open. */
-export const FILE_LACKS = 'Your file is not in it: whoever opens it needs the file too.';
+export const FILE_NOTE = text('labs.linkLacksFile');
 
 /**
  * Copies the page's address to the clipboard, and says so in the status line, with the notes on what the link lacks.
  */
-export async function copyAddress(status: StatusLine, lacks: (string | false)[]): Promise<void> {
-  const say = (done: string) => status.say([done, ...lacks].filter(Boolean).join(' '));
+export async function copyAddress(status: StatusLine, notes: (string | false)[]): Promise<void> {
+  const say = (done: string) => status.say([done, ...notes].filter(Boolean).join(' '));
   try {
     await navigator.clipboard.writeText(location.href);
-    say('Link copied.');
+    say(text('labs.linkCopied'));
   } catch {
-    say('The link is in the address bar.');
+    say(text('labs.linkInAddressBar'));
   }
 }

@@ -9,7 +9,11 @@ const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'van
  */
 export function toCsv({ reports }: History, residual = 'energy'): string {
   const parts = [...new Set(reports.flatMap(({ times }) => Object.keys(times)))];
-  const head = [...PLAIN.map((name) => (name === 'residual' ? residual : name)), ...EVENTS, ...parts.map(inMs)];
+  const head = [
+    ...PLAIN.map((name) => (name === 'residual' ? residual : name)),
+    ...EVENTS,
+    ...parts.map(millisecondsHeader),
+  ];
   const lines = reports.map((report) => [
     ...PLAIN.map((name) => report[name]),
     ...EVENTS.map((name) => report.events[name]),
@@ -18,4 +22,4 @@ export function toCsv({ reports }: History, residual = 'energy'): string {
   return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
 }
 
-const inMs = (part: string) => `${part} (ms)`;
+const millisecondsHeader = (part: string) => `${part} (ms)`;

@@ -1,8 +1,10 @@
+import { text } from '../texts';
+
 /** Downloads that were started ahead, by address. */
 const early = new Map<string, Promise<Uint8Array>>();
 
 /** Starts to download a file that will be needed as soon as the engine has loaded. */
-export function fetchAhead(url: string): void {
+export function preload(url: string): void {
   const bytes = download(url);
   // `fetchBytes` reports the error.
   bytes.catch(() => undefined);
@@ -25,8 +27,7 @@ async function download(url: string): Promise<Uint8Array> {
  */
 export async function fetched(url: string): Promise<Response> {
   const response = await fetch(url).catch(() => undefined);
-  if (!response)
-    throw new Error(`The network does not answer, and ${url} has not been opened here before. Try again when it does.`);
-  if (!response.ok) throw new Error(`The server answered ${response.status} for ${url}.`);
+  if (!response) throw new Error(text('labs.offline', { url }));
+  if (!response.ok) throw new Error(text('labs.serverAnswered', { status: response.status, url }));
   return response;
 }

@@ -1,29 +1,30 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
-import { exampleById, startOf } from '../presets';
+import { defaultStart, exampleById } from '../presets';
 import type { Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
+import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
-import { fetchAhead, fetchBytes } from './downloads';
+import { fetchBytes, preload } from './downloads';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
 import type { ExtractSettings } from './extract-settings';
 import type { LabStates } from './lab-states';
-import type { PassedOn } from './labs';
+import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
 import { Opening, type Source } from './opening';
 
 export type ExtractSource = Source<Example, Linked, VolumeSource>;
 
 /** An opened volume, and its model before the first step. */
-interface Opened extends Loaded {
+interface OpenedVolume extends Loaded {
   choice: StartChoice;
   setup: Setup;
 }
 
 /** Opens volumes in the Extract lab, and builds models of them. */
-export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opened> {
+export class ExtractOpening extends Opening<Example, Linked, VolumeSource, OpenedVolume> {
   protected readonly first = EXAMPLES[0];
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -54,13 +55,13 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   static fetchLinked(): void {
     const linked = fromHash(location.hash);
     const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
-    if (example && !linked?.file && 'file' in example.source) fetchAhead(exampleUrl(example.source.file));
+    if (example && !linked?.file && 'file' in example.source) preload(exampleUrl(example.source.file));
   }
 
   /** Opens a volume passed on by another lab. */
-  passedOn({ name, bytes, params }: PassedOn): Promise<void> {
-    const opened = async () => ({ files: [{ name, bytes: bytes.slice() }] });
-    return this.open({ name, opened, linked: { params, attractors: [] }, unit: '' });
+  passedOn({ name, bytes, params }: Handoff): Promise<void> {
+    const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
+    return this.open({ name, load, linked: { params, attractors: [] }, unit: '' });
   }
 
   protected find(id: string): Example | undefined {
@@ -73,36 +74,36 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
 
   protected fromExample(example: Example): ExtractSource {
     const { source } = example;
-    if ('shape' in source) return { name: source.shape, opened: async () => source, example };
+    if ('shape' in source) return { name: source.shape, load: async () => source, example };
     const { file } = source;
-    const opened = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
-    return { name: file, opened, example };
+    const load = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
+    return { name: file, load, example };
   }
 
   protected fromFiles(files: File[]): ExtractSource {
-    return { name: nameOf(files), opened: async () => ({ files: await readFiles(files) }) };
+    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load(source: ExtractSource, volume: VolumeSource, again: boolean): Promise<Opened> {
-    const choice = again ? this.#ui.start.inForce : this.#startFor(source);
-    const setup = again ? this.#settings.setup(choice) : this.#setupFor(source, choice);
+  protected async load(source: ExtractSource, volume: VolumeSource, reopening: boolean): Promise<OpenedVolume> {
+    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source);
+    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, choice);
     const body = { name: source.name, source: volume, setup };
     return { ...(await this.#client.request('load', body, transferable(volume))), choice, setup };
   }
 
-  protected async adopt(opened: Opened, source: ExtractSource, again: boolean): Promise<void> {
-    if (again) return this.#takeUp(opened, source);
+  protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
+    if (reopening) return this.#takeUp(opened, source);
     const { volume, choice, params, setup } = opened;
     this.states.ready = true;
     this.#ui.adopt(volume, source);
     if (source.linked?.color) this.#ui.options.color = source.linked.color;
     this.#settings.adopt(volume, choice, params, setup.attractors);
-    this.#settings.remember('Play');
+    this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);
   }
 
   /** After a restart of the engine, with volume and settings unchanged: restores the newest saved state. */
-  async #takeUp({ choice, params }: Opened, { example }: ExtractSource): Promise<void> {
+  async #takeUp({ choice, params }: OpenedVolume, { example }: ExtractSource): Promise<void> {
     this.#ui.data.choose(example);
     // Sends the slice planes to the new engine.
     this.#ui.stage.goTo(this.#ui.stage.crosshair);
@@ -111,19 +112,20 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
       await this.#client.request('restore', newest.saved);
       this.#settings.adoptMoment(newest);
     } else this.#settings.begin(choice, params);
-    const where = newest ? `from iteration ${count(newest.saved.iteration)}` : 'from the beginning';
-    this.#ui.status.say(`Started again ${where}.`);
+    this.#ui.status.say(
+      newest ? text('extract.restartedFrom', { iteration: count(newest.saved.iteration) }) : text('extract.restarted'),
+    );
   }
 
-  protected override keep(): void {
-    this.#settings.keep();
+  protected override save(): void {
+    this.#settings.save();
   }
 
-  protected override kept(): Promise<unknown> {
-    return this.#settings.kept;
+  protected override saved(): Promise<unknown> {
+    return this.#settings.saved;
   }
 
-  protected override greeted(specs: ParamSpec[]): void {
+  protected override onEngineReady(specs: ParamSpec[]): void {
     const known = specs.filter(({ name }) => name !== 'iso');
     this.defaults = Object.fromEntries(known.map(({ name, default: value }) => [name, value]));
   }
@@ -152,7 +154,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   #startFor({ example, linked }: ExtractSource): StartChoice {
     const choice = this.#ui.start.value;
     const suits: StartChoice = example
-      ? { ...choice, ...startOf(example), levels: example.levels, edge: example.edge }
+      ? { ...choice, ...defaultStart(example), levels: example.levels, edge: example.edge }
       : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
     return linked ? withLink(suits, linked) : suits;
   }

@@ -1,5 +1,6 @@
 import type { Example } from '../examples';
 import type { VolumeView } from '../protocol';
+import { text } from '../texts';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure } from '../ui/format';
 
@@ -38,7 +39,7 @@ export interface Parts {
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab';
   const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.legend, parts.banner, parts.drop);
-  const params = folded('Parameters', parts.params);
+  const params = folded(text('labs.parameters'), parts.params);
   params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
     h(
@@ -52,24 +53,24 @@ export function layOut(root: HTMLElement, parts: Parts): void {
     h(
       'div',
       { class: 'column setup' },
-      section('Data', parts.data, parts.figure),
-      section('Intensities', parts.histogram),
-      section('Start', parts.start),
-      section('Pyramid', parts.pyramid),
-      section('Attractors', parts.attractors),
+      section(text('extract.sectionData'), parts.data, parts.figure),
+      section(text('extract.sectionIntensities'), parts.histogram),
+      section(text('extract.sectionStart'), parts.start),
+      section(text('extract.sectionPyramid'), parts.pyramid),
+      section(text('extract.sectionAttractors'), parts.attractors),
       params,
     ),
     h(
       'div',
       { class: 'column results' },
-      section('Surface', parts.measures),
-      section('Coverage', parts.coverage),
-      section('Save', parts.exports, parts.sculpt, parts.link),
-      section('Progress', parts.plots, parts.csv),
-      section('Events', parts.log),
-      section('Time per part', parts.times),
+      section(text('labs.sectionSurface'), parts.measures),
+      section(text('extract.sectionCoverage'), parts.coverage),
+      section(text('labs.sectionSave'), parts.exports, parts.sculpt, parts.link),
+      section(text('labs.sectionProgress'), parts.plots, parts.csv),
+      section(text('extract.sectionEvents'), parts.log),
+      section(text('extract.sectionTimes'), parts.times),
       parts.compare,
-      folded('Exercises', parts.exercises),
+      folded(text('extract.sectionExercises'), parts.exercises),
     ),
   );
 }
@@ -80,13 +81,18 @@ export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
 }
 
 /** Names of the facts about a volume; they are shown before one is open, so that the layout does not shift. */
-const FACTS = ['File', 'Voxels', 'Voxel size', 'Intensities'];
+const FACTS = [
+  text('labs.factFile'),
+  text('extract.factVoxels'),
+  text('labs.factVoxelSize'),
+  text('extract.sectionIntensities'),
+];
 
 /** Panel that shows the open volume and opens others. */
 export class DataPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
-  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #own = h('option', { value: '', hidden: true }, text('labs.yourFile'));
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
@@ -95,7 +101,7 @@ export class DataPanel {
     const id = uniqueId('example');
     const group = (label: string, list: Example[]) =>
       h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
-    const groups = [group('Volumes', examples), group('Figures of the paper', figures)];
+    const groups = [group(text('extract.groupVolumes'), examples), group(text('labs.groupFigures'), figures)];
     this.#examples = h('select', { id }, this.#own, ...groups);
     this.#examples.addEventListener('change', () => {
       const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
@@ -106,13 +112,14 @@ export class DataPanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row' }, h('label', { for: id }, 'Example'), h('span', { class: 'value' }, this.#examples)),
-      h('div', { class: 'row' }, chooser),
       h(
-        'p',
-        { class: 'help' },
-        'Or drop NIfTI, NRRD or MetaImage anywhere on the page; a detached header together with its data. It stays on this machine.',
+        'div',
+        { class: 'row' },
+        h('label', { for: id }, text('labs.example')),
+        h('span', { class: 'value' }, this.#examples),
       ),
+      h('div', { class: 'row' }, chooser),
+      h('p', { class: 'help' }, text('extract.dropHelp')),
       this.#facts,
       this.#credit,
     );
@@ -129,12 +136,16 @@ export class DataPanel {
     this.choose(example);
     const spacing = volume.spacing.map(figure).join(' × ');
     const facts: [string, string][] = [
-      ['File', volume.name],
-      ['Voxels', volume.dims.join(' × ')],
-      ['Voxel size', `${spacing} ${example?.unit ?? 'mm'}`.trim()],
-      ['Intensities', `${figure(volume.range[0])} to ${figure(volume.range[1])}`],
+      [text('labs.factFile'), volume.name],
+      [text('extract.factVoxels'), volume.dims.join(' × ')],
+      [text('labs.factVoxelSize'), `${spacing} ${example?.unit ?? 'mm'}`.trim()],
+      [
+        text('extract.sectionIntensities'),
+        text('extract.range', { low: figure(volume.range[0]), high: figure(volume.range[1]) }),
+      ],
     ];
-    if (volume.frames > 1) facts.push(['Frames', `${volume.frames}, the first is shown`]);
+    if (volume.frames > 1)
+      facts.push([text('labs.frames'), text('extract.framesFirstShown', { count: volume.frames })]);
     this.#showFacts(facts);
     this.#credit.textContent = example?.credit ?? '';
   }

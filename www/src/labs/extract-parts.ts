@@ -1,8 +1,9 @@
 import { EXAMPLES, type Example } from '../examples';
 import { COVERAGE_GUIDE } from '../guides';
-import { isPreset, PRESETS, type Preset, type Variant, variantOf } from '../presets';
+import { isPreset, PRESETS, type Preset, type Variant, variantInForce } from '../presets';
 import type { Attractor, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { AttractorControls } from '../ui/attractors';
 import { ComparePanel } from '../ui/compare';
 import { CoveragePanel } from '../ui/coverage';
@@ -60,8 +61,7 @@ export class ExtractParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label':
-      '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom; while attractors are placed, Enter is a click in its middle.',
+    'aria-label': text('extract.viewLabel'),
   });
   readonly #slices = h('div', { class: 'slices' });
   readonly stage: Stage;
@@ -133,32 +133,32 @@ export class ExtractParts {
       onGoTo: (point) => this.stage.lookAt(point),
       onMark: (parts) => this.stage.showUncovered(parts),
     });
-    this.#compareHolder = folded('Direct against coarse to fine', this.compare.element);
+    this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
     this.saving = new Saving(fetchMesh, (text) => this.status.say(text));
     this.#exports = new ExportButtons((format, type) => {
-      this.saving.mesh(format, type).catch((error) => events.onError('The surface could not be saved.', error));
+      this.saving.mesh(format, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
     this.#sculpt = h(
       'button',
       { type: 'button', class: 'wide', 'data-action': 'sculpt', onclick: events.onSculpt },
-      'Open in Sculpt',
+      text('labs.openInSculpt'),
     );
     this.#cancel = h(
       'button',
       { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      'Cancel',
+      text('labs.cancel'),
     );
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
     this.#csv = h(
       'button',
       { type: 'button', onclick: () => this.saving.plots(history), disabled: true },
-      'Plot data (CSV)',
+      text('labs.plotData'),
     );
     this.#layOut(signal);
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
+    const drop = h('div', { class: 'drop', hidden: true }, text('extract.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -181,11 +181,7 @@ export class ExtractParts {
       coverage: this.coverage.element,
       exports: this.#exports.element,
       sculpt: this.#sculpt,
-      link: h(
-        'button',
-        { type: 'button', class: 'wide', onclick: this.#events.onCopyLink },
-        'Copy link to these settings',
-      ),
+      link: h('button', { type: 'button', class: 'wide', onclick: this.#events.onCopyLink }, text('labs.copyLink')),
       plots: this.#plots.element,
       csv: this.#csv,
       times: this.#times.element,
@@ -222,13 +218,13 @@ export class ExtractParts {
   showParams(params: ParamValues, example: Example | undefined): void {
     this.#params?.show(params);
     if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
-    if (isPreset(example)) this.#figure.show(example, variantOf(example, params));
+    if (isPreset(example)) this.#figure.show(example, variantInForce(example, params));
     else this.#figure.show(undefined);
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'iso') this.histogram.complain(message);
-    else this.#params?.complain(name, message);
+    if (name === 'iso') this.histogram.showError(message);
+    else this.#params?.showError(name, message);
   }
 
   /** Shows the attractors in force, in the list and in the views. */
@@ -269,6 +265,6 @@ export class ExtractParts {
   #setPlacing(placing: boolean): void {
     this.stage.onPlace = placing ? (point) => this.attractors.add(point) : undefined;
     this.#root.toggleAttribute('data-placing', placing);
-    this.status.say(placing ? 'Click in a slice or on the surface to place attractors.' : '');
+    this.status.say(placing ? text('extract.placeAttractors') : '');
   }
 }

@@ -1,15 +1,15 @@
 import type { Client } from '../client';
 import type { ProgressEvent, SectionsEvent, SnapshotEvent, StepReport, SurfaceBuffers, VolumeView } from '../protocol';
 import type { LabState } from '../state';
-import { count, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count } from '../ui/format';
 import { type History, type HistoryMark, underWay } from '../ui/history';
 import type { ExtractParts } from './extract-parts';
 import type { LabStates } from './lab-states';
 
 export type ResultEvent = SnapshotEvent | ProgressEvent | SectionsEvent;
 
-const VANISHED =
-  'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
+const VANISHED = text('extract.vanishedHint');
 
 /** Displays the worker's results: surface, cross-sections, measures and history. */
 export class ExtractResults {
@@ -63,25 +63,28 @@ export class ExtractResults {
       const coarser = await this.#client.request('pyramid', { levels });
       if (asked === this.#pyramids) this.#ui.pyramid.setLevels(dims, coarser, this.#level);
     } catch (error) {
-      if (asked === this.#pyramids) this.#states.fail('The pyramid cannot be shown.', error);
+      if (asked === this.#pyramids) this.#states.fail(text('extract.pyramidFailed'), error);
     }
   }
 
   /** Describes the state in the status line; if the surface has vanished, explains why. */
   showState(state: LabState): void {
     this.#ui.status.say(this.describe(state));
-    if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show('The surface has vanished.', VANISHED);
+    if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show(text('extract.vanished'), VANISHED);
   }
 
   /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
-    if (!last) return state === 'running' ? 'Running.' : 'Ready to start.';
-    if (last.vertices === 0) return `The surface vanished at iteration ${count(last.iteration)}.`;
-    if (state === 'running') return 'Running.';
-    const where = `${count(last.vertices)} vertices in ${plural(last.components, 'component')}`;
-    if (state === 'done') return `Settled after ${count(last.iteration)} iterations: ${where}.`;
-    return `Paused at iteration ${count(last.iteration)}: ${where}.`;
+    if (!last) return state === 'running' ? text('labs.running') : text('labs.readyToStart');
+    if (last.vertices === 0) return text('extract.vanishedAt', { iteration: count(last.iteration) });
+    if (state === 'running') return text('labs.running');
+    const where = text('labs.surfaceSize', {
+      vertices: plural('counts.vertex', last.vertices),
+      components: plural('counts.component', last.components),
+    });
+    if (state === 'done') return text('extract.converged', { iterations: count(last.iteration), surface: where });
+    return text('extract.pausedAt', { iteration: count(last.iteration), surface: where });
   }
 
   /** Forgets the displayed buffers, which belong to an engine that was replaced. */
@@ -97,7 +100,7 @@ export class ExtractResults {
   /** Displays a snapshot at the next animation frame; only then may the worker send another. */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);
-    if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
+    if (this.#snapshot) this.#client.returnBuffers(this.#snapshot.surface);
     this.#snapshot = event;
     this.#level = event.level;
     this.#ui.pyramid.setInUse(event.level);
@@ -113,7 +116,7 @@ export class ExtractResults {
     this.#ui.stage.showSurface(snapshot.surface);
     this.#ui.stage.showSections(snapshot.sections);
     // The previous surface is no longer drawn.
-    if (this.#shown) this.#client.giveBack(this.#shown);
+    if (this.#shown) this.#client.returnBuffers(this.#shown);
     this.#shown = snapshot.surface;
     this.#ui.showHistory();
   }

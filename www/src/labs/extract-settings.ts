@@ -1,13 +1,13 @@
 import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
-import { plural } from '../ui/format';
+import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
 import type { LabStates } from './lab-states';
-import { type Moment, Rewinder } from './rewinder';
+import { type SavedMoment, UndoHistory } from './undo-history';
 
 /** Radius of the sphere placed at the crosshair, as a fraction of the volume's shortest side. */
 const SPHERE_PART = 0.1;
@@ -15,7 +15,7 @@ const SPHERE_PART = 0.1;
 const ATTRACTOR_PART = 0.15;
 
 /** Why nothing can be changed after a failure of the engine. */
-const BROKEN = 'The engine has stopped; Reset starts it again.';
+const BROKEN = text('labs.engineStopped');
 
 /** State of the page besides the model, which undo restores. */
 interface PageState {
@@ -33,7 +33,7 @@ export class ExtractSettings {
   readonly #states: LabStates;
   readonly #results: ExtractResults;
   readonly #onChange: () => void;
-  readonly #rewinder: Rewinder<PageState, SavedRun>;
+  readonly #undo: UndoHistory<PageState, SavedRun>;
   #volume: VolumeView | undefined;
   /** The parameters in force; a reset keeps them. */
   #params: ParamValues = {};
@@ -47,7 +47,7 @@ export class ExtractSettings {
     this.#states = states;
     this.#results = results;
     this.#onChange = onChange;
-    this.#rewinder = new Rewinder<PageState, SavedRun>(
+    this.#undo = new UndoHistory<PageState, SavedRun>(
       client,
       () => this.#pageState(),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
@@ -68,8 +68,8 @@ export class ExtractSettings {
   }
 
   /** The newest saved state, to resume from after a restart of the engine. */
-  get newest(): Moment<PageState, SavedRun> | undefined {
-    return this.#rewinder.newest;
+  get newest(): SavedMoment<PageState, SavedRun> | undefined {
+    return this.#undo.newest;
   }
 
   /** Returns all that a model of the present volume is built from. */
@@ -81,7 +81,7 @@ export class ExtractSettings {
   /** Adopts another volume and its new model, and clears the undo history. */
   adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, attractors: Attractor[]): void {
     this.#volume = volume;
-    this.#rewinder.clear();
+    this.#undo.clear();
     this.#ui.attractors.radius = ATTRACTOR_PART * this.#smallestSide;
     this.#attractors = attractors;
     this.#ui.showAttractors(attractors);
@@ -90,23 +90,23 @@ export class ExtractSettings {
 
   /** Adopts a new model of the present volume, before its first step. */
   begin(choice: StartChoice, params: ParamValues): void {
-    this.#states.stand('Ready to start.');
+    this.#states.idle(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
   }
 
   /** Saves the present state, in case the user cancels opening something else. */
-  keep(): void {
-    void this.#rewinder.keep();
+  save(): void {
+    void this.#undo.save();
   }
 
   /** Settles when all pending saves are complete. */
-  get kept(): Promise<unknown> {
-    return this.#rewinder.kept;
+  get saved(): Promise<unknown> {
+    return this.#undo.saved;
   }
 
   /** Saves the present state for undo, before a change. Returns a function that forgets it. */
-  remember(label: string, together = ''): () => void {
-    return this.#rewinder.remember(label, together);
+  checkpoint(label: string, mergeKey = ''): () => void {
+    return this.#undo.checkpoint(label, mergeKey);
   }
 
   /**
@@ -115,7 +115,7 @@ export class ExtractSettings {
    */
   changeTo({ params: usual, startsOver }: Preset, { id, params: differing }: Variant): Promise<void> {
     const params = { ...usual, ...differing };
-    return this.#change(`figure ${id}`, 'That did not work.', async () => {
+    return this.#change(text('extract.figureChange', { id }), text('labs.requestFailed'), async () => {
       if (startsOver) await this.#rebuild(this.#ui.start.inForce, params);
       else this.#take(await this.#client.request('setParams', params));
       await this.#client.request('play', undefined);
@@ -125,36 +125,36 @@ export class ExtractSettings {
   /** Adds missing parts to the surface, and continues the run if there were any. */
   seed(): Promise<void> {
     const { coverage } = this.#ui;
-    return this.#change('seeding', 'Missing parts could not be seeded.', async () => {
+    return this.#change(text('extract.seeding'), text('extract.seedFailed'), async () => {
       const seeds = await this.#client.request('seed', undefined);
-      coverage.say(seeds === 0 ? 'Nothing to seed on this level.' : `${plural(seeds, 'part')} seeded.`);
+      coverage.say(seeds === 0 ? text('extract.nothingToSeed') : plural('extract.seeded', seeds));
       if (seeds > 0) await this.#client.request('play', undefined);
     });
   }
 
   /** Rebuilds the model from its start, with the parameters unchanged. */
   startOver(): Promise<void> {
-    return this.#change('Reset', 'The model could not be built.', async () => {
+    return this.#change(text('labs.reset'), text('labs.buildFailed'), async () => {
       await this.#rebuild(this.#ui.start.inForce, this.#params);
     });
   }
 
   /** Rebuilds the model from the chosen start, and runs it. If the start is rejected, the previous model continues. */
   async restart(): Promise<void> {
-    if (!this.#states.canChange) return this.#ui.start.refuse(this.#why('Not while a volume is opened.'));
-    await this.#states.inTurn(async () => {
+    if (!this.#states.canChange) return this.#ui.start.reject(this.#why(text('extract.notWhileOpening')));
+    await this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       const running = this.#states.value === 'running';
-      const forget = this.remember('another start');
+      const forget = this.checkpoint(text('extract.startChange'));
       try {
         await this.#rebuild(this.#ui.start.value, this.#params);
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        this.#ui.start.refuse(message);
-        if (code === 'internal') return this.#states.fail('The model could not be built.', error);
-        this.#states.back((state) => this.#results.describe(state));
+        this.#ui.start.reject(message);
+        if (code === 'internal') return this.#states.fail(text('labs.buildFailed'), error);
+        this.#states.restore((state) => this.#results.describe(state));
         if (running) this.#play();
       }
     });
@@ -162,17 +162,17 @@ export class ExtractSettings {
 
   /** Sets a parameter of the live model; a run continues, and a converged one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (this.#states.engineBroken) return this.#refuseParam(name, BROKEN);
       if (!this.#states.canChange) return this.#onChange();
-      const forget = this.remember(`change of ${this.#ui.labelOf(name)}`, name);
+      const forget = this.checkpoint(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
       try {
         this.#take(await this.#client.request('setParams', { [name]: value }));
         this.#goOn();
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#refuseParam(name, this.#why(message));
       }
     });
@@ -183,9 +183,9 @@ export class ExtractSettings {
    * one.
    */
   setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return this.#ui.attractors.show(this.#attractors);
-      const forget = this.remember(what, tuning ? what : '');
+      const forget = this.checkpoint(what, tuning ? what : '');
       try {
         await this.#client.request('setAttractors', attractors);
         this.#attractors = attractors;
@@ -195,55 +195,55 @@ export class ExtractSettings {
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#ui.showAttractors(this.#attractors);
-        this.#ui.attractors.complain(this.#why(message));
+        this.#ui.attractors.showError(this.#why(message));
       }
     });
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
-      this.#states.load(way === 'undo' ? 'Going back.' : 'Going forth again.');
+      this.#states.load(way === 'undo' ? text('labs.undoing') : text('labs.redoing'));
       try {
-        const moment = await this.#rewinder.travel(way);
+        const moment = await this.#undo.step(way);
         if (moment) this.adoptMoment(moment);
-        else this.#states.back((state) => this.#results.describe(state));
+        else this.#states.restore((state) => this.#results.describe(state));
       } catch (error) {
-        this.#states.fail('That did not work.', error);
+        this.#states.fail(text('labs.requestFailed'), error);
       }
     });
   }
 
   /** Restores the page to a saved state that the model has already been restored to. */
-  adoptMoment({ saved, page }: Moment<PageState, SavedRun>): void {
+  adoptMoment({ saved, page }: SavedMoment<PageState, SavedRun>): void {
     this.#ui.start.show(page.choice);
     this.#attractors = page.attractors;
     this.#ui.showAttractors(page.attractors);
     this.#results.rewind(page.mark(saved.iteration));
     this.#take(page.params);
     const state = saved.done ? 'done' : 'paused';
-    this.#states.stand(this.#results.describe(state), state);
+    this.#states.idle(this.#results.describe(state), state);
     this.#showPyramid(page.choice);
   }
 
   /** Does a change that undo can revert; if it fails, the previous state stays. */
-  #change(label: string, complaint: string, work: () => Promise<void>): Promise<void> {
-    return this.#states.inTurn(async () => {
+  #change(label: string, errorTitle: string, work: () => Promise<void>): Promise<void> {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
-      const forget = this.remember(label);
+      const forget = this.checkpoint(label);
       try {
         await work();
       } catch (error) {
         forget();
-        this.#states.fail(complaint, error);
+        this.#states.fail(errorTitle, error);
       }
     });
   }
 
   async #rebuild(choice: StartChoice, params: ParamValues): Promise<void> {
-    this.#states.load('Starting over.');
+    this.#states.load(text('labs.resetting'));
     const ready = await this.#client.request('rebuild', this.setup(choice, params));
     this.begin(choice, ready.params);
   }
@@ -263,11 +263,11 @@ export class ExtractSettings {
 
   /** Resumes a converged run: under other forces it can move on. */
   #goOn(): void {
-    if (this.#states.beneath === 'done') this.#play();
+    if (this.#states.modelState === 'done') this.#play();
   }
 
   #play(): void {
-    this.#client.request('play', undefined).catch((error) => this.#states.fail('That did not work.', error));
+    this.#client.request('play', undefined).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #showPyramid({ levels }: StartChoice): void {

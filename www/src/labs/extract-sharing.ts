@@ -1,11 +1,13 @@
 /** Shares the state of the Extract lab as an address, and passes its surface to the Sculpt lab. */
+
 import type { Client } from '../client';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { text } from '../texts';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { ExtractOpening } from './extract-opening';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractSettings } from './extract-settings';
 import type { LabStates } from './lab-states';
-import type { PassOn } from './labs';
+import type { OpenInLab } from './labs';
 import { ADDRESS, linkOf, toHash } from './link';
 
 export class ExtractSharing {
@@ -45,14 +47,15 @@ export class ExtractSharing {
 
   async copyLink(): Promise<void> {
     this.updateAddress();
-    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
   }
 
   /** Passes the surface on as a mesh to deform. */
-  toSculpt(passOn: PassOn): void {
+  toSculpt(passOn: OpenInLab): void {
     this.#client.request('export', { format: 'ply' }).then(
-      (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} }),
-      (error) => this.#states.fail('The surface could not be passed on.', error),
+      (bytes) =>
+        passOn({ lab: 'sculpt', name: text('labs.surfaceName', { name: this.#ui.saving.name }), bytes, params: {} }),
+      (error) => this.#states.fail(text('labs.toSculptFailed'), error),
     );
   }
 }

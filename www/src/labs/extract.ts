@@ -1,8 +1,8 @@
 import { Client, RequestError, toFailure } from '../client';
 import { GUIDES } from '../guides';
-import type { Shade, WorkerEvent } from '../protocol';
+import type { VertexQuantity, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
-import { plural } from '../ui/format';
+import { plural, text } from '../texts';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { ViewOptions } from '../ui/view-options';
@@ -12,7 +12,7 @@ import { ExtractResults } from './extract-results';
 import { ExtractSettings } from './extract-settings';
 import { ExtractSharing } from './extract-sharing';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn, PassOn } from './labs';
+import type { Handoff, Lab, OpenInLab } from './labs';
 
 /**
  * The Extract lab: a deformable surface is fitted to a volume. This class connects the lab's parts; opening, settings,
@@ -29,11 +29,11 @@ export class ExtractLab implements Lab {
   readonly #settings: ExtractSettings;
   readonly #opening: ExtractOpening;
   readonly #sharing: ExtractSharing;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   /** The quantity requested for each vertex. */
-  #shade: Shade | undefined;
+  #quantity: VertexQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -52,15 +52,15 @@ export class ExtractLab implements Lab {
     this.#results = new ExtractResults(client, ui, states, history);
     this.#settings = new ExtractSettings(client, ui, states, this.#results, () => this.#showSettings());
     this.#opening = new ExtractOpening(client, ui, states, this.#settings, this.#results, () =>
-      client.request('shade', this.#shade),
+      client.request('quantity', this.#quantity),
     );
     this.#sharing = new ExtractSharing(client, ui, states, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.extract, signal);
   }
 
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
-  async start(passedOn?: PassedOn): Promise<void> {
+  async start(passedOn?: Handoff): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
     const open = passedOn && (() => this.#opening.passedOn(passedOn));
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress(), open);
@@ -111,15 +111,21 @@ export class ExtractLab implements Lab {
     const redo = () => void this.#settings.travel('redo');
     const attract = () => this.#ui.attractors.add(this.#ui.stage.crosshair);
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'a', shown: 'a', text: 'attractor at the crosshair', act: attract },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
-      { key: 'Escape', shown: 'Esc', text: 'away with the message', act: () => this.#dismiss() },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }
 
@@ -129,9 +135,9 @@ export class ExtractLab implements Lab {
   }
 
   #setOptions({ color }: ViewOptions): void {
-    const shade = color === 'plain' || color === 'component' ? undefined : color;
-    if (shade !== this.#shade) this.#ask(this.#client.request('shade', shade));
-    this.#shade = shade;
+    const quantity = color === 'plain' || color === 'component' ? undefined : color;
+    if (quantity !== this.#quantity) this.#ask(this.#client.request('quantity', quantity));
+    this.#quantity = quantity;
     this.#sharing.updateAddress();
   }
 
@@ -139,34 +145,34 @@ export class ExtractLab implements Lab {
     const running = this.#states.value === 'running';
     if (!running && !this.#states.canRun) return;
     this.#ui.banner.hide();
-    if (!running) this.#settings.remember('Play');
+    if (!running) this.#settings.checkpoint(text('labs.play'));
     this.#ask(this.#client.request(running ? 'pause' : 'play', undefined));
   }
 
   #step(steps: number): void {
     if (!this.#states.canRun) return;
     this.#ui.banner.hide();
-    this.#settings.remember(plural(steps, 'step'));
+    this.#settings.checkpoint(plural('counts.step', steps));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
   async #reset(): Promise<void> {
     const { ready, engineBroken, value } = this.#states;
     if (!ready || value === 'loading') return;
-    await (engineBroken ? this.#opening.again() : this.#settings.startOver());
+    await (engineBroken ? this.#opening.reopen() : this.#settings.startOver());
   }
 
   /** Runs the same extraction twice, direct and coarse to fine, and shows the comparison. */
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;
-    if (start.value.levels === 0) return compare.refuse('Choose one pyramid level or more under Start first.');
+    if (start.value.levels === 0) return compare.reject(text('extract.compareNeedsLevel'));
     compare.begin();
     try {
       const setup = this.#settings.setup(start.value, this.#settings.params, []);
       compare.finish(await this.#client.request('compare', setup));
     } catch (error) {
-      compare.refuse(`The comparison stopped: ${toFailure(error).message}`);
+      compare.reject(text('extract.compareFailed', { message: toFailure(error).message }));
     }
   }
 
@@ -176,26 +182,26 @@ export class ExtractLab implements Lab {
     try {
       coverage.finish(await this.#client.request('coverage', undefined));
     } catch (error) {
-      coverage.say(`Coverage could not be measured: ${toFailure(error).message}`);
+      coverage.say(text('extract.coverageFailed', { message: toFailure(error).message }));
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
-    else if (event.event === 'comparing') this.#ui.compare.tell(event);
-    else if (event.event === 'covering') this.#ui.coverage.tell(event);
+    if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
+    else if (event.event === 'comparing') this.#ui.compare.showProgress(event);
+    else if (event.event === 'covering') this.#ui.coverage.showProgress(event);
     else if (event.event !== 'state') this.#results.take(event);
-    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
-    this.#ui.showState(state, beneath, ready);
+    const { modelState, ready } = this.#states;
+    this.#ui.showState(state, modelState, ready);
     if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
   }
 

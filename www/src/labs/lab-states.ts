@@ -1,5 +1,6 @@
 import { toFailure } from '../channel';
 import { type LabState, Observable } from '../state';
+import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 
 /** The state of a lab; an error covers it until the user dismisses it. */
@@ -13,7 +14,7 @@ export class LabStates {
   /** Whether something else is being opened; the state of the present model is then ignored. */
   #opening = false;
   /** Settles when the last queued change is complete. */
-  #turns: Promise<unknown> = Promise.resolve();
+  #queue: Promise<unknown> = Promise.resolve();
   /** Whether there is a model. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
@@ -26,11 +27,11 @@ export class LabStates {
     this.#signal = signal;
   }
 
-  /** Calls `follower` now and at every change. */
-  follow(follower: (state: LabState) => void): void {
-    this.#state.follow((state) => {
+  /** Calls `subscriber` now and at every change. */
+  subscribe(subscriber: (state: LabState) => void): void {
+    this.#state.subscribe((state) => {
       if (state !== 'loading' && state !== 'error') this.#model = state;
-      follower(state);
+      subscriber(state);
     });
   }
 
@@ -39,7 +40,7 @@ export class LabStates {
   }
 
   /** The state beneath a displayed error. */
-  get beneath(): LabState {
+  get modelState(): LabState {
     return this.value === 'error' ? this.#model : this.value;
   }
 
@@ -50,7 +51,7 @@ export class LabStates {
 
   /** Whether the model can be run or stepped. */
   get canRun(): boolean {
-    return this.ready && !this.engineBroken && this.beneath === 'paused';
+    return this.ready && !this.engineBroken && this.modelState === 'paused';
   }
 
   /** Enters the loading state, with a text for the status line. */
@@ -61,30 +62,30 @@ export class LabStates {
   }
 
   /**
-   * Prepares for opening something else: waits until queued changes are complete. Until {@link opened} is called, the
+   * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is called, the
    * present model's state is ignored.
    */
   async open(text: string): Promise<void> {
     this.#opening = true;
     this.load(text);
-    await this.#turns;
+    await this.#queue;
   }
 
-  /** Ends {@link open}. From now on the state is that of the new model if `isThere`, else that of the previous one. */
-  opened(isThere: boolean): void {
+  /** Ends {@link open}. From now on the state is that of the new model if `hasModel`, else that of the previous one. */
+  finishOpening(hasModel: boolean): void {
     this.#opening = false;
-    if (isThere) this.#model = 'paused';
+    if (hasModel) this.#model = 'paused';
   }
 
   /** Queues changes, so that each starts from the result of the previous one. */
-  inTurn(work: () => Promise<void>): Promise<void> {
-    const turn = this.#turns.then(work);
-    this.#turns = turn.catch(() => undefined);
+  enqueue(work: () => Promise<void>): Promise<void> {
+    const turn = this.#queue.then(work);
+    this.#queue = turn.catch(() => undefined);
     return turn;
   }
 
   /** Ends loading with a model that is not running. */
-  stand(text: string, state: 'paused' | 'done' = 'paused'): void {
+  idle(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
     this.#state.value = state;
     this.#status.say(text);
@@ -94,7 +95,7 @@ export class LabStates {
    * Returns to the model's state after loading has failed or changed nothing; `describe` gives the text for the status
    * line.
    */
-  back(describe: (state: LabState) => string): void {
+  restore(describe: (state: LabState) => string): void {
     if (this.#opening) return;
     this.#state.value = this.#model;
     this.#status.say(describe(this.#model));
@@ -104,7 +105,7 @@ export class LabStates {
    * Enters the model's new state. Returns false if it is ignored: during loading, all states but 'running'; while
    * something else is being opened, all.
    */
-  enter(state: 'running' | 'paused' | 'done'): boolean {
+  setModelState(state: 'running' | 'paused' | 'done'): boolean {
     this.#model = state;
     if (this.#opening || (this.value === 'loading' && state !== 'running')) return false;
     this.#state.value = state;
@@ -118,11 +119,9 @@ export class LabStates {
     if (failure.code === 'internal') this.engineBroken = true;
     // The failure concerns the model being replaced, or else `Opening` reports it.
     if (this.#opening) return;
-    const hint =
-      this.engineBroken && this.ready
-        ? 'What you see is the last result; Reset starts the engine again. It said: '
-        : '';
-    this.#banner.show(title, hint + failure.message);
+    const message =
+      this.engineBroken && this.ready ? text('labs.engineHint', { message: failure.message }) : failure.message;
+    this.#banner.show(title, message);
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.#model === 'running' && this.engineBroken) this.#model = 'paused';

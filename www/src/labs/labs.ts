@@ -2,7 +2,7 @@
 import type { ParamValues } from '../protocol';
 
 /** Data that one lab passes to another: a volume for Extract, with suitable parameters, or a mesh for Sculpt. */
-export interface PassedOn {
+export interface Handoff {
   /** The receiving lab's name in addresses. */
   lab: 'extract' | 'sculpt';
   name: string;
@@ -13,13 +13,13 @@ export interface PassedOn {
 
 /** A lab that is open. */
 export interface Lab {
-  start(passedOn?: PassedOn): Promise<void>;
+  start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */
   close(): void;
 }
 
 /** Opens another lab with the given data. */
-export type PassOn = (passedOn: PassedOn) => void;
+export type OpenInLab = (passedOn: Handoff) => void;
 
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
@@ -32,5 +32,5 @@ export interface LabKind {
   /** Starts its worker. */
   spawn: () => Worker;
   /** Loads its code; returns the lab's class. */
-  load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: PassOn) => Lab>;
+  load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: OpenInLab) => Lab>;
 }

@@ -1,6 +1,6 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 import { EXAMPLES, type Example } from '../examples';
-import { exampleById, isPreset, PAPER, startOf } from '../presets';
+import { defaultStart, exampleById, isPreset, PAPER } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
 import type { ColorMode } from '../ui/view-options';
@@ -49,7 +49,7 @@ export interface LabSettings {
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
-  const start = startOf(example);
+  const start = defaultStart(example);
   const bubbles = 'bubbles' in start ? start.bubbles : undefined;
   return {
     ...(!example && { file }),

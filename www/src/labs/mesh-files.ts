@@ -1,7 +1,9 @@
 /** Opens meshes of the Sculpt lab, from an example or from the user's files. */
+
 import { dataUrl } from '../reconstruct/examples';
 import type { ExampleMesh, SculptExample } from '../sculpt/examples';
 import type { MeshSource, MeshTexture, SceneSource } from '../sculpt/protocol';
+import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 
@@ -33,9 +35,8 @@ async function fetchMesh(mesh: ExampleMesh): Promise<MeshSource> {
 export async function fromFiles(files: File[]): Promise<SceneSource> {
   const pictures = files.filter(({ name }) => typeOf(name));
   const meshes = files.filter((file) => !pictures.includes(file));
-  if (meshes.length === 0) throw new Error('A picture needs its mesh: choose or drop both together.');
-  if (meshes.length > 2 || pictures.length > 1)
-    throw new Error('One mesh at a time, please, or two: a detailed one and its base; and one picture at most.');
+  if (meshes.length === 0) throw new Error(text('sculpt.textureNeedsMesh'));
+  if (meshes.length > 2 || pictures.length > 1) throw new Error(text('sculpt.oneMesh'));
   const [detail, base] = (await readFiles(meshes)).sort((a, b) => b.bytes.length - a.bytes.length);
   const [picture] = await readFiles(pictures);
   const type = picture && typeOf(picture.name);

@@ -1,17 +1,18 @@
 import { toFailure } from '../channel';
 import type { Unit } from '../examples';
 import type { Failure, ParamSpec } from '../protocol';
+import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
 
 /** Milliseconds that a busy worker has to save its model before it is stopped. */
-const KEEPING = 1000;
+const SAVE_TIMEOUT_MS = 1000;
 
 /** Something that a lab opens, with all that is needed to open it again after a failure of the engine. */
 export interface Source<Example, Linked, Data> {
   name: string;
   /** Reads or downloads the data. */
-  opened: () => Promise<Data>;
+  load: () => Promise<Data>;
   example?: Example;
   /** Settings of a link, in addition to the example. */
   linked?: Linked;
@@ -45,11 +46,11 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Link whose file the user has yet to open. */
   #awaiting: Linked | undefined;
   /** Counts requests, so that a slow download does not replace what was opened after it. */
-  #turn = 0;
+  #requestCount = 0;
   /** Settles when the worker has answered the last load request. */
   #loads: Promise<unknown> = Promise.resolve();
   /** Whether the worker's model is not the one displayed, or is missing. */
-  #astray = false;
+  #modelMismatch = false;
 
   constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
     this.#engine = engine;
@@ -73,31 +74,35 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
   /**
-   * Has the worker build a model of the data. With `again`, the source is already open, and the engine was restarted.
+   * Has the worker build a model of the data. With `reopening`, the source is already open, and the engine was restarted.
    */
-  protected abstract load(source: Source<Example, Linked, Data>, data: Data, again: boolean): Promise<Opened>;
+  protected abstract load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened>;
 
   /**
-   * Displays what was opened, with the settings of its example or link, and runs it; with `again`, with the previous
+   * Displays what was opened, with the settings of its example or link, and runs it; with `reopening`, with the previous
    * settings.
    */
-  protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, again: boolean): Promise<void>;
+  protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, reopening: boolean): Promise<void>;
 
   /** Returns the source to remember as open; a subclass may replace it. */
-  protected asOpen(source: Source<Example, Linked, Data>, _opened: Opened, _data: Data): Source<Example, Linked, Data> {
+  protected sourceToRemember(
+    source: Source<Example, Linked, Data>,
+    _opened: Opened,
+    _data: Data,
+  ): Source<Example, Linked, Data> {
     return source;
   }
 
   /** Has the worker save the present model, so that it can be restored. */
-  protected keep(): void {}
+  protected save(): void {}
 
   /** Settles when all pending saves are complete. */
-  protected async kept(): Promise<unknown> {
+  protected async saved(): Promise<unknown> {
     return undefined;
   }
 
   /** Called when the engine has loaded, with the parameters of the method. */
-  protected greeted(_specs: ParamSpec[]): void {}
+  protected onEngineReady(_specs: ParamSpec[]): void {}
 
   /** Called when the engine was restarted, to send it the view's settings again. */
   protected async restarted(): Promise<unknown> {
@@ -113,7 +118,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     try {
       await this.#greet();
     } catch (error) {
-      this.states.fail('Vesicle could not start.', error);
+      this.states.fail(text('labs.startFailed'), error);
       return;
     }
     if (signal.aborted) return;
@@ -125,7 +130,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   async #greet(): Promise<void> {
     const { specs } = await this.#engine.request('hello', undefined);
     this.#ui.makeParams(specs);
-    this.greeted(specs);
+    this.onEngineReady(specs);
   }
 
   /** The source that is open. */
@@ -135,7 +140,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /** Discards everything that is still being opened. */
   close(): void {
-    this.#turn += 1;
+    this.#requestCount += 1;
   }
 
   /** Opens an example, with the settings of a link. */
@@ -156,7 +161,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /** Opens the present source again, after a failure of the engine. */
-  async again(): Promise<void> {
+  async reopen(): Promise<void> {
     if (this.#source) await this.open(this.#source, true);
   }
 
@@ -165,14 +170,14 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * opened again.
    */
   async cancel(): Promise<void> {
-    const turn = this.#turn;
-    await Promise.race([this.kept(), later(KEEPING)]);
-    if (turn !== this.#turn || this.states.value !== 'loading') return;
+    const request = this.#requestCount;
+    await Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
+    if (request !== this.#requestCount || this.states.value !== 'loading') return;
     this.states.engineBroken = true;
-    const opening = this.#source ? this.again() : this.example(this.first);
-    const own = this.#turn;
+    const opening = this.#source ? this.reopen() : this.example(this.first);
+    const own = this.#requestCount;
     await opening;
-    if (own === this.#turn && !this.#ui.banner.shown) this.#ui.status.say('Cancelled.');
+    if (own === this.#requestCount && !this.#ui.banner.shown) this.#ui.status.say(text('labs.cancelled'));
   }
 
   /** Opens what the address asks for. If that is not possible, opens `otherwise` and says why. */
@@ -184,8 +189,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (!linked) return;
     this.#awaiting = linked.file ? linked : undefined;
     if (linked.file)
-      this.#ui.banner.show('This link needs a file.', `Open ${linked.file} from your disk: its settings will follow.`);
-    else this.#ui.banner.show('This link cannot be followed.', `There is no example “${linked.example ?? ''}”.`);
+      this.#ui.banner.show(text('labs.linkNeedsFile'), text('labs.linkNeedsFileHint', { file: linked.file }));
+    else this.#ui.banner.show(text('labs.linkInvalid'), text('labs.linkNoExample', { example: linked.example ?? '' }));
   }
 
   #exampleOf({ example, file }: Linked): Example | undefined {
@@ -194,63 +199,65 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /** Opens a source, unless a newer request comes first. */
-  protected async open(source: Source<Example, Linked, Data>, again = false): Promise<void> {
-    const turn = ++this.#turn;
-    if (this.states.canChange) this.keep();
-    const calm = this.states.open(again ? 'Starting the engine again.' : `Opening ${source.name}.`);
+  protected async open(source: Source<Example, Linked, Data>, reopening = false): Promise<void> {
+    const request = ++this.#requestCount;
+    if (this.states.canChange) this.save();
+    const changesDone = this.states.open(
+      reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
+    );
     try {
       await this.#needEngine();
-      await calm;
-      const data = await source.opened();
+      await changesDone;
+      const data = await source.load();
       // In turn, so that the worker ends up with the newest request.
       await this.#loads;
-      if (turn !== this.#turn) return;
+      if (request !== this.#requestCount) return;
       await this.#needEngine();
-      const opened = await this.#load(source, data, again);
-      if (turn !== this.#turn) return;
-      this.states.opened(true);
-      this.#source = this.asOpen(source, opened, data);
-      this.#astray = false;
-      if (!again) this.#awaiting = undefined;
-      await this.adopt(opened, source, again);
+      const opened = await this.#load(source, data, reopening);
+      if (request !== this.#requestCount) return;
+      this.states.finishOpening(true);
+      this.#source = this.sourceToRemember(source, opened, data);
+      this.#modelMismatch = false;
+      if (!reopening) this.#awaiting = undefined;
+      await this.adopt(opened, source, reopening);
     } catch (error) {
-      if (turn === this.#turn) await this.#failed(source, error, again);
+      if (request === this.#requestCount) await this.#failed(source, error, reopening);
     }
   }
 
-  #load(source: Source<Example, Linked, Data>, data: Data, again: boolean): Promise<Opened> {
-    const loading = this.load(source, data, again);
+  #load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened> {
+    const loading = this.load(source, data, reopening);
     this.#loads = loading.then(
       () => {
-        this.#astray = true;
+        this.#modelMismatch = true;
       },
       () => undefined,
     );
     return loading;
   }
 
-  async #failed(source: Source<Example, Linked, Data>, error: unknown, again: boolean): Promise<void> {
-    this.states.opened(false);
+  async #failed(source: Source<Example, Linked, Data>, error: unknown, reopening: boolean): Promise<void> {
+    this.states.finishOpening(false);
     const { code, message } = toFailure(error);
-    if (code !== 'internal' && !this.states.engineBroken && !again && source.linked)
+    if (code !== 'internal' && !this.states.engineBroken && !reopening && source.linked)
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
-    if (this.#astray) this.states.engineBroken = true;
-    this.states.fail(`${source.name} could not be opened.`, error);
+    if (this.#modelMismatch) this.states.engineBroken = true;
+    this.states.fail(text('labs.openFailed', { name: source.name }), error);
   }
 
   /** Opens a link's example with its own settings, after one of the link's settings was rejected. */
   async #openWithoutLink({ linked: _, ...source }: Source<Example, Linked, Data>, why: string): Promise<void> {
     await this.open(source);
     if (this.states.value === 'error' || this.#source !== source) return;
-    this.#ui.banner.show('The link’s settings are left out.', `One of them cannot be: ${why}.`);
+    this.#ui.banner.show(text('labs.linkSettingsIgnored'), text('labs.linkSettingRejected', { reason: why }));
   }
 
   /** Restarts the engine if it is broken. */
   async #needEngine(): Promise<void> {
     if (!this.states.engineBroken) return;
-    this.#engine.restart({ code: 'internal', message: 'the engine was started again' });
-    this.#astray = true;
+    this.#engine.restart({ code: 'internal', message: text('labs.engineRestarted') });
+    this.#modelMismatch = true;
     await this.#greet();
     await this.restarted();
     this.states.engineBroken = false;

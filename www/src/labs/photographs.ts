@@ -1,5 +1,7 @@
 /** Reads photographs with their cameras and masks. */
+
 import type { CameraView } from '../reconstruct/protocol';
+import { text } from '../texts';
 
 /** A camera and its photograph, if there is one: as data for the worker, and as an image for the page. */
 export interface Photograph {
@@ -33,35 +35,43 @@ const MASKED = 128;
  * Reads all cameras of a list, and the photographs that are available. Throws if the list is malformed, or a photograph
  * cannot be decoded or does not fit its camera.
  */
-export async function readPhotographs(text: string, fileOf: FileByName): Promise<Photograph[]> {
-  const file = parseCameras(text);
+export async function readPhotographs(json: string, fileOf: FileByName): Promise<Photograph[]> {
+  const file = parseCameras(json);
   return Promise.all(file.cameras.map((entry, i) => readOne(entry, i, file, fileOf)));
 }
 
-function parseCameras(text: string): CameraFile {
+function parseCameras(json: string): CameraFile {
   let file: Partial<CameraFile>;
   try {
-    file = JSON.parse(text) as Partial<CameraFile>;
+    file = JSON.parse(json) as Partial<CameraFile>;
   } catch {
-    throw new Error('The list of cameras is no JSON.');
+    throw new Error(text('reconstruct.camerasNoJson'));
   }
-  if (!Array.isArray(file?.cameras)) throw new Error('The list of cameras needs an array “cameras”.');
+  if (!Array.isArray(file?.cameras)) throw new Error(text('reconstruct.camerasMissing'));
   return file as CameraFile;
 }
 
 async function readOne(entry: CameraEntry, i: number, file: CameraFile, fileOf: FileByName): Promise<Photograph> {
   const projection = (entry.P ?? []).flat();
   if (projection.length !== 12 || !projection.every(Number.isFinite))
-    throw new Error(`Camera ${i + 1} needs “P”, three rows of four numbers.`);
-  const name = entry.image ?? `camera ${i + 1}`;
+    throw new Error(text('reconstruct.cameraNeedsP', { number: i + 1 }));
+  const name = entry.image ?? text('reconstruct.camera', { number: i + 1 });
   const blob = entry.image ? await fileOf(entry.image) : undefined;
   const mask = entry.mask ? await fileOf(entry.mask) : undefined;
   const picture = blob && (await decode(blob, name));
   const width = entry.width ?? file.width ?? picture?.width ?? 0;
   const height = entry.height ?? file.height ?? picture?.height ?? 0;
   if (picture && (picture.width !== width || picture.height !== height))
-    throw new Error(`${name} has ${picture.width} × ${picture.height} pixels, its camera ${width} × ${height}.`);
-  if (!(width > 0 && height > 0)) throw new Error(`Camera ${i + 1} has neither a picture nor a width and height.`);
+    throw new Error(
+      text('reconstruct.photoSize', {
+        name,
+        width: picture.width,
+        height: picture.height,
+        cameraWidth: width,
+        cameraHeight: height,
+      }),
+    );
+  if (!(width > 0 && height > 0)) throw new Error(text('reconstruct.cameraSizeMissing', { number: i + 1 }));
   const view: CameraView = { projection, width, height };
   if (!picture) return { name, view };
   const pixels = pixelsOf(picture);
@@ -73,13 +83,13 @@ async function decode(blob: Blob, name: string): Promise<ImageBitmap> {
   try {
     return await createImageBitmap(blob, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
   } catch {
-    throw new Error(`${name} could not be read as a picture.`);
+    throw new Error(text('reconstruct.photoUnreadable', { name }));
   }
 }
 
 function pixelsOf(picture: ImageBitmap): ImageData {
   const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d', { willReadFrequently: true });
-  if (!context) throw new Error('This browser cannot read the pixels of a picture.');
+  if (!context) throw new Error(text('reconstruct.pixelsUnreadable'));
   context.drawImage(picture, 0, 0);
   return context.getImageData(0, 0, picture.width, picture.height);
 }

@@ -10,29 +10,29 @@ export const NO_EDITS: Edits = { added: [], removed: [], outside: [] };
  * Returns the edits after a click with a tool; undefined if it changes nothing. `distance`, in world units, is the
  * offset of a new point along the surface normal, or the radius for removal.
  */
-export function editedBy(
+export function applyClick(
   tool: EditTool,
   { point, normal }: Hit,
   distance: number,
   edits: Edits,
   points: Float32Array,
 ): Edits | undefined {
-  const before = normal ? (point.map((x, axis) => x + distance * (normal[axis] ?? 0)) as Vec3) : point;
+  const position = normal ? (point.map((x, axis) => x + distance * (normal[axis] ?? 0)) as Vec3) : point;
   switch (tool) {
     case 'add':
-      return { ...edits, added: [...edits.added, before] };
+      return { ...edits, added: [...edits.added, position] };
     case 'outside':
-      return { ...edits, outside: [...edits.outside, before] };
+      return { ...edits, outside: [...edits.outside, position] };
     case 'remove':
-      return withoutNear(point, Math.abs(distance), edits, points);
+      return removeNear(point, Math.abs(distance), edits, points);
     default:
       return undefined;
   }
 }
 
-/** Removes all points within `reach` of a position, including those added by hand; undefined if there are none. */
-function withoutNear(place: Vec3, reach: number, edits: Edits, points: Float32Array): Edits | undefined {
-  const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= reach;
+/** Removes all points within `radius` of a position, including those added by hand; undefined if there are none. */
+function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Array): Edits | undefined {
+  const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= radius;
   const gone = new Set(edits.removed);
   const found: number[] = [];
   for (let i = 0; i < points.length / 3; i++) {
@@ -44,7 +44,7 @@ function withoutNear(place: Vec3, reach: number, edits: Edits, points: Float32Ar
 }
 
 /** Returns packed triples without those of the removed points. */
-export function without(values: Float32Array, removed: number[]): Float32Array {
+export function withoutRemoved(values: Float32Array, removed: number[]): Float32Array {
   const gone = new Set(removed);
   return gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;
 }

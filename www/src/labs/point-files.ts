@@ -1,6 +1,8 @@
 /** Opens points, cameras and photographs of the Reconstruct lab, from an example or from the user's files. */
+
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
 import type { CloudSource } from '../reconstruct/protocol';
+import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 import { type Photograph, readPhotographs } from './photographs';
@@ -9,13 +11,13 @@ import { type Photograph, readPhotographs } from './photographs';
 export const ACCEPT = '.ply,.obj,.xyz,.pts,.csv,.txt,.json,.png,.jpg,.jpeg,.webp';
 
 /** Files opened together. */
-export interface Opened {
+export interface PointFiles {
   /** The points; undefined if only cameras were opened, for the present points. */
   source?: CloudSource;
   photographs: Photograph[];
 }
 
-export async function fromExample({ source, photographs }: CloudExample): Promise<Opened> {
+export async function fromExample({ source, photographs }: CloudExample): Promise<PointFiles> {
   const [points, pictures] = await Promise.all([
     'shape' in source ? source : fetchPoints(source.file),
     photographs === undefined ? [] : fetchPhotographs(photographs),
@@ -37,15 +39,12 @@ async function fetchPhotographs(folder: string): Promise<Photograph[]> {
  * Reads points from one file, and a list of cameras with the photographs it names. Throws if there are several files
  * with points, or photographs without a list of cameras.
  */
-export async function fromFiles(files: File[]): Promise<Opened> {
+export async function fromFiles(files: File[]): Promise<PointFiles> {
   const lists = files.filter(({ name }) => /\.json$/i.test(name));
   const pictures = files.filter(({ name, type }) => type.startsWith('image/') || /\.(png|jpe?g|webp)$/i.test(name));
   const [points, ...more] = files.filter((file) => !lists.includes(file) && !pictures.includes(file));
-  if (more.length > 0) throw new Error('One file with points at a time, please.');
-  if (!lists[0] && pictures.length > 0)
-    throw new Error(
-      'Photographs need a cameras.json with the projection of each, chosen or dropped together with them.',
-    );
+  if (more.length > 0) throw new Error(text('reconstruct.onePointFile'));
+  if (!lists[0] && pictures.length > 0) throw new Error(text('reconstruct.photosNeedCameras'));
   const byName = new Map(pictures.map((file) => [file.name, file]));
   // A list may name photographs with their folder.
   const find = async (name: string) => byName.get(name.replace(/^.*[/\\]/, ''));

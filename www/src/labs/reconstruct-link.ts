@@ -77,7 +77,7 @@ export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Par
   };
 }
 
-const packed = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
+const coordinates = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
 
 /** Returns the hash of an address for a link's settings. */
 export function toHash(linked: LinkedCloud): string {
@@ -87,8 +87,8 @@ export function toHash(linked: LinkedCloud): string {
     if (value !== undefined) query.set(name, String(value));
   }
   for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
-  for (const point of linked.edits.added) query.append('add', packed(point));
-  for (const point of linked.edits.outside) query.append('outside', packed(point));
+  for (const point of linked.edits.added) query.append('add', coordinates(point));
+  for (const point of linked.edits.outside) query.append('outside', coordinates(point));
   if (linked.edits.removed.length > 0) query.set('remove', linked.edits.removed.join(','));
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;

@@ -1,37 +1,53 @@
 import type { Fit } from '../reconstruct/protocol';
+import { text } from '../texts';
 import { count, figure } from '../ui/format';
 import type { History } from '../ui/history';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
 /** Measures of the points and the fit, shown besides those of the surface. */
-export const FIT_ROWS: MoreMeasure[] = [
+export const FIT_ROWS: ExtraMeasure[] = [
   {
     name: 'fitMean',
-    label: 'Distance of points, mean',
-    help: 'From all points, with those changed by hand, to the surface',
+    label: text('reconstruct.fitMean'),
+    help: text('reconstruct.fitMeanHelp'),
     text: figure,
   },
-  { name: 'fitRms', label: 'Distance, rms', help: 'Root of the mean squared distance', text: figure },
-  { name: 'fitMax', label: 'Distance, largest', help: 'Strays that were left out count, too', text: figure },
+  { name: 'fitRms', label: text('reconstruct.fitRms'), help: text('reconstruct.fitRmsHelp'), text: figure },
+  { name: 'fitMax', label: text('reconstruct.fitMax'), help: text('reconstruct.fitMaxHelp'), text: figure },
   {
     name: 'meanCurvature',
-    label: 'Mean curvature',
-    help: 'Mean of |H| over the vertices, one over a length',
+    label: text('reconstruct.meanCurvature'),
+    help: text('reconstruct.meanCurvatureHelp'),
     text: figure,
   },
-  { name: 'surfaceConstraints', label: 'Constraints, surface', help: 'Points that take part: f is 0', text: count },
-  { name: 'exteriorConstraints', label: 'Constraints, exterior', help: 'Points outside: f is −1', text: count },
+  {
+    name: 'surfaceConstraints',
+    label: text('reconstruct.surfaceConstraints'),
+    help: text('reconstruct.surfaceConstraintsHelp'),
+    text: count,
+  },
+  {
+    name: 'exteriorConstraints',
+    label: text('reconstruct.exteriorConstraints'),
+    help: text('reconstruct.exteriorConstraintsHelp'),
+    text: count,
+  },
   {
     name: 'spacing',
-    label: 'Mean spacing',
-    help: 'To the nearest other point that takes part; the box is 2 long',
+    label: text('reconstruct.spacing'),
+    help: text('reconstruct.spacingHelp'),
     text: figure,
   },
-  { name: 'cell', label: 'Cell', help: 'Edge of the cells that the surface is drawn with', text: figure },
-  { name: 'duplicates', label: 'Duplicates', help: 'Points equal to others, left out', text: count },
-  { name: 'strays', label: 'Stray pieces', help: 'Pieces of the surface that no point is near', text: count },
-  { name: 'residual', label: 'Residual', help: 'Of the solve, relative to its right side', text: figure },
+  { name: 'cell', label: text('reconstruct.cell'), help: text('reconstruct.cellHelp'), text: figure },
+  { name: 'duplicates', label: text('reconstruct.duplicates'), help: text('reconstruct.duplicatesHelp'), text: count },
+  {
+    name: 'strays',
+    label: text('reconstruct.spuriousComponents'),
+    help: text('reconstruct.spuriousComponentsHelp'),
+    text: count,
+  },
+  { name: 'residual', label: text('reconstruct.residual'), help: text('reconstruct.residualHelp'), text: figure },
 ];
 
 /** Returns the values of these measures by name. */
@@ -44,19 +60,23 @@ export function fitValues(fit: Fit): Record<string, unknown> {
 
 /** Plot of the solver's residual over the iterations. */
 export const RESIDUAL_PLOT: PlotKind = {
-  title: 'Residual of the solve',
+  title: text('reconstruct.residualPlot'),
   log: true,
   curves: [
-    { label: 'residual', color: '--curve', of: ({ residual }) => residual },
-    { label: 'tolerance', color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
+    { label: text('reconstruct.residualCurve'), color: '--curve', of: ({ residual }) => residual },
+    { label: text('labs.toleranceCurve'), color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
   ],
-  tell: tellResidual,
+  describe: describeResidual,
 };
 
-function tellResidual({ reports }: History): string {
+function describeResidual({ reports }: History): string {
   const last = reports.at(-1);
   const solving = reports.filter(({ phase, residual }) => phase === 'solve' && Number.isFinite(residual));
-  if (!last || solving.length === 0) return 'The solve has not begun.';
-  const relation = last.residual <= last.tolerance ? 'below' : 'above';
-  return `After ${count(solving.length)} steps of the solve the residual is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+  if (!last || solving.length === 0) return text('reconstruct.solveNotStarted');
+  const key = last.residual <= last.tolerance ? 'reconstruct.solveBelow' : 'reconstruct.solveAbove';
+  return text(key, {
+    iterations: count(solving.length),
+    residual: figure(last.residual),
+    tolerance: figure(last.tolerance),
+  });
 }

@@ -2,15 +2,16 @@ import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
 import type { Cloud, CloudSource, ParamSpec, ParamValues, Setup } from '../reconstruct/protocol';
+import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
 import type { Photograph } from './photographs';
 import { NO_EDITS } from './picking';
-import { type Opened as Data, fromExample, fromFiles } from './point-files';
+import { type PointFiles as Data, fromExample, fromFiles } from './point-files';
 import { fromHash, type LinkedCloud, withLink } from './reconstruct-link';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { ModelSettings } from './reconstruct-settings';
+import type { ReconstructSettings } from './reconstruct-settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
 
@@ -28,7 +29,7 @@ export interface OpenedCloud {
 export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data, OpenedCloud> {
   protected readonly first = CLOUDS[0];
   readonly #client: ReconstructClient;
-  readonly #settings: ModelSettings;
+  readonly #settings: ReconstructSettings;
   readonly #onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
   /** Default parameters of the method. */
   defaults: ParamValues = {};
@@ -37,7 +38,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    settings: ModelSettings,
+    settings: ReconstructSettings,
     onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>,
   ) {
     super(client, ui, states);
@@ -46,7 +47,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     this.#onOpened = onOpened;
   }
 
-  protected override greeted(specs: ParamSpec[]): void {
+  protected override onEngineReady(specs: ParamSpec[]): void {
     this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
   }
 
@@ -60,12 +61,12 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   protected fromExample(example: CloudExample): CloudOrigin {
     const name = 'file' in example.source ? example.source.file : example.source.shape;
-    return { name, opened: () => fromExample(example), example };
+    return { name, load: () => fromExample(example), example };
   }
 
   protected fromFiles(files: File[]): CloudOrigin {
     const points = files.find((file) => !/\.(json|png|jpe?g|webp)$/i.test(file.name))?.name;
-    return { name: points ?? files.map((file) => file.name).join(' + '), opened: () => fromFiles(files) };
+    return { name: points ?? files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
   protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
@@ -76,9 +77,13 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /** If only cameras were opened, the source is the present points, now with these cameras. */
-  protected override asOpen(origin: CloudOrigin, { from, photographs }: OpenedCloud, { source }: Data): CloudOrigin {
+  protected override sourceToRemember(
+    origin: CloudOrigin,
+    { from, photographs }: OpenedCloud,
+    { source }: Data,
+  ): CloudOrigin {
     if (source) return origin;
-    return { ...origin, name: this.source?.name ?? origin.name, opened: async () => ({ source: from, photographs }) };
+    return { ...origin, name: this.source?.name ?? origin.name, load: async () => ({ source: from, photographs }) };
   }
 
   protected adopt(opened: OpenedCloud, origin: CloudOrigin): Promise<void> {
@@ -87,9 +92,9 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   /** Returns the present points, for cameras that are opened after them. */
   async #presentPoints(): Promise<CloudSource> {
-    if (!this.source) throw new Error('Open points first, or together with their cameras.');
-    const { source } = await this.source.opened();
-    if (!source) throw new Error('Open points together with their cameras.');
+    if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
+    const { source } = await this.source.load();
+    if (!source) throw new Error(text('reconstruct.camerasWithPoints'));
     return source;
   }
 
@@ -109,7 +114,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
    */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {
-      const first = variantOf(example);
+      const first = firstVariant(example);
       const params = { ...this.defaults, ...example.params, ...(linked ? {} : first?.params) };
       return { params, maxPoints: first?.maxPoints ?? example.maxPoints, keepComponents: example.keepComponents };
     }
@@ -123,6 +128,6 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 }
 
-function variantOf(example: CloudExample): CloudVariant | undefined {
+function firstVariant(example: CloudExample): CloudVariant | undefined {
   return isCloudPreset(example) ? example.variants[0] : undefined;
 }

@@ -1,4 +1,5 @@
 import type { CloudExample } from '../reconstruct/examples';
+import { text } from '../texts';
 import { h, section, uniqueId } from '../ui/dom';
 import { count } from '../ui/format';
 import { folded } from './extract-page';
@@ -45,38 +46,43 @@ export function layOut(root: HTMLElement, parts: Parts): void {
     parts.banner,
     parts.drop,
   );
-  const params = folded('Parameters', parts.params);
+  const params = folded(text('labs.parameters'), parts.params);
   params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
     h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.warning, parts.photos),
     h(
       'div',
       { class: 'column setup' },
-      section('Points', parts.data, parts.figure, parts.setup),
+      section(text('reconstruct.points'), parts.data, parts.figure, parts.setup),
       params,
-      section('Points by hand', parts.tools),
+      section(text('reconstruct.sectionEdits'), parts.tools),
     ),
     h(
       'div',
       { class: 'column results' },
-      section('Progress', parts.phases),
-      section('Surface', parts.measures),
-      section('Save', parts.exports, parts.volume, parts.extract, parts.sculpt, parts.link),
-      section('Plots', parts.plots, parts.kernel, parts.csv),
-      folded('Time against number of constraints', parts.timing),
-      folded('Exercise', parts.exercises),
+      section(text('labs.sectionProgress'), parts.phases),
+      section(text('labs.sectionSurface'), parts.measures),
+      section(text('labs.sectionSave'), parts.exports, parts.volume, parts.extract, parts.sculpt, parts.link),
+      section(text('labs.sectionPlots'), parts.plots, parts.kernel, parts.csv),
+      folded(text('reconstruct.sectionTiming'), parts.timing),
+      folded(text('labs.sectionExercise'), parts.exercises),
     ),
   );
 }
 
 /** Names of the facts about points; they are shown before any are open, so that the layout does not shift. */
-const FACTS = ['File', 'Points', 'Colours', 'Cameras'];
+const FACTS = [
+  text('labs.factFile'),
+  text('reconstruct.points'),
+  text('reconstruct.factColours'),
+  text('reconstruct.factCameras'),
+];
 
 /** Panel that shows the open points and opens others. */
 export class CloudPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
-  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #own = h('option', { value: '', hidden: true }, text('labs.yourFile'));
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
@@ -90,7 +96,7 @@ export class CloudPanel {
     const id = uniqueId('example');
     const group = (label: string, list: CloudExample[]) =>
       h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
-    const groups = [group('Points', examples), group('Figures of the paper', figures)];
+    const groups = [group(text('reconstruct.points'), examples), group(text('labs.groupFigures'), figures)];
     this.#examples = h('select', { id }, this.#own, ...groups);
     this.#examples.addEventListener('change', () => {
       const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
@@ -100,13 +106,9 @@ export class CloudPanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, text('labs.example')), this.#examples),
       h('div', { class: 'row' }, chooser),
-      h(
-        'p',
-        { class: 'help' },
-        'Or drop PLY, OBJ, XYZ, PTS or CSV anywhere on the page; photographs together with a cameras.json. It stays on this machine.',
-      ),
+      h('p', { class: 'help' }, text('reconstruct.dropHelp')),
       this.#facts,
       this.#credit,
     );
@@ -126,11 +128,12 @@ export class CloudPanel {
     const known = facts && [
       facts.name,
       count(facts.points),
-      facts.colors ? 'yes' : 'no',
-      facts.cameras > 0 ? count(facts.cameras) : 'none',
+      facts.colors ? text('labs.yes') : text('labs.no'),
+      facts.cameras > 0 ? count(facts.cameras) : text('labs.none'),
     ];
     const rows = FACTS.map((name, i) => h('div', {}, h('dt', {}, name), h('dd', {}, known?.[i] ?? '–')));
-    if (facts?.normals) rows.push(h('div', {}, h('dt', {}, 'Normals'), h('dd', {}, 'yes')));
+    if (facts?.normals)
+      rows.push(h('div', {}, h('dt', {}, text('reconstruct.factNormals')), h('dd', {}, text('labs.yes'))));
     this.#facts.replaceChildren(...rows);
     this.#credit.textContent = example?.credit ?? '';
   }

@@ -3,6 +3,7 @@ import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { CLOUD_PRESETS, type CloudPreset, type CloudVariant } from '../reconstruct/presets';
 import type { Cloud, ParamSpec, ParamValues } from '../reconstruct/protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { CloudOptionControls } from '../ui/cloud-options';
 import { type CloudChoice, CloudSetup } from '../ui/cloud-setup';
 import { h } from '../ui/dom';
@@ -64,8 +65,7 @@ export class ReconstructParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label':
-      '3D view of the points and the surface. Arrow keys turn it, plus and minus zoom; with a tool for points by hand, Enter is a click in its middle.',
+    'aria-label': text('reconstruct.viewLabel'),
   });
   readonly view = new ReconstructionView(this.#canvas, INITIAL_VIEW);
   readonly status = new StatusLine();
@@ -111,7 +111,7 @@ export class ReconstructParts {
       (text) => this.status.say(text),
     );
     this.#exports = new ExportButtons((format, type) => {
-      this.saving.mesh(format, type).catch((error) => events.onError('The surface could not be saved.', error));
+      this.saving.mesh(format, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
     this.options = new CloudOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -119,19 +119,19 @@ export class ReconstructParts {
     });
     this.photos = new PhotoStrip((index) => this.#lookThrough(index));
     this.view.onLeave = () => this.photos.choose(undefined);
-    this.#volume = button('Volume (NIfTI)', events.onSaveVolume, 'volume');
-    this.#extract = button('Open as a volume in Extract', events.onPassOn, 'extract');
-    this.#sculpt = button('Open in Sculpt', events.onSculpt, 'sculpt');
+    this.#volume = button(text('reconstruct.saveVolume'), events.onSaveVolume, 'volume');
+    this.#extract = button(text('reconstruct.openInExtract'), events.onPassOn, 'extract');
+    this.#sculpt = button(text('labs.openInSculpt'), events.onSculpt, 'sculpt');
     this.csv = h(
       'button',
       { type: 'button', onclick: () => this.saving.plots(history, 'residual'), disabled: true },
-      'Plot data (CSV)',
+      text('labs.plotData'),
     );
     this.#layOut(signal);
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop points to open them');
+    const drop = h('div', { class: 'drop', hidden: true }, text('reconstruct.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -155,7 +155,7 @@ export class ReconstructParts {
       volume: this.#volume,
       extract: this.#extract,
       sculpt: this.#sculpt,
-      link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
+      link: button(text('labs.copyLink'), this.#events.onCopyLink, 'link'),
       plots: this.plots.element,
       kernel: this.#kernel.element,
       csv: this.csv,
@@ -202,7 +202,7 @@ export class ReconstructParts {
 
   refuseParam(name: string, message: string, inForce: ParamValues): void {
     this.#params?.show(inForce);
-    this.#params?.complain(name, message);
+    this.#params?.showError(name, message);
   }
 
   showState(state: LabState, ready: boolean, surface: boolean): void {

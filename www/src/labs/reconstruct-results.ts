@@ -1,9 +1,10 @@
 import type { ReconstructClient } from '../reconstruct/client';
 import type { ConstraintsEvent, MeasuredEvent, ProgressEvent, SurfaceEvent, TimedEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
-import { count, figure, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count, figure } from '../ui/format';
 import { type History, underWay } from '../ui/history';
-import { overallProgress } from '../ui/phases';
+import { overallProgress, phaseName } from '../ui/phases';
 import type { LabStates } from './lab-states';
 import { fitValues } from './reconstruct-measures';
 import type { ReconstructParts } from './reconstruct-parts';
@@ -11,13 +12,13 @@ import type { ReconstructParts } from './reconstruct-parts';
 export type ResultEvent = ProgressEvent | SurfaceEvent | ConstraintsEvent | MeasuredEvent | TimedEvent;
 
 /** Displays the worker's results: progress, constraints, surface and measures. */
-export class Results {
+export class ReconstructResults {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #history: History;
   /** Whether the displayed surface is complete; previews must not replace it. */
-  #whole = false;
+  #complete = false;
   /** The newest surface, until it is displayed at the next animation frame. */
   #surface: SurfaceEvent | undefined;
   #framePending = 0;
@@ -30,8 +31,8 @@ export class Results {
   }
 
   /** Whether there is a complete surface to save or pass on. */
-  get whole(): boolean {
-    return this.#whole;
+  get complete(): boolean {
+    return this.#complete;
   }
 
   take(event: ResultEvent): void {
@@ -51,7 +52,7 @@ export class Results {
         this.#showMeasures(event);
         break;
       case 'timed':
-        this.#ui.timing.tell(event.timing);
+        this.#ui.timing.add(event.timing);
     }
   }
 
@@ -65,11 +66,16 @@ export class Results {
   /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
-    if (state === 'running') return 'Running.';
-    if (!last) return 'Ready to start.';
-    if (state !== 'done') return `Paused at iteration ${count(last.iteration)}, in the phase ${last.phase}.`;
-    if (last.vertices === 0) return 'Done, but there is no surface: f is nowhere 0.';
-    return `Done: ${count(last.vertices)} vertices in ${plural(last.components, 'component')}, residual ${figure(last.residual)}.`;
+    if (state === 'running') return text('labs.running');
+    if (!last) return text('labs.readyToStart');
+    if (state !== 'done')
+      return text('reconstruct.pausedAt', { iteration: count(last.iteration), phase: phaseName(last.phase) });
+    if (last.vertices === 0) return text('reconstruct.noSurfaceDone');
+    return text('reconstruct.done', {
+      vertices: plural('counts.vertex', last.vertices),
+      components: plural('counts.component', last.components),
+      residual: figure(last.residual),
+    });
   }
 
   /** Clears the history for a new run; the surface stays until the new one is complete. */
@@ -79,7 +85,7 @@ export class Results {
 
   /** Clears the history and the surface; only the points stay. */
   clear(): void {
-    this.#whole = false;
+    this.#complete = false;
     this.#surface = undefined;
     this.#history.clear();
     this.#ui.clearSurface();
@@ -92,23 +98,23 @@ export class Results {
 
   /** Displays a surface at the next animation frame; only then may the worker send another. */
   #takeSurface(event: SurfaceEvent): void {
-    if (event.preview && this.#whole) {
-      this.#client.shown();
+    if (event.preview && this.#complete) {
+      this.#client.acknowledge();
       return;
     }
     this.#surface = event;
-    this.#whole = !event.preview;
+    this.#complete = !event.preview;
     this.#framePending ||= requestAnimationFrame(() => {
       this.#framePending = 0;
       if (this.#surface) this.#ui.view.showSurface(this.#surface.surface);
       this.#surface = undefined;
-      this.#client.shown();
+      this.#client.acknowledge();
     });
   }
 
   #showMeasures({ measures, fit }: MeasuredEvent): void {
     if (measures) this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showMore(fitValues(fit));
+    this.#ui.measures.showExtra(fitValues(fit));
     this.#ui.warning.textContent = fit.warning ?? '';
   }
 
@@ -122,11 +128,8 @@ export class Results {
 
   /** Clears a surface that belongs to other settings, and explains why there is none. */
   #showNothing(): void {
-    this.#whole = false;
+    this.#complete = false;
     this.#ui.clearSurface();
-    this.#ui.banner.show(
-      'There is no surface.',
-      'f is nowhere above the level. Few points need a smaller δ, or more points; else try a smaller λs, the level “mean”, or a smaller cell.',
-    );
+    this.#ui.banner.show(text('reconstruct.noSurface'), text('reconstruct.noSurfaceHint'));
   }
 }

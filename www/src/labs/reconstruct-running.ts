@@ -1,9 +1,10 @@
 import type { ReconstructClient } from '../reconstruct/client';
+import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { ReconstructParts } from './reconstruct-parts';
 
 /** Runs, pauses and steps the model of the Reconstruct lab. */
-export class Running {
+export class RunControl {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
@@ -33,6 +34,6 @@ export class Running {
 
   /** Reports a request's failure, without waiting for its reply. */
   ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 }

@@ -1,13 +1,14 @@
 import { toFailure } from '../channel';
 import type { ReconstructClient } from '../reconstruct/client';
 import type { Cloud, Edits, ParamValues, Setup } from '../reconstruct/protocol';
+import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { Hit } from '../view/reconstruction';
 import type { LabStates } from './lab-states';
-import { editedBy, NO_EDITS, without } from './picking';
+import { applyClick, NO_EDITS, withoutRemoved } from './picking';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { Results } from './reconstruct-results';
-import type { Running } from './reconstruct-running';
+import type { ReconstructResults } from './reconstruct-results';
+import type { RunControl } from './reconstruct-running';
 import { UndoStack } from './undo';
 
 /** Limits of the undo history. */
@@ -23,15 +24,15 @@ interface Settings {
 }
 
 /** The points and the settings of their model: changes them, sends them to the worker, and undoes changes. */
-export class ModelSettings {
+export class ReconstructSettings {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #results: Results;
-  readonly #running: Running;
+  readonly #results: ReconstructResults;
+  readonly #running: RunControl;
   readonly #onParams: (params: ParamValues) => void;
   readonly #undo = new UndoStack<Settings>(UNDO_LIMITS);
-  #lastChange = { together: '', at: 0 };
+  #lastChange = { mergeKey: '', at: 0 };
   #cloud: Cloud | undefined;
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
@@ -41,8 +42,8 @@ export class ModelSettings {
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    results: Results,
-    running: Running,
+    results: ReconstructResults,
+    running: RunControl,
     onParams: (params: ParamValues) => void,
   ) {
     this.#client = client;
@@ -71,7 +72,7 @@ export class ModelSettings {
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
     this.#edits = { ...setup.edits, removed };
     this.#undo.clear();
-    this.#tellUndo();
+    this.#showUndo();
     this.#ui.setup.show(setup);
     this.#showEdits();
   }
@@ -86,43 +87,43 @@ export class ModelSettings {
    * Changes settings; the surface stays until the new one is complete. If the settings are rejected, nothing changes.
    */
   change(changed: Partial<Settings>, label: string): Promise<void> {
-    return this.#states.inTurn(() => this.#change(changed, label));
+    return this.#states.enqueue(() => this.#change(changed, label));
   }
 
   /** Sets a parameter of the live model; a run continues, and a finished one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
-    return this.#states.inTurn(() => this.#setParam(name, value));
+    return this.#states.enqueue(() => this.#setParam(name, value));
   }
 
   /** Handles a click in the view with the selected tool. */
   pick(hit: Hit): Promise<void> {
     const { tool, distance } = this.#ui.tools;
     const length = distance * this.#ui.view.size;
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#cloud || !this.#states.canChange) return;
-      const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
-      if (edits) await this.#change({ edits }, 'points by hand');
-      else if (tool === 'remove') this.#ui.status.say('No point is so near to that place.');
+      const edits = applyClick(tool, hit, length, this.#edits, this.#cloud.points);
+      if (edits) await this.#change({ edits }, text('reconstruct.editChange'));
+      else if (tool === 'remove') this.#ui.status.say(text('reconstruct.noPointsNear'));
     });
   }
 
   takeBackEdits(): Promise<void> {
-    return this.change({ edits: NO_EDITS }, 'taking all back');
+    return this.change({ edits: NO_EDITS }, text('reconstruct.discardChange'));
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(() => this.#travel(way));
+    return this.#states.enqueue(() => this.#travel(way));
   }
 
   /** Builds a new model with the same settings, before its first step. */
   rebuild(): Promise<void> {
-    return this.#states.inTurn(async () => this.showParams(await this.#handOver(this.#now)));
+    return this.#states.enqueue(async () => this.showParams(await this.#handOver(this.#now)));
   }
 
   async #change(changed: Partial<Settings>, label: string): Promise<void> {
     if (!this.#states.canChange) return;
     const before = this.#now;
-    if (await this.#apply({ ...before, ...changed })) this.#remember(before, label);
+    if (await this.#apply({ ...before, ...changed })) this.#checkpoint(before, label);
   }
 
   async #setParam(name: string, value: unknown): Promise<void> {
@@ -130,16 +131,16 @@ export class ModelSettings {
     const before = this.#now;
     try {
       const params = await this.#client.request('setParams', { [name]: value });
-      this.#remember(before, `change of ${name}`, name);
+      this.#checkpoint(before, text('labs.changeOf', { name }), name);
       this.showParams(params);
-      if (this.#states.beneath === 'done') {
+      if (this.#states.modelState === 'done') {
         this.#results.startOver();
         this.#running.ask(this.#running.play());
       }
     } catch (error) {
       const { code, message } = toFailure(error);
       this.#ui.refuseParam(name, message, this.#params);
-      if (code === 'internal') this.#states.fail('That did not work.', error);
+      if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
     }
   }
 
@@ -147,8 +148,8 @@ export class ModelSettings {
     if (!this.#states.canChange) return;
     const state = this.#now;
     const back = this.#undo[way]({ bytes: sizeOf(state), state });
-    this.#lastChange.together = '';
-    this.#tellUndo();
+    this.#lastChange.mergeKey = '';
+    this.#showUndo();
     if (back) await this.#apply(back);
   }
 
@@ -170,7 +171,7 @@ export class ModelSettings {
       return true;
     } catch (error) {
       this.#ui.setup.show(this.choice);
-      this.#states.fail('That cannot be.', error);
+      this.#states.fail(text('labs.settingsRejected'), error);
       return false;
     }
   }
@@ -190,15 +191,15 @@ export class ModelSettings {
     return ready.params;
   }
 
-  #remember(state: Settings, label: string, together = ''): void {
+  #checkpoint(state: Settings, label: string, mergeKey = ''): void {
     const now = performance.now();
-    const isOne = together !== '' && together === this.#lastChange.together && now - this.#lastChange.at < TOGETHER;
-    this.#lastChange = { together, at: now };
+    const isOne = mergeKey !== '' && mergeKey === this.#lastChange.mergeKey && now - this.#lastChange.at < TOGETHER;
+    this.#lastChange = { mergeKey, at: now };
     if (!isOne) this.#undo.push({ label, bytes: sizeOf(state), state });
-    this.#tellUndo();
+    this.#showUndo();
   }
 
-  #tellUndo(): void {
+  #showUndo(): void {
     this.#ui.transport.showUndo(this.#undo.undoable, this.#undo.redoable);
   }
 
@@ -207,7 +208,7 @@ export class ModelSettings {
     if (!this.#cloud) return;
     const { points, colors } = this.#cloud;
     const { added, removed, outside } = this.#edits;
-    this.#ui.view.showPoints(without(points, removed), colors && without(colors, removed));
+    this.#ui.view.showPoints(withoutRemoved(points, removed), colors && withoutRemoved(colors, removed));
     this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
   }
 }

@@ -1,11 +1,12 @@
 import type { ReconstructClient } from '../reconstruct/client';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { text } from '../texts';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { LabStates } from './lab-states';
-import type { PassOn } from './labs';
+import type { OpenInLab } from './labs';
 import { fits, linkOf, toHash } from './reconstruct-link';
 import type { ReconstructOpening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { ModelSettings } from './reconstruct-settings';
+import type { ReconstructSettings } from './reconstruct-settings';
 
 /** Voxels along the longest side of a volume that is saved or passed on. */
 const VOLUME_SIZE = 96;
@@ -14,18 +15,18 @@ const VOLUME_SIZE = 96;
  * Shares the state of the Reconstruct lab as an address, saves f as a volume, and passes volume or surface to other
  * labs.
  */
-export class Sharing {
+export class ReconstructSharing {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #settings: ModelSettings;
+  readonly #settings: ReconstructSettings;
   readonly #opening: ReconstructOpening;
 
   constructor(
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    settings: ModelSettings,
+    settings: ReconstructSettings,
     opening: ReconstructOpening,
   ) {
     this.#client = client;
@@ -57,8 +58,8 @@ export class Sharing {
     this.updateAddress();
     const fit = fits(this.#settings.edits);
     await copyAddress(this.#ui.status, [
-      !this.#opening.source?.example && FILE_LACKS,
-      !fit && 'So many points by hand are not in it.',
+      !this.#opening.source?.example && FILE_NOTE,
+      !fit && text('reconstruct.linkLacksEdits'),
     ]);
   }
 
@@ -70,23 +71,28 @@ export class Sharing {
   }
 
   /** Passes f on to the Extract lab as a volume; inside is above the level. */
-  toExtract(passOn: PassOn): void {
-    this.#ui.status.say('Making a volume.');
+  toExtract(passOn: OpenInLab): void {
+    this.#ui.status.say(text('reconstruct.samplingVolume'));
     this.#tryTo(async () => {
       const { bytes, level } = await this.#client.request('volume', { size: VOLUME_SIZE });
-      passOn({ lab: 'extract', name: `${this.#ui.saving.name} (volume)`, bytes, params: { iso: level, isoForce: -1 } });
+      passOn({
+        lab: 'extract',
+        name: text('reconstruct.volumeName', { name: this.#ui.saving.name }),
+        bytes,
+        params: { iso: level, isoForce: -1 },
+      });
     });
   }
 
   /** Passes the surface on as a mesh to deform. */
-  toSculpt(passOn: PassOn): void {
+  toSculpt(passOn: OpenInLab): void {
     this.#tryTo(async () => {
       const bytes = await this.#client.request('export', { format: 'ply' });
-      passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} });
-    }, 'The surface could not be passed on.');
+      passOn({ lab: 'sculpt', name: text('labs.surfaceName', { name: this.#ui.saving.name }), bytes, params: {} });
+    }, text('labs.toSculptFailed'));
   }
 
-  #tryTo(work: () => Promise<void>, title = 'The volume could not be made.'): void {
+  #tryTo(work: () => Promise<void>, title = text('reconstruct.volumeFailed')): void {
     work().catch((error) => this.#states.fail(title, error));
   }
 }

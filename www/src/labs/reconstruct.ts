@@ -2,20 +2,21 @@ import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
 import { ReconstructClient } from '../reconstruct/client';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
-import type { ParamValues, PointShade, WorkerEvent } from '../reconstruct/protocol';
+import type { ParamValues, PointQuantity, WorkerEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { CloudViewOptions } from '../view/reconstruction';
 import { LabStates } from './lab-states';
-import type { Lab, PassOn } from './labs';
+import type { Lab, OpenInLab } from './labs';
 import { photoFor } from './reconstruct-link';
 import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './reconstruct-opening';
 import { type PartEvents, ReconstructParts } from './reconstruct-parts';
-import { Results } from './reconstruct-results';
-import { Running } from './reconstruct-running';
-import { ModelSettings } from './reconstruct-settings';
-import { Sharing } from './reconstruct-sharing';
+import { ReconstructResults } from './reconstruct-results';
+import { RunControl } from './reconstruct-running';
+import { ReconstructSettings } from './reconstruct-settings';
+import { ReconstructSharing } from './reconstruct-sharing';
 
 /**
  * The Reconstruct lab: an implicit surface is fitted to points. This class connects the lab's parts; opening, settings,
@@ -23,19 +24,19 @@ import { Sharing } from './reconstruct-sharing';
  */
 export class ReconstructLab implements Lab {
   readonly #root: HTMLElement;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   readonly #closing = new AbortController();
   readonly #client = new ReconstructClient((event) => this.#onEvent(event));
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #running: Running;
-  readonly #results: Results;
-  readonly #settings: ModelSettings;
+  readonly #running: RunControl;
+  readonly #results: ReconstructResults;
+  readonly #settings: ReconstructSettings;
   readonly #opening: ReconstructOpening;
-  readonly #sharing: Sharing;
-  #shade: PointShade | undefined;
+  readonly #sharing: ReconstructSharing;
+  #quantity: PointQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -45,16 +46,16 @@ export class ReconstructLab implements Lab {
     const states = new LabStates(ui.banner, ui.status, signal);
     this.#ui = ui;
     this.#states = states;
-    this.#running = new Running(client, ui, states);
-    this.#results = new Results(client, ui, states, history);
-    this.#settings = new ModelSettings(client, ui, states, this.#results, this.#running, (params) =>
+    this.#running = new RunControl(client, ui, states);
+    this.#results = new ReconstructResults(client, ui, states, history);
+    this.#settings = new ReconstructSettings(client, ui, states, this.#results, this.#running, (params) =>
       this.#showParams(params),
     );
     this.#opening = new ReconstructOpening(client, ui, states, this.#settings, (opened, origin) =>
       this.#adopt(opened, origin),
     );
-    this.#sharing = new Sharing(client, ui, states, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    this.#sharing = new ReconstructSharing(client, ui, states, this.#settings, this.#opening);
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
   }
 
@@ -79,7 +80,7 @@ export class ReconstructLab implements Lab {
       onExample: (example) => void this.#opening.example(example),
       onExampleId: (id) => this.#opening.byId(id),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
-      onChoice: (choice, what) => void this.#settings.change({ choice }, `change of ${what}`),
+      onChoice: (choice, what) => void this.#settings.change({ choice }, text('labs.changeOf', { name: what })),
       onParam: (name, value) => void this.#settings.setParam(name, value),
       onPick: (hit) => void this.#settings.pick(hit),
       onTakeBack: () => void this.#settings.takeBackEdits(),
@@ -102,18 +103,24 @@ export class ReconstructLab implements Lab {
   #shortcuts(): Shortcut[] {
     const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#running.toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#running.step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#running.step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#running.toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#running.step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#running.step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
       {
         key: 'Escape',
-        shown: 'Esc',
-        text: 'away with the message, the tool or the photograph',
-        act: () => this.#putAway(),
+        shown: text('labs.keyEscape'),
+        text: text('reconstruct.dismissKey'),
+        act: () => this.#escape(),
       },
     ];
   }
@@ -138,7 +145,7 @@ export class ReconstructLab implements Lab {
   #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {
     const choice = { ...this.#settings.choice, maxPoints: maxPoints ?? preset.maxPoints };
     const changed = { choice, params: { ...this.#opening.defaults, ...preset.params, ...params } };
-    void this.#settings.change(changed, `figure ${name}`);
+    void this.#settings.change(changed, text('labs.figureChange', { name }));
   }
 
   #showParams(params: ParamValues): void {
@@ -151,9 +158,9 @@ export class ReconstructLab implements Lab {
   }
 
   #setOptions({ color }: CloudViewOptions): void {
-    const shade = color === 'mean curvature' || color === 'distance' ? color : undefined;
-    if (shade !== this.#shade) this.#running.ask(this.#client.request('shade', shade));
-    this.#shade = shade;
+    const quantity = color === 'mean curvature' || color === 'distance' ? color : undefined;
+    if (quantity !== this.#quantity) this.#running.ask(this.#client.request('quantity', quantity));
+    this.#quantity = quantity;
     this.#sharing.updateAddress();
   }
 
@@ -161,34 +168,34 @@ export class ReconstructLab implements Lab {
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    if (engineBroken) return this.#opening.reopen();
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
       this.#results.clear();
-      this.#states.stand('Ready to start.');
+      this.#states.idle(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The model could not be built.', error);
+      this.#states.fail(text('labs.buildFailed'), error);
     }
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event !== 'state') this.#results.take(event);
-    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
+    const { modelState, ready } = this.#states;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.whole);
+    this.#ui.showState(modelState, ready, state !== 'loading' && this.#results.complete);
   }
 
   /** Handles Escape: dismisses the message, else deselects the tool, else leaves the photograph. */
-  #putAway(): void {
+  #escape(): void {
     const { banner, tools, photos } = this.#ui;
     if (banner.shown) this.#dismiss();
-    else if (tools.tool !== 'none') tools.putAway();
+    else if (tools.tool !== 'none') tools.deselect();
     else photos.choose(undefined);
   }
 

@@ -1,4 +1,5 @@
 import type { MeshFormat } from '../protocol';
+import { text } from '../texts';
 import { download } from '../ui/files';
 import type { History } from '../ui/history';
 import { toCsv } from './csv';
@@ -32,6 +33,6 @@ export class Saving {
       .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')
       .replaceAll(' ', '-');
     download(`${stem}${suffix}.${extension}`, bytes, type);
-    this.#say(`Saved ${stem}${suffix}.${extension}.`);
+    this.#say(text('labs.saved', { stem, suffix, extension }));
   }
 }

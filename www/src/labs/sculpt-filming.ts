@@ -1,9 +1,10 @@
 import type { SculptClient } from '../sculpt/client';
 import type { Film } from '../sculpt/film';
 import { poseAt } from '../sculpt/film';
+import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
-import type { ModelSettings } from './sculpt-settings';
+import type { SculptSettings } from './sculpt-settings';
 
 /** Duration of a recorded frame, in seconds. */
 const FRAME_SECONDS = 1 / 25;
@@ -13,9 +14,9 @@ export class Filming {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
-  readonly #settings: ModelSettings;
+  readonly #settings: SculptSettings;
 
-  constructor(client: SculptClient, ui: SculptParts, states: LabStates, settings: ModelSettings) {
+  constructor(client: SculptClient, ui: SculptParts, states: LabStates, settings: SculptSettings) {
     this.#client = client;
     this.#ui = ui;
     this.#states = states;
@@ -28,56 +29,56 @@ export class Filming {
     const known =
       film && 'keys' in film ? film : { keys: [], between: this.#ui.film.between, loop: film?.loop ?? false };
     const keys = [...known.keys, pose];
-    this.#change({ ...known, keys }, 'new keyframe', known.between * (keys.length - 1));
-    this.#ui.status.say(`Keyframe ${keys.length} is the present pose.`);
+    this.#change({ ...known, keys }, text('sculpt.newKeyframeChange'), known.between * (keys.length - 1));
+    this.#ui.status.say(text('sculpt.keyframeAdded', { number: keys.length }));
   }
 
   removeKey(index: number): void {
     const { film } = this.#settings;
     if (!film || !('keys' in film)) return;
     const keys = film.keys.filter((_, k) => k !== index);
-    this.#change(keys.length > 0 ? { ...film, keys } : undefined, 'removed keyframe', 0);
+    this.#change(keys.length > 0 ? { ...film, keys } : undefined, text('sculpt.removedKeyframeChange'), 0);
   }
 
   setBetween(between: number): void {
     const { film, frame } = this.#settings;
     if (!film || !('keys' in film)) return;
     const at = Math.round((frame / film.between) * between);
-    this.#change({ ...film, between }, 'change of the frames between', at);
+    this.#change({ ...film, between }, text('sculpt.betweenChange'), at);
   }
 
   setLoop(loop: boolean): void {
     const { film, frame } = this.#settings;
-    if (film) this.#change({ ...film, loop }, 'change of the loop', frame);
+    if (film) this.#change({ ...film, loop }, text('sculpt.loopChange'), frame);
   }
 
   /** Moves the film to a frame, and the ellipsoids to its pose, without playing. */
   seek(frame: number): void {
     const { film } = this.#settings;
     if (!film || !this.#states.canChange) return;
-    this.#settings.remember(`frame ${frame}`, 'seek');
+    this.#settings.checkpoint(text('sculpt.frameChange', { frame }), 'seek');
     this.#settings.send(poseAt(film, frame), false);
-    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail('That did not work.', error));
+    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   /** Records the whole film as one file. */
   async record(): Promise<void> {
     if (!this.#states.canChange) return;
     this.#ui.film.showRecording(0);
-    this.#ui.status.say('Recording.');
+    this.#ui.status.say(text('sculpt.recording'));
     try {
       const bytes = await this.#client.request('record', { frameSeconds: FRAME_SECONDS });
       if (bytes) this.#ui.saving.bytes('film.glb', bytes, 'model/gltf-binary');
-      else this.#ui.status.say('The recording was cancelled.');
+      else this.#ui.status.say(text('sculpt.recordingCancelled'));
     } catch (error) {
-      this.#states.fail('The film could not be recorded.', error);
+      this.#states.fail(text('sculpt.recordingFailed'), error);
     }
     this.#ui.film.showRecording(undefined);
   }
 
   #change(film: Film | undefined, what: string, frame: number): void {
     if (!this.#states.canChange) return;
-    this.#settings.remember(what);
-    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail('That did not work.', error));
+    this.#settings.checkpoint(what);
+    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 }

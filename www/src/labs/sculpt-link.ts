@@ -1,6 +1,6 @@
 /** Converts the Sculpt lab's settings to the hash of an address, `#sculpt?…`, and back. */
 import type { ParamValues } from '../protocol';
-import { lengthsOf, packed, unpacked } from '../sculpt/ellipsoids';
+import { fromNumbers, lengthsOf, toNumbers } from '../sculpt/ellipsoids';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import type { Film } from '../sculpt/film';
 import type { Pose } from '../sculpt/protocol';
@@ -66,7 +66,7 @@ export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undef
 function asText(pose: Pose): string {
   return pose
     .map((one) =>
-      packed(one)
+      toNumbers(one)
         .map(rounding(1e-4 * Math.max(...lengthsOf(one))))
         .join(','),
     )
@@ -79,7 +79,7 @@ function rounding(step: number): (value: number) => number {
 }
 
 function asPose(text: string): Pose | undefined {
-  const pose = text.split(';').map((one) => unpacked(one.split(',').map(Number)));
+  const pose = text.split(';').map((one) => fromNumbers(one.split(',').map(Number)));
   return pose.every((one) => one !== undefined) ? pose : undefined;
 }
 

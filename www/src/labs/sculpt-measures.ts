@@ -1,50 +1,51 @@
 import type { StepReport } from '../sculpt/protocol';
+import { text } from '../texts';
 import { count, figure, milliseconds } from '../ui/format';
 import type { History } from '../ui/history';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
 /** Measures of frames, detail and correspondence, shown besides those of the surface. */
-export const SCULPT_ROWS: MoreMeasure[] = [
-  { name: 'frameMs', label: 'Time of a frame', help: 'Work of the last frame in the worker', text: milliseconds },
+export const SCULPT_ROWS: ExtraMeasure[] = [
+  { name: 'frameMs', label: text('sculpt.frameTime'), help: text('sculpt.frameTimeHelp'), text: milliseconds },
   {
     name: 'alongMs',
-    label: 'Answer to the hand',
-    help: 'From the last move by hand to the surface on the screen that goes along, until the model has followed',
+    label: text('sculpt.displayLatency'),
+    help: text('sculpt.displayLatencyHelp'),
     text: milliseconds,
   },
   {
     name: 'answerMs',
-    label: 'Answer of the model',
-    help: 'From the last move of an ellipsoid to the frame of the model on the screen that follows it',
+    label: text('sculpt.modelLatency'),
+    help: text('sculpt.modelLatencyHelp'),
     text: milliseconds,
   },
   {
     name: 'answerFrames',
-    label: 'The same, in frames',
-    help: 'Frames of the model drawn until the move was followed; 1 is at once, 2 where one was under way',
+    label: text('sculpt.latencyFrames'),
+    help: text('sculpt.latencyFramesHelp'),
     text: count,
   },
-  { name: 'bands', label: 'Bands', help: 'Surfaces from the base to the detail, both among them', text: count },
+  { name: 'bands', label: text('sculpt.bands'), help: text('sculpt.bandsHelp'), text: count },
   {
     name: 'areaLow',
-    label: 'Area under T, 5 %',
-    help: 'Area on the base over area here: 5 % of the vertices lie below',
+    label: text('sculpt.areaLow'),
+    help: text('sculpt.areaLowHelp'),
     text: figure,
   },
-  { name: 'areaHigh', label: 'Area under T, 95 %', help: 'The same: 95 % of the vertices lie below', text: figure },
+  { name: 'areaHigh', label: text('sculpt.areaHigh'), help: text('sculpt.areaHighHelp'), text: figure },
   {
     name: 'angleHigh',
-    label: 'Stretch of T, 95 %',
-    help: 'Longest over shortest stretch of directions; 1 where angles are kept. 95 % lie below',
+    label: text('sculpt.angleHigh'),
+    help: text('sculpt.angleHighHelp'),
     text: figure,
   },
-  { name: 'folded', label: 'Folded', help: 'Triangles that T turns over', text: count },
-  { name: 'missed', label: 'Missed', help: 'Vertices whose normal on the base met no detail', text: count },
+  { name: 'folded', label: text('sculpt.flipped'), help: text('sculpt.flippedHelp'), text: count },
+  { name: 'missed', label: text('sculpt.missed'), help: text('sculpt.missedHelp'), text: count },
   {
     name: 'held',
-    label: 'Held back',
-    help: 'Vertices whose detail was held back, so that nothing crosses',
+    label: text('sculpt.limited'),
+    help: text('sculpt.limitedHelp'),
     text: count,
   },
 ];
@@ -52,25 +53,25 @@ export const SCULPT_ROWS: MoreMeasure[] = [
 /** Plots of the Sculpt lab, over the frames. */
 export const SCULPT_PLOTS: PlotKind[] = [
   {
-    title: 'Unrest of the skin',
+    title: text('sculpt.residualPlot'),
     log: true,
     curves: [
-      { label: 'unrest', color: '--curve', of: ({ residual }) => residual },
-      { label: 'tolerance', color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
+      { label: text('sculpt.residualCurve'), color: '--curve', of: ({ residual }) => residual },
+      { label: text('labs.toleranceCurve'), color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
     ],
-    tell: tellUnrest,
+    describe: describeResidual,
   },
   {
-    title: 'Vertices',
+    title: text('sculpt.verticesPlot'),
     log: false,
-    curves: [{ label: 'vertices', color: '--curve', of: ({ vertices }) => vertices }],
-    tell: ({ reports }) => tellLast(reports, 'vertices', ({ vertices }) => count(vertices)),
+    curves: [{ label: text('sculpt.verticesCurve'), color: '--curve', of: ({ vertices }) => vertices }],
+    describe: describeVertices,
   },
   {
-    title: 'Time of a frame, ms',
+    title: text('sculpt.frameTimePlot'),
     log: false,
-    curves: [{ label: 'time', color: '--curve', of: timeOf }],
-    tell: tellTime,
+    curves: [{ label: text('sculpt.timeCurve'), color: '--curve', of: timeOf }],
+    describe: describeTime,
   },
 ];
 
@@ -79,20 +80,24 @@ function timeOf({ times }: StepReport): number {
   return Object.values(times).reduce((sum, time) => sum + time, 0);
 }
 
-function tellUnrest({ reports }: History): string {
+function describeResidual({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return '';
-  const relation = last.residual <= last.tolerance ? 'below' : 'above';
-  return `After ${count(last.iteration)} frames one more iteration would move the skin by ${figure(last.residual)} edges, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+  const key = last.residual <= last.tolerance ? 'sculpt.residualBelow' : 'sculpt.residualAbove';
+  return text(key, {
+    frames: count(last.iteration),
+    residual: figure(last.residual),
+    tolerance: figure(last.tolerance),
+  });
 }
 
-function tellLast(reports: readonly StepReport[], what: string, text: (report: StepReport) => string): string {
+function describeVertices({ reports }: History): string {
   const [first, last] = [reports[0], reports.at(-1)];
-  return first && last ? `From ${text(first)} to ${text(last)} ${what}.` : '';
+  return first && last ? text('sculpt.verticesTold', { first: count(first.vertices), last: count(last.vertices) }) : '';
 }
 
-function tellTime({ reports }: History): string {
+function describeTime({ reports }: History): string {
   const sorted = reports.map(timeOf).sort((a, b) => a - b);
   const median = sorted[sorted.length >> 1] ?? 0;
-  return `Half of the frames took less than ${milliseconds(median)}, the longest ${milliseconds(sorted.at(-1) ?? 0)}.`;
+  return text('sculpt.frameTimesTold', { median: milliseconds(median), longest: milliseconds(sorted.at(-1) ?? 0) });
 }

@@ -1,7 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
-import type { Opened, SceneSource } from '../sculpt/protocol';
+import type { OpenedScene, SceneSource } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import { fromExample, fromFiles } from './mesh-files';
 import { Opening, type Source } from './opening';
@@ -14,16 +15,16 @@ export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 const OWN_PARAMS = { supersample: 2 };
 
 /** Opens meshes in the Sculpt lab, and builds models of them. */
-export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, Opened> {
+export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, OpenedScene> {
   protected readonly first = SCENES[0];
   readonly #client: SculptClient;
-  readonly #onOpened: (opened: Opened, source: SculptSource) => Promise<void>;
+  readonly #onOpened: (opened: OpenedScene, source: SculptSource) => Promise<void>;
 
   constructor(
     client: SculptClient,
     ui: SculptParts,
     states: LabStates,
-    onOpened: (opened: Opened, source: SculptSource) => Promise<void>,
+    onOpened: (opened: OpenedScene, source: SculptSource) => Promise<void>,
   ) {
     super(client, ui, states);
     this.#client = client;
@@ -32,7 +33,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
 
   /** Opens a mesh passed on by another lab. */
   bytes(name: string, bytes: Uint8Array): Promise<void> {
-    return this.open({ name, opened: async () => ({ detail: { file: { name, bytes } } }) });
+    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }) });
   }
 
   protected find(id: string): SculptExample | undefined {
@@ -44,15 +45,15 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
   }
 
   protected fromExample(example: SculptExample): SculptSource {
-    return { name: example.name, opened: () => fromExample(example), example };
+    return { name: example.name, load: () => fromExample(example), example };
   }
 
   protected fromFiles(files: File[]): SculptSource {
-    return { name: files.map((file) => file.name).join(' + '), opened: () => fromFiles(files) };
+    return { name: files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
-  protected load({ name, example, linked }: SculptSource, meshes: SceneSource): Promise<Opened> {
-    if (meshes.detail && !meshes.base) this.states.load(`Making the base of ${name}: its smooth form, without detail.`);
+  protected load({ name, example, linked }: SculptSource, meshes: SceneSource): Promise<OpenedScene> {
+    if (meshes.detail && !meshes.base) this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
     const [variant] = isSculptPreset(example) ? example.variants : [];
     const usual = linked?.keys ? undefined : (variant?.pose ?? example?.pose);
@@ -60,7 +61,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     return this.#client.request('open', { source: meshes, setup });
   }
 
-  protected adopt(opened: Opened, source: SculptSource): Promise<void> {
+  protected adopt(opened: OpenedScene, source: SculptSource): Promise<void> {
     return this.#onOpened(opened, source);
   }
 }

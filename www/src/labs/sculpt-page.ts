@@ -1,4 +1,5 @@
 import type { SculptExample } from '../sculpt/examples';
+import { plural, text } from '../texts';
 import { h, section, uniqueId } from '../ui/dom';
 import { count, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
@@ -45,30 +46,30 @@ export function layOut(root: HTMLElement, parts: Parts): void {
     h(
       'div',
       { class: 'column setup' },
-      section('Scene', parts.data, parts.figure),
-      section('Ellipsoids', parts.ellipsoids),
-      section('Film', parts.film),
-      folded('Parameters', parts.params),
+      section(text('sculpt.sectionScene'), parts.data, parts.figure),
+      section(text('sculpt.sectionEllipsoids'), parts.ellipsoids),
+      section(text('sculpt.sectionFilm'), parts.film),
+      folded(text('labs.parameters'), parts.params),
     ),
     h(
       'div',
       { class: 'column results' },
-      section('Surface', parts.measures),
-      section('Save', parts.exports, parts.link),
-      section('Plots', parts.plots, parts.csv),
-      folded('Exercise', parts.exercises),
+      section(text('labs.sectionSurface'), parts.measures),
+      section(text('labs.sectionSave'), parts.exports, parts.link),
+      section(text('labs.sectionPlots'), parts.plots, parts.csv),
+      folded(text('labs.sectionExercise'), parts.exercises),
     ),
   );
 }
 
 /** Names of the facts about a scene; they are shown before one is open, so that the layout does not shift. */
-const FACTS = ['File', 'Detail', 'Bands', 'Made in'];
+const FACTS = [text('labs.factFile'), text('sculpt.factDetail'), text('sculpt.factBands'), text('sculpt.factDuration')];
 
 /** Panel that shows the open scene and opens others. */
 export class ScenePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
-  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #own = h('option', { value: '', hidden: true }, text('labs.yourFile'));
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
@@ -82,7 +83,10 @@ export class ScenePanel {
     const id = uniqueId('example');
     const group = (label: string, list: SculptExample[]) =>
       h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
-    const groups = [group('Scenes', examples), ...(figures.length > 0 ? [group('Figures of the paper', figures)] : [])];
+    const groups = [
+      group(text('sculpt.groupScenes'), examples),
+      ...(figures.length > 0 ? [group(text('labs.groupFigures'), figures)] : []),
+    ];
     this.#examples = h('select', { id }, this.#own, ...groups);
     this.#examples.addEventListener('change', () => {
       const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
@@ -92,13 +96,9 @@ export class ScenePanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, text('labs.example')), this.#examples),
       h('div', { class: 'row' }, chooser),
-      h(
-        'p',
-        { class: 'help' },
-        'Or drop a closed mesh anywhere on the page: GLB, OBJ, PLY or STL; two at once are a detailed one and its base. It stays on this machine.',
-      ),
+      h('p', { class: 'help' }, text('sculpt.dropHelp')),
       this.#facts,
       this.#credit,
     );
@@ -115,7 +115,7 @@ export class ScenePanel {
     example: SculptExample | undefined,
   ): void {
     this.choose(example);
-    const detail = facts?.detail === undefined ? 'none' : `${count(facts.detail)} triangles`;
+    const detail = facts?.detail === undefined ? text('labs.none') : plural('counts.triangle', facts.detail);
     const known = facts && [facts.name, detail, count(facts.bands), milliseconds(facts.made)];
     const rows = FACTS.map((name, i) => h('div', {}, h('dt', {}, name), h('dd', {}, known?.[i] ?? '–')));
     this.#facts.replaceChildren(...rows);

@@ -2,8 +2,9 @@ import type { Texture } from 'three';
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { posesOf, SCULPT_PRESETS, type SculptPreset, type SculptVariant } from '../sculpt/presets';
-import type { MeshTexture, Opened, ParamSpec, ParamValues } from '../sculpt/protocol';
+import type { MeshTexture, OpenedScene, ParamSpec, ParamValues } from '../sculpt/protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { h } from '../ui/dom';
 import { EllipsoidControls, type EllipsoidEvents } from '../ui/ellipsoids';
 import { exercises, SCULPT_EXERCISES } from '../ui/exercises';
@@ -20,10 +21,10 @@ import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
-import { Answers } from './answers';
+import { DragLatency } from './drag-latency';
 import { ACCEPT } from './mesh-files';
 import { Saving } from './saving';
-import { Ahead } from './sculpt-ahead';
+import { SurfaceCarrier } from './sculpt-carrier';
 import { SCULPT_PLOTS, SCULPT_ROWS } from './sculpt-measures';
 import { layOut, ScenePanel } from './sculpt-page';
 
@@ -50,15 +51,14 @@ export class SculptParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label':
-      '3D view of the surface and its ellipsoids. Number keys choose an ellipsoid; arrow keys and Page Up and Down then move, turn or size it, by the keys m, t and e; Escape lets it go. Without one, arrow keys turn the view, plus and minus zoom.',
+    'aria-label': text('sculpt.viewLabel'),
   });
   readonly view = new SculptureView(this.#canvas, INITIAL_VIEW);
-  readonly ahead = new Ahead(this.view);
-  readonly answer = new Answers();
+  readonly carrier = new SurfaceCarrier(this.view);
+  readonly latency = new DragLatency();
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(SCULPT_ROWS);
-  readonly coarse = h('p', { class: 'coarse', hidden: true }, 'Coarse preview: it gets fine when the hand rests');
+  readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
   readonly banner: ErrorBanner;
   readonly data: ScenePanel;
   readonly options: SculptOptionControls;
@@ -95,7 +95,7 @@ export class SculptParts {
       (text) => this.status.say(text),
     );
     this.#exports = new ExportButtons((format, type) => {
-      this.saving.mesh(format, type).catch((error) => events.onError('The surface could not be saved.', error));
+      this.saving.mesh(format, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
     this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -105,18 +105,18 @@ export class SculptParts {
     this.#cancel = h(
       'button',
       { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      'Cancel',
+      text('labs.cancel'),
     );
     this.csv = h(
       'button',
       { type: 'button', onclick: () => this.saving.plots(history, 'unrest'), disabled: true },
-      'Plot data (CSV)',
+      text('labs.plotData'),
     );
     this.#layOut(signal);
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a mesh to open it');
+    const drop = h('div', { class: 'drop', hidden: true }, text('sculpt.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -128,7 +128,7 @@ export class SculptParts {
       cancel: this.#cancel,
       options: this.options.element,
       legend: this.view.legend.element,
-      coarse: this.coarse,
+      coarse: this.previewNote,
       captions: this.#captions,
       banner: this.banner.element,
       status: this.status.element,
@@ -136,7 +136,7 @@ export class SculptParts {
       drop,
       measures: this.measures.element,
       exports: this.#exports.element,
-      link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
+      link: button(text('labs.copyLink'), this.#events.onCopyLink, 'link'),
       plots: this.plots.element,
       csv: this.csv,
       exercises: exercises(SCULPT_EXERCISES, this.#events.onExampleId),
@@ -151,7 +151,7 @@ export class SculptParts {
 
   /** Shows a newly opened scene. */
   adopt(
-    { box, start, pose, detail, bands, made, texture }: Opened,
+    { box, start, pose, detail, bands, buildMs, texture }: OpenedScene,
     example: SculptExample | undefined,
     name: string,
   ): void {
@@ -159,7 +159,7 @@ export class SculptParts {
     this.measures.unit = '';
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
-    this.data.show({ name, detail, bands, made }, example);
+    this.data.show({ name, detail, bands, made: buildMs }, example);
   }
 
   /** Decodes and shows a texture. If that fails, the surface stays without one. */
@@ -177,7 +177,7 @@ export class SculptParts {
         this.#texture = picture;
         this.view.texture = picture;
       },
-      (error) => this.#events.onError('The texture could not be shown.', error),
+      (error) => this.#events.onError(text('sculpt.textureFailed'), error),
     );
   }
 
@@ -192,7 +192,7 @@ export class SculptParts {
 
   refuseParam(name: string, message: string, inForce: ParamValues): void {
     this.#params?.show(inForce);
-    this.#params?.complain(name, message);
+    this.#params?.showError(name, message);
   }
 
   /** With `canPlay`, a converged model can be played, since there is a film. */

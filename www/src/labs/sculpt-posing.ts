@@ -1,39 +1,47 @@
 import { moved, scaled, turned } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from '../sculpt/protocol';
+import { text } from '../texts';
 import { figure } from '../ui/format';
 import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
-import type { ModelSettings } from './sculpt-settings';
+import type { SculptSettings } from './sculpt-settings';
 
 /** Effect of one key press: displacement as a share of the scene's size, rotation in radians, and scale factor. */
-const MOVE = 0.02;
-const TURN = 0.1;
-const GROW = 1.06;
+const MOVE_STEP = 0.02;
+const ROTATION_STEP = 0.1;
+const SCALE_STEP = 1.06;
 /** Share of these effects with Shift. */
-const FINE = 0.2;
+const FINE_FACTOR = 0.2;
 
 /** Radius of a new ellipsoid, as a share of the scene's size. */
-const NEW = 0.12;
+const NEW_RADIUS = 0.12;
 
 /** Milliseconds after the last key press until the change counts as ended. */
-const REST = 350;
+const IDLE_MS = 350;
 
 const MODE_KEYS: Record<string, HandleMode> = { m: 'move', t: 'turn', e: 'size' };
-const DONE: Record<HandleMode, string> = { move: 'moved', turn: 'turned', size: 'sized' };
+const DONE: Record<HandleMode, string> = {
+  move: text('sculpt.moved'),
+  turn: text('sculpt.rotated'),
+  size: text('sculpt.scaled'),
+};
+
+/** Messages on what handles and arrow keys do. */
+const MODE_TEXTS = { move: 'sculpt.handlesMove', turn: 'sculpt.handlesRotate', size: 'sculpt.handlesScale' } as const;
 
 /** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
 export class Posing {
   readonly #ui: SculptParts;
-  readonly #settings: ModelSettings;
+  readonly #settings: SculptSettings;
   #mode: HandleMode = 'move';
   /** Timer that ends a series of key presses. */
   #resting = 0;
 
-  constructor(ui: SculptParts, settings: ModelSettings) {
+  constructor(ui: SculptParts, settings: SculptSettings) {
     this.#ui = ui;
     this.#settings = settings;
     ui.view.onPick = (index) => settings.choose(index);
-    ui.view.handles.onGrab = () => this.#remember(DONE[this.#mode], false);
+    ui.view.handles.onDragStart = () => this.#checkpoint(DONE[this.#mode], false);
     ui.view.handles.onDrag = (ellipsoid, dragging) => this.#drag(ellipsoid, dragging);
     ui.view.takesKey = (event, directions) => this.#key(event, directions);
   }
@@ -42,20 +50,20 @@ export class Posing {
     this.#mode = mode;
     this.#ui.ellipsoids.mode = mode;
     this.#ui.view.mode = mode;
-    this.#ui.status.say(`Handles and arrow keys ${mode === 'size' ? 'change the size' : mode}.`);
+    this.#ui.status.say(text(MODE_TEXTS[mode]));
   }
 
   /** Replaces the selected ellipsoid by one entered as numbers. */
   change(ellipsoid: ControlEllipsoid, what: string): void {
-    this.#remember(what, true);
+    this.#checkpoint(what, true);
     this.#send(ellipsoid, false);
-    this.#tell(what);
+    this.#announce(what);
   }
 
   /** Adds an ellipsoid beside the selected one, or else in the middle of the scene; the model lets it grow. */
   add(): void {
     const { pose, chosen, names } = this.#settings;
-    const size = NEW * this.#ui.view.size;
+    const size = NEW_RADIUS * this.#ui.view.size;
     const near = chosen === undefined ? undefined : pose[chosen];
     const center: Vec3 = near ? moved(near, [size, size, 0]).center : this.#ui.view.middle;
     const [x, y, z]: [Vec3, Vec3, Vec3] = [
@@ -63,7 +71,7 @@ export class Posing {
       [0, size, 0],
       [0, 0, size],
     ];
-    this.#settings.remember('new ellipsoid');
+    this.#settings.checkpoint(text('sculpt.newEllipsoidChange'));
     this.#settings.send([...pose, { center, axes: [x, y, z] }], false, [...names, '']);
     this.#settings.choose(pose.length);
   }
@@ -74,10 +82,10 @@ export class Posing {
     if (chosen === undefined || pose.length < 2) return;
     const name = this.#settings.nameOf(chosen);
     const others = <T>(list: T[]) => list.filter((_, index) => index !== chosen);
-    this.#settings.remember('removed ellipsoid');
+    this.#settings.checkpoint(text('sculpt.removedEllipsoidChange'));
     this.#settings.send(others(pose), false, others(names));
     this.#settings.choose(undefined);
-    this.#ui.status.say(`${name} is removed.`);
+    this.#ui.status.say(text('sculpt.ellipsoidRemoved', { name }));
     this.#ui.ellipsoids.focus();
   }
 
@@ -88,7 +96,7 @@ export class Posing {
 
   #drag(ellipsoid: ControlEllipsoid, dragging: boolean): void {
     this.#send(ellipsoid, dragging);
-    if (!dragging) this.#tell(DONE[this.#mode]);
+    if (!dragging) this.#announce(DONE[this.#mode]);
   }
 
   #send(ellipsoid: ControlEllipsoid, dragging: boolean): void {
@@ -97,20 +105,20 @@ export class Posing {
     this.#settings.send(next, dragging);
   }
 
-  #remember(what: string, together: boolean): void {
+  #checkpoint(what: string, merge: boolean): void {
     const { chosen } = this.#settings;
     if (chosen === undefined) return;
-    const label = `${this.#settings.nameOf(chosen)} ${what}`;
-    this.#settings.remember(label, together ? label : '');
+    const label = text('sculpt.ellipsoidChange', { name: this.#settings.nameOf(chosen), what });
+    this.#settings.checkpoint(label, merge ? label : '');
   }
 
   /** Describes the ellipsoid's new position in the status line, once the change has ended. */
-  #tell(what: string): void {
+  #announce(what: string): void {
     const { pose, chosen } = this.#settings;
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
     if (chosen === undefined || !ellipsoid) return;
     const place = ellipsoid.center.map((x) => figure(Number(x.toPrecision(3)))).join(', ');
-    this.#ui.status.say(`${this.#settings.nameOf(chosen)}: ${what}; its centre is ${place}.`);
+    this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre: place }));
   }
 
   /** Handles a key in the view; returns whether it was for an ellipsoid. */
@@ -123,14 +131,14 @@ export class Posing {
     else if (chosen === undefined) return false;
     else if (key === 'Escape') this.#settings.choose(undefined);
     else if (key === 'Delete') this.remove();
-    else return this.#nudge(key, shiftKey ? FINE : 1, directions);
+    else return this.#nudge(key, shiftKey ? FINE_FACTOR : 1, directions);
     return true;
   }
 
   /** Ends a series of key presses, so that the preview ends, too. */
   #rest(): void {
     this.#settings.send(this.#settings.pose, false);
-    this.#tell(DONE[this.#mode]);
+    this.#announce(DONE[this.#mode]);
   }
 
   #nudge(key: string, much: number, [right, up, near]: Vec3[]): boolean {
@@ -140,15 +148,15 @@ export class Posing {
     if (!step || !ellipsoid || !right || !up || !near) return false;
     const axis = [right, up, near][step.axis] ?? right;
     const change = {
-      move: () => moved(ellipsoid, scaledBy(axis, step.sign * much * MOVE * this.#ui.view.size)),
+      move: () => moved(ellipsoid, scaledBy(axis, step.sign * much * MOVE_STEP * this.#ui.view.size)),
       turn: () =>
-        turned(ellipsoid, [up, right, near][step.axis] ?? up, TURN * much * TURN_SIGNS[step.axis] * step.sign),
+        turned(ellipsoid, [up, right, near][step.axis] ?? up, ROTATION_STEP * much * TURN_SIGNS[step.axis] * step.sign),
       size: () => sized(ellipsoid, step, much),
     };
-    this.#remember(DONE[this.#mode], true);
+    this.#checkpoint(DONE[this.#mode], true);
     this.#send(change[this.#mode](), true);
     clearTimeout(this.#resting);
-    this.#resting = window.setTimeout(() => this.#rest(), REST);
+    this.#resting = window.setTimeout(() => this.#rest(), IDLE_MS);
     return true;
   }
 }
@@ -176,7 +184,7 @@ const TURN_SIGNS = [1, -1, 1] as const;
  * third.
  */
 function sized(ellipsoid: ControlEllipsoid, { axis, sign }: Step, much: number): ControlEllipsoid {
-  const factor = GROW ** (sign * much);
+  const factor = SCALE_STEP ** (sign * much);
   const factors: Vec3 = axis === 1 ? [factor, factor, factor] : [axis === 0 ? factor : 1, 1, axis === 2 ? factor : 1];
   return scaled(ellipsoid, factors);
 }

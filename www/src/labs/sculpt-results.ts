@@ -1,7 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import type { FrameEvent, MeasuredEvent, StageKind } from '../sculpt/protocol';
 import type { LabState } from '../state';
-import { count, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count } from '../ui/format';
 import { type History, underWay } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
@@ -10,7 +11,7 @@ import type { SculptParts } from './sculpt-parts';
 const SHOW_EVERY = 250;
 
 /** Displays the worker's results: frames, measures and plots. */
-export class Results {
+export class SculptResults {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
@@ -49,8 +50,8 @@ export class Results {
     this.#measured = undefined;
     this.#originals = false;
     this.#more = {};
-    this.#ui.ahead.clear();
-    this.#ui.answer.clear();
+    this.#ui.carrier.clear();
+    this.#ui.latency.clear();
     this.#ui.measures.clear();
     this.startOver();
   }
@@ -73,7 +74,7 @@ export class Results {
       if (this.#frame) this.#show(this.#frame);
       this.#frame = undefined;
       this.#showMeasured();
-      this.#client.shown();
+      this.#client.acknowledge();
     });
   }
 
@@ -89,11 +90,11 @@ export class Results {
     this.#measured = undefined;
     Object.assign(this.#more, facts);
     this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showMore(this.#more);
+    this.#ui.measures.showExtra(this.#more);
   }
 
   showState(state: LabState): void {
-    if (state === 'paused' || state === 'done') this.#ui.ahead.rest();
+    if (state === 'paused' || state === 'done') this.#ui.carrier.stop();
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
   }
@@ -101,11 +102,16 @@ export class Results {
   /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
-    if (state === 'running') return 'Running.';
-    if (!last) return 'Ready.';
+    if (state === 'running') return text('labs.running');
+    if (!last) return text('labs.ready');
     const { vertices, components } = last;
-    const what = `${count(vertices)} vertices in ${plural(components, 'component')}`;
-    return state === 'done' ? `At rest: ${what}.` : `Paused at iteration ${count(last.iteration)}: ${what}.`;
+    const what = text('labs.surfaceSize', {
+      vertices: plural('counts.vertex', vertices),
+      components: plural('counts.component', components),
+    });
+    return state === 'done'
+      ? text('sculpt.converged', { surface: what })
+      : text('sculpt.pausedAt', { iteration: count(last.iteration), surface: what });
   }
 
   /** Requests and displays the undeformed meshes, if the layout includes them. */
@@ -119,7 +125,7 @@ export class Results {
         this.#ui.view.show('S0', base);
         this.#ui.view.show('S1', detail ?? base);
       },
-      (error) => this.#states.fail('The undeformed meshes could not be shown.', error),
+      (error) => this.#states.fail(text('sculpt.originalsFailed'), error),
     );
   }
 
@@ -130,33 +136,33 @@ export class Results {
       (stages) => {
         if (scene === this.#scene) this.#ui.view.showStages(stages);
       },
-      (error) => this.#states.fail('The meshes could not be made.', error),
+      (error) => this.#states.fail(text('sculpt.stagesFailed'), error),
     );
   }
 
   #show(frame: FrameEvent): void {
-    const { view, ahead, measures, coarse } = this.#ui;
+    const { view, carrier, measures, previewNote } = this.#ui;
     view.show('S1dash', frame.result);
     view.show('S0dash', frame.base);
-    ahead.shown(frame);
+    carrier.frameShown(frame);
     view.show('T', frame.link);
     if (frame.levels) view.showStages(frame.levels);
-    coarse.hidden = !frame.coarse;
+    previewNote.hidden = !frame.preview;
     this.#follow(frame);
-    this.#tellAnswer(frame.turn);
-    this.#more.frameMs = frame.took;
+    this.#showLatency(frame.poseId);
+    this.#more.frameMs = frame.durationMs;
     const last = frame.reports.at(-1);
     if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
-    measures.showMore(this.#more);
+    measures.showExtra(this.#more);
     if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
   }
 
-  #tellAnswer(turn: number): void {
-    const { answer } = this.#ui;
-    if (!answer.drawn(turn, performance.now()) || !answer.last) return;
-    if (answer.alongMs !== undefined) this.#more.alongMs = Math.round(answer.alongMs);
-    this.#more.answerMs = Math.round(answer.last.milliseconds);
-    this.#more.answerFrames = answer.last.frames;
+  #showLatency(poseId: number): void {
+    const { latency } = this.#ui;
+    if (!latency.frameDrawn(poseId, performance.now()) || !latency.last) return;
+    if (latency.displayMs !== undefined) this.#more.alongMs = Math.round(latency.displayMs);
+    this.#more.answerMs = Math.round(latency.last.milliseconds);
+    this.#more.answerFrames = latency.last.frames;
   }
 
   #showHistory(): void {

@@ -3,10 +3,11 @@ import type { SculptClient } from '../sculpt/client';
 import { samePose } from '../sculpt/ellipsoids';
 import type { Film } from '../sculpt/film';
 import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
-import { Rewinder } from './rewinder';
 import type { SculptParts } from './sculpt-parts';
+import { UndoHistory } from './undo-history';
 
 /** State of the page besides the model, which undo restores. */
 interface PageState {
@@ -27,13 +28,13 @@ export interface Adopted {
 }
 
 /** Ellipsoids, film and parameters: changes them, sends them to the worker, and undoes changes. */
-export class ModelSettings {
+export class SculptSettings {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
   readonly #history: History;
   readonly #onChange: () => void;
-  readonly #rewinder: Rewinder<PageState, SavedPose>;
+  readonly #undo: UndoHistory<PageState, SavedPose>;
   #params: ParamValues = {};
   #pose: Pose = [];
   #names: string[] = [];
@@ -42,7 +43,7 @@ export class ModelSettings {
   #film: Film | undefined;
   #frame = 0;
   /** Number of the last pose sent. */
-  #turn = 0;
+  #poseId = 0;
 
   /** `onChange` is called whenever the settings in force may have changed. */
   constructor(client: SculptClient, ui: SculptParts, states: LabStates, history: History, onChange: () => void) {
@@ -51,7 +52,7 @@ export class ModelSettings {
     this.#states = states;
     this.#history = history;
     this.#onChange = onChange;
-    this.#rewinder = new Rewinder<PageState, SavedPose>(
+    this.#undo = new UndoHistory<PageState, SavedPose>(
       client,
       () => ({ names: this.#names, posed: this.#posed, film: this.#film, mark: history.marker() }),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
@@ -86,12 +87,14 @@ export class ModelSettings {
   /** Returns the number and name of an ellipsoid, for messages. */
   nameOf(index: number): string {
     const name = this.#names[index];
-    return name ? `Ellipsoid ${index + 1}, ${name}` : `Ellipsoid ${index + 1}`;
+    return name
+      ? text('sculpt.ellipsoidNamed', { number: index + 1, name })
+      : text('sculpt.ellipsoid', { number: index + 1 });
   }
 
   /** Adopts another scene, and clears the undo history. */
   adopt({ pose, names, posed, film, params }: Adopted): void {
-    this.#rewinder.clear();
+    this.#undo.clear();
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = posed;
@@ -106,17 +109,19 @@ export class ModelSettings {
   choose(index: number | undefined): void {
     const chosen = index !== undefined && index < this.#pose.length ? index : undefined;
     if (chosen !== this.#chosen)
-      this.#ui.status.say(chosen === undefined ? 'No ellipsoid is chosen.' : `${this.nameOf(chosen)} is chosen.`);
+      this.#ui.status.say(
+        chosen === undefined ? text('sculpt.noneSelected') : text('sculpt.selected', { name: this.nameOf(chosen) }),
+      );
     this.#chosen = chosen;
     this.#showPose();
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `together` in short succession count as
+   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
    * one. Returns a function that forgets it.
    */
-  remember(label: string, together = ''): () => void {
-    return this.#rewinder.remember(label, together);
+  checkpoint(label: string, mergeKey = ''): () => void {
+    return this.#undo.checkpoint(label, mergeKey);
   }
 
   /** Sends the worker a target pose; `names` if the ellipsoids themselves have changed. */
@@ -126,21 +131,21 @@ export class ModelSettings {
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = true;
-    this.#turn = this.#client.pose(pose, dragging);
-    this.#answer(dragging);
+    this.#poseId = this.#client.pose(pose, dragging);
+    this.#measureLatency(dragging);
     if (this.#chosen !== undefined && this.#chosen >= pose.length) this.#chosen = undefined;
     this.#showPose();
     if (!dragging) this.#onChange();
   }
 
   /** During a drag, carries the displayed surface along at once; the model follows. Records both latencies. */
-  #answer(dragging: boolean): void {
-    const { ahead, answer } = this.#ui;
+  #measureLatency(dragging: boolean): void {
+    const { carrier, latency } = this.#ui;
     const at = performance.now();
-    answer.sent(this.#turn, at);
+    latency.poseSent(this.#poseId, at);
     // After the drawing, which has requested the same animation frame.
-    if (dragging && ahead.follow(this.#pose, this.#turn))
-      requestAnimationFrame(() => answer.along(performance.now() - at));
+    if (dragging && carrier.dragTo(this.#pose, this.#poseId))
+      requestAnimationFrame(() => latency.carried(performance.now() - at));
   }
 
   get names(): string[] {
@@ -156,8 +161,8 @@ export class ModelSettings {
   }
 
   /** Takes the film's frame and the target pose from a frame of the model, unless a newer pose was sent. */
-  follow({ turn, frame, pose }: FrameEvent, playing: boolean): void {
-    if (turn < this.#turn) return;
+  follow({ poseId, frame, pose }: FrameEvent, playing: boolean): void {
+    if (poseId < this.#poseId) return;
     if (playing && frame !== this.#frame) this.#posed = false;
     this.#frame = frame;
     if (!samePose(pose, this.#pose)) {
@@ -169,25 +174,25 @@ export class ModelSettings {
   }
 
   /** Returns to the previous target after the worker has rejected a pose. */
-  refuse(pose: Pose, why: string): void {
+  reject(pose: Pose, why: string): void {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
     this.#showPose();
-    this.#ui.ellipsoids.complain(why);
+    this.#ui.ellipsoids.showError(why);
   }
 
   /** Sets parameters of the live model; a run continues, and a converged model is resumed. */
   setParams(values: ParamValues, what: string): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return this.show();
-      const forget = this.remember(`change of ${what}`, what);
+      const forget = this.checkpoint(text('labs.changeOf', { name: what }), what);
       try {
         this.#params = await this.#client.request('setParams', values);
-        if (this.#states.beneath === 'done') await this.#client.request('settle', undefined);
+        if (this.#states.modelState === 'done') await this.#client.request('settle', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.show();
         this.#ui.refuseParam(Object.keys(values)[0] ?? '', message, this.#params);
         return;
@@ -197,22 +202,22 @@ export class ModelSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       try {
-        const moment = await this.#rewinder.travel(way);
+        const moment = await this.#undo.step(way);
         if (moment) await this.#goTo(moment.saved, moment.page);
       } catch (error) {
-        this.#states.fail(way === 'undo' ? 'That could not be undone.' : 'That could not be done again.', error);
+        this.#states.fail(way === 'undo' ? text('labs.undoFailed') : text('labs.redoFailed'), error);
       }
     });
   }
 
   /** Builds a new model of the same meshes with the parameters in force, before its first step. */
   rebuild(start: Pose | undefined): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
-      this.#rewinder.clear();
+      this.#undo.clear();
       this.#pose = ready.pose;
       this.#names = named(this.#names, ready.pose.length);
       this.#params = ready.params;

@@ -3,25 +3,37 @@ import { GUIDES } from '../guides';
 import { SculptClient } from '../sculpt/client';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
-import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
+import type {
+  FrameContents,
+  FrameEvent,
+  OpenedScene,
+  ParamValues,
+  SculptQuantity,
+  WorkerEvent,
+} from '../sculpt/protocol';
 import type { LabState } from '../state';
-import { wantsStillness } from '../ui/dom';
+import { plural, text } from '../texts';
+import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn } from './labs';
+import type { Handoff, Lab } from './labs';
 import { Filming } from './sculpt-filming';
 import { filmOf, linkOf, toHash } from './sculpt-link';
 import { SculptOpening, type SculptSource } from './sculpt-opening';
 import { type PartEvents, SculptParts } from './sculpt-parts';
 import { Posing } from './sculpt-posing';
-import { Results } from './sculpt-results';
-import { ModelSettings } from './sculpt-settings';
+import { SculptResults } from './sculpt-results';
+import { SculptSettings } from './sculpt-settings';
 
 /** The colourings that the worker has to compute. */
-const SHADES: readonly string[] = ['area distortion', 'angle distortion', 'mean curvature'] satisfies SculptShade[];
+const QUANTITIES: readonly string[] = [
+  'area distortion',
+  'angle distortion',
+  'mean curvature',
+] satisfies SculptQuantity[];
 
 /**
  * The Sculpt lab: a detailed surface is deformed by ellipsoids. This class connects the lab's parts; opening, settings,
@@ -33,14 +45,14 @@ export class SculptLab implements Lab {
   readonly #client = new SculptClient((event) => this.#onEvent(event));
   readonly #ui: SculptParts;
   readonly #states: LabStates;
-  readonly #results: Results;
-  readonly #settings: ModelSettings;
+  readonly #results: SculptResults;
+  readonly #settings: SculptSettings;
   readonly #posing: Posing;
   readonly #filming: Filming;
   readonly #opening: SculptOpening;
   /** Parameters that the scene opened with, including the model's own choices, but without changes by a link. */
   #usual: ParamValues = {};
-  #shown: Shown = { layout: 'result', shade: undefined, textured: false };
+  #shown: FrameContents = { layout: 'result', quantity: undefined, textured: false };
 
   constructor(root: HTMLElement, help: HTMLElement) {
     this.#root = root;
@@ -51,17 +63,17 @@ export class SculptLab implements Lab {
     const states = new LabStates(ui.banner, ui.status, signal);
     this.#ui = ui;
     this.#states = states;
-    this.#results = new Results(client, ui, states, history, (frame) => this.#follow(frame));
-    this.#settings = new ModelSettings(client, ui, states, history, () => this.#showSettings());
+    this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
+    this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
     this.#posing = new Posing(ui, this.#settings);
     this.#filming = new Filming(client, ui, states, this.#settings);
     this.#opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
   }
 
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
-  async start(passedOn?: PassedOn): Promise<void> {
+  async start(passedOn?: Handoff): Promise<void> {
     const open = passedOn && (() => this.#opening.bytes(passedOn.name, passedOn.bytes));
     await this.#opening.start(this.#closing.signal, () => this.#updateAddress(), open);
   }
@@ -113,25 +125,31 @@ export class SculptLab implements Lab {
   #shortcuts(): Shortcut[] {
     const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'k', shown: 'k', text: 'add a keyframe', act: () => this.#filming.addKey() },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: () => this.#filming.addKey() },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
       {
         key: 'Escape',
-        shown: 'Esc',
-        text: 'away with the message, or let the ellipsoid go',
-        act: () => this.#putAway(),
+        shown: text('labs.keyEscape'),
+        text: text('sculpt.dismissKey'),
+        act: () => this.#escape(),
       },
     ];
   }
 
   /** Displays an opened scene, with the settings of its example or link, and plays it. */
-  async #adopt(opened: Opened, { name, example, linked }: SculptSource): Promise<void> {
+  async #adopt(opened: OpenedScene, { name, example, linked }: SculptSource): Promise<void> {
     this.#states.ready = true;
     this.#usual = { ...opened.params };
     for (const [name, value] of Object.entries(linked?.params ?? {}))
@@ -156,20 +174,20 @@ export class SculptLab implements Lab {
     if (preset?.stages) this.#results.showStages(preset.stages);
     await this.#settings.setFilm(film, 0);
     await this.#client.request('show', this.#shown);
-    const endless = film?.loop === true && wantsStillness();
+    const endless = film?.loop === true && prefersReducedMotion();
     await this.#client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
     const values = { ...this.#usual, ...params };
     const differs = Object.entries(values).some(([key, value]) => !Object.is(this.#settings.params[key], value));
-    if (differs) void this.#settings.setParams(values, `figure ${name}`);
-    this.#settings.remember(`figure ${name}`);
+    if (differs) void this.#settings.setParams(values, text('labs.figureChange', { name }));
+    this.#settings.checkpoint(text('labs.figureChange', { name }));
     this.#settings.send(pose ?? preset.start ?? this.#settings.pose, false);
   }
 
   #follow(frame: FrameEvent): void {
-    this.#settings.follow(frame, this.#states.beneath === 'running');
+    this.#settings.follow(frame, this.#states.modelState === 'running');
   }
 
   #showSettings(): void {
@@ -177,7 +195,7 @@ export class SculptLab implements Lab {
     const example = this.#opening.source?.example;
     const preset = isSculptPreset(example) ? example : undefined;
     this.#ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
-    this.#ui.showState(this.#states.beneath, this.#states.ready, this.#canPlay);
+    this.#ui.showState(this.#states.modelState, this.#states.ready, this.#canPlay);
     this.#updateAddress();
   }
 
@@ -187,11 +205,11 @@ export class SculptLab implements Lab {
   }
 
   #setOptions({ layout, color }: SculptViewOptions): void {
-    const shade = SHADES.includes(color) ? (color as SculptShade) : undefined;
+    const quantity = QUANTITIES.includes(color) ? (color as SculptQuantity) : undefined;
     const textured = color === 'texture';
     const before = this.#shown;
-    const changed = layout !== before.layout || shade !== before.shade || textured !== before.textured;
-    this.#shown = { layout, shade, textured };
+    const changed = layout !== before.layout || quantity !== before.quantity || textured !== before.textured;
+    this.#shown = { layout, quantity, textured };
     if (!this.#states.ready) return;
     if (changed) this.#ask(this.#client.request('show', this.#shown));
     this.#results.showOriginals();
@@ -203,8 +221,8 @@ export class SculptLab implements Lab {
     if (!canChange) return;
     this.#ui.banner.hide();
     if (value === 'running') this.#ask(this.#client.request('pause', undefined));
-    else if (this.#canPlay || this.#states.beneath === 'paused') {
-      this.#settings.remember('Play');
+    else if (this.#canPlay || this.#states.modelState === 'paused') {
+      this.#settings.checkpoint(text('labs.play'));
       this.#ask(this.#client.request('play', undefined));
     }
   }
@@ -212,7 +230,7 @@ export class SculptLab implements Lab {
   #step(steps: number): void {
     if (!this.#states.canChange || this.#states.value === 'running') return;
     this.#ui.banner.hide();
-    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
+    this.#settings.checkpoint(plural('counts.step', steps));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
@@ -220,21 +238,21 @@ export class SculptLab implements Lab {
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    if (engineBroken) return this.#opening.reopen();
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild(undefined);
       this.#results.startOver();
       await this.#client.request('show', this.#shown);
-      this.#states.stand('Ready to start.');
+      this.#states.idle(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The model could not be built.', error);
+      this.#states.fail(text('labs.buildFailed'), error);
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   /** Updates the page's address with what is open and the settings. */
@@ -259,26 +277,26 @@ export class SculptLab implements Lab {
 
   async #copyLink(): Promise<void> {
     this.#updateAddress();
-    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'recorded') this.#ui.film.showRecording(event.part);
-    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    if (event.event === 'recorded') this.#ui.film.showRecording(event.progress);
+    else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);
-    else if (event.event === 'refused') this.#settings.refuse(event.pose, event.failure.message);
-    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+    else if (event.event === 'refused') this.#settings.reject(event.pose, event.failure.message);
+    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
+    const { modelState, ready } = this.#states;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, this.#canPlay);
+    this.#ui.showState(modelState, ready, this.#canPlay);
     if (state === 'done' || state === 'paused') this.#updateAddress();
   }
 
-  #putAway(): void {
+  #escape(): void {
     if (this.#ui.banner.shown) this.#dismiss();
     else this.#settings.choose(undefined);
   }

@@ -1,37 +1,41 @@
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
-import type { Enrichment, Setup, SurfaceError } from '../track/protocol';
-import { type ComparedRun, comparedRun, type Other } from '../ui/track-compare';
+import type { Alternative, Enrichment, Setup, SurfaceError } from '../track/protocol';
+import { comparedRun, type TrackingRun } from '../ui/track-compare';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
 /** Names of the enrichments in the comparison. */
 const NAMES: Record<Enrichment, string> = {
-  none: 'as measured',
-  linear: 'linear',
-  flow: 'by flow',
+  none: text('track.withoutEnrichment'),
+  linear: text('track.linear'),
+  flow: text('track.opticalFlow'),
 };
 
 /** Repeats the present run with one setting changed; returns both for the comparison, or undefined if cancelled. */
 export async function compareWith(
   client: TrackClient,
   { setup, params }: TrackSettings,
-  { results, took }: { results: TrackResults; took: number | undefined },
-  other: Other,
-): Promise<[ComparedRun, ComparedRun] | undefined> {
+  { results, duration }: { results: TrackResults; duration: number | undefined },
+  other: Alternative,
+): Promise<[TrackingRun, TrackingRun] | undefined> {
   const predicted = params.prediction === true;
   const [here, there] =
     other === 'prediction'
-      ? [predicted ? 'predicted' : 'not predicted', predicted ? 'not predicted' : 'predicted']
+      ? [
+          predicted ? text('track.withPrediction') : text('track.withoutPrediction'),
+          predicted ? text('track.withoutPrediction') : text('track.withPrediction'),
+        ]
       : [NAMES[setup.preparation.enrichment], NAMES[other]];
   const changed = otherwise(setup, other, predicted);
   const facts = results.frames.map((frame) => frame.facts);
   const errors = results.frames.flatMap(({ error }) => error ?? []);
-  const present: ComparedRun = { name: here, facts, closing: results.closing, error: meanOf(errors), took };
+  const present: TrackingRun = { name: here, facts, closing: results.closing, error: meanOf(errors), duration };
   const run = await client.request('compare', { setup: changed });
   return run && [present, comparedRun(there, run)];
 }
 
-function otherwise(setup: Setup, other: Other, predicted: boolean): Setup {
+function otherwise(setup: Setup, other: Alternative, predicted: boolean): Setup {
   if (other === 'prediction') return { ...setup, params: { ...setup.params, prediction: !predicted } };
   return { ...setup, preparation: { ...setup.preparation, enrichment: other } };
 }
@@ -39,5 +43,5 @@ function otherwise(setup: Setup, other: Other, predicted: boolean): Setup {
 function meanOf(errors: SurfaceError[]): SurfaceError | undefined {
   if (errors.length === 0) return undefined;
   const mean = (of: keyof SurfaceError) => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
-  return { mean: mean('mean'), most: mean('most') };
+  return { mean: mean('mean'), p95: mean('p95') };
 }

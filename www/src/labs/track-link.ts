@@ -1,9 +1,9 @@
 /** Converts the Track lab's settings to the hash of an address, `#track?…`, and back. */
 import type { ParamValues, Vec3 } from '../protocol';
-import { FILMS, OWN_PREPARATION, type TrackExample } from '../track/examples';
+import { IMAGES, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
 import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
-import type { TrackViewOptions } from '../view/beating';
+import type { TrackViewOptions } from '../view/track';
 import { differing, readValue } from './link';
 
 const ADDRESS = '#track';
@@ -21,7 +21,7 @@ export interface LinkedTrack {
 }
 
 /** Present settings of the lab, from which a link is made. */
-export interface TrackSettings {
+export interface LinkableTrack {
   example: TrackExample | undefined;
   file: string;
   setup: Setup;
@@ -43,12 +43,12 @@ export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack)
 }
 
 /** Returns the settings that differ from those of the example, or else from the defaults. */
-export function linkOf({ example, file, setup, view }: TrackSettings): LinkedTrack {
+export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTrack {
   const usual = setupOf(example);
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
   return {
     ...(!example && { file }),
-    ...(example && example !== FILMS[0] && { example: example.id }),
+    ...(example && example !== IMAGES[0] && { example: example.id }),
     params: differing(setup.params, usual.params),
     preparation: differing({ ...setup.preparation }, { ...usual.preparation }),
     ...(!same(setup.box, usual.box) && { box: setup.box ?? 'whole' }),

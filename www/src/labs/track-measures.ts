@@ -1,47 +1,48 @@
+import { text } from '../texts';
 import { beatOf } from '../track/curve';
 import type { TrackedFrame } from '../track/protocol';
 import { count, figure } from '../ui/format';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const round = (value: number) => figure(Number(value.toPrecision(3)));
 
 /** Measures of the tracking, shown besides those of the frame's surface. */
-export const TRACK_ROWS: MoreMeasure[] = [
+export const TRACK_ROWS: ExtraMeasure[] = [
   {
     name: 'ejection',
-    label: 'Ejection fraction',
-    help: 'Share of the largest volume that is driven out',
+    label: text('track.ejection'),
+    help: text('track.ejectionHelp'),
     text: percent,
   },
   {
     name: 'folded',
-    label: 'Folded',
-    help: 'Triangles of this frame that face away from their neighbours',
+    label: text('track.folded'),
+    help: text('track.foldedHelp'),
     text: count,
   },
   {
     name: 'closing',
-    label: 'Closes within',
-    help: 'Of a cyclic sequence: how far the last frame’s surface, taken on to the first, is from the first one’s in the mean',
+    label: text('track.closing'),
+    help: text('track.closingHelp'),
     optional: true,
     text: round,
   },
   {
     name: 'errorMean',
-    label: 'Error, mean',
-    help: 'Distance of the vertices from the true wall, where it is known',
+    label: text('track.errorMean'),
+    help: text('track.errorMeanHelp'),
     optional: true,
     text: round,
   },
   {
     name: 'errorMost',
-    label: 'Error, 95 %',
-    help: 'The same: 95 % of the vertices are nearer',
+    label: text('track.errorHigh'),
+    help: text('track.errorHighHelp'),
     optional: true,
     text: round,
   },
-  { name: 'noise', label: 'Noise σ', help: 'Measured in the box, intensity units', text: round },
+  { name: 'noise', label: text('track.noise'), help: text('track.noiseHelp'), text: round },
 ];
 
 /** The results so far that the measures are computed from. */
@@ -64,7 +65,7 @@ export function moreOf({ frames, count, frame, closing, noise }: Tracked): Recor
     frames: count,
     tracked: frames.length,
     ...(shown && { folded: shown.facts.folded }),
-    ...(shown?.error && { errorMean: shown.error.mean, errorMost: shown.error.most }),
+    ...(shown?.error && { errorMean: shown.error.mean, errorMost: shown.error.p95 }),
     ...(beat && { ejection: beat.ejection, largest: beat.largest, smallest: beat.smallest }),
     ...(closing !== undefined && { closing }),
   };
@@ -87,12 +88,12 @@ const COLUMNS = [
 /** Returns the data of all tracked frames as CSV, one line per frame, in world units. */
 export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
   const known = frames.some(({ error }) => error);
-  const head = ['frame', ...COLUMNS, 'crossings', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];
+  const head = ['frame', ...COLUMNS, 'self-intersections', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];
   const lines = frames.map(({ facts, measures, error }, i) => [
     i + 1,
     ...COLUMNS.map((name) => facts[name as keyof typeof facts]),
     measures.report?.selfIntersections ?? '',
-    ...(known ? [error?.mean ?? '', error?.most ?? '', truth?.[i] ?? ''] : []),
+    ...(known ? [error?.mean ?? '', error?.p95 ?? '', truth?.[i] ?? ''] : []),
   ]);
   return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
 }

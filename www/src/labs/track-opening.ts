@@ -1,8 +1,8 @@
 import { exampleUrl } from '../examples';
 import type { TrackClient } from '../track/client';
-import { FILMS, type TrackExample } from '../track/examples';
-import { filmById } from '../track/presets';
-import type { FilmSource, Opened as OpenedFilm, Setup } from '../track/protocol';
+import { IMAGES, type TrackExample } from '../track/examples';
+import { imageById } from '../track/presets';
+import type { ImageSource, OpenedImage as OpenedFilm, Setup } from '../track/protocol';
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
@@ -10,24 +10,24 @@ import { Opening, type Source } from './opening';
 import { fromHash, type LinkedTrack, setupOf } from './track-link';
 import type { TrackParts } from './track-parts';
 
-export type TrackSource = Source<TrackExample, LinkedTrack, FilmSource>;
+export type TrackSource = Source<TrackExample, LinkedTrack, ImageSource>;
 
 /** An opened image, and the setup of its tracker. */
-export interface Opened extends OpenedFilm {
+export interface OpenedTrack extends OpenedFilm {
   setup: Setup;
 }
 
 /** Opens 4D images in the Track lab, and builds trackers of them. */
-export class TrackOpening extends Opening<TrackExample, LinkedTrack, FilmSource, Opened> {
-  protected readonly first = FILMS[0];
+export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource, OpenedTrack> {
+  protected readonly first = IMAGES[0];
   readonly #client: TrackClient;
-  readonly #onOpened: (opened: Opened, source: TrackSource) => Promise<void>;
+  readonly #onOpened: (opened: OpenedTrack, source: TrackSource) => Promise<void>;
 
   constructor(
     client: TrackClient,
     ui: TrackParts,
     states: LabStates,
-    onOpened: (opened: Opened, source: TrackSource) => Promise<void>,
+    onOpened: (opened: OpenedTrack, source: TrackSource) => Promise<void>,
   ) {
     super(client, ui, states);
     this.#client = client;
@@ -35,7 +35,7 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, FilmSource,
   }
 
   protected find(id: string): TrackExample | undefined {
-    return filmById(id);
+    return imageById(id);
   }
 
   protected linkedBy(hash: string): LinkedTrack | undefined {
@@ -43,24 +43,24 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, FilmSource,
   }
 
   protected fromExample(example: TrackExample): TrackSource {
-    return { name: example.name, opened: () => imageOf(example), example };
+    return { name: example.name, load: () => imageOf(example), example };
   }
 
   protected fromFiles(files: File[]): TrackSource {
-    return { name: nameOf(files), opened: async () => ({ files: await readFiles(files) }) };
+    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load({ name, example, linked }: TrackSource, source: FilmSource): Promise<Opened> {
+  protected async load({ name, example, linked }: TrackSource, source: ImageSource): Promise<OpenedTrack> {
     const setup = setupOf(example, linked);
     return { ...(await this.#client.request('open', { name, source, setup })), setup };
   }
 
-  protected adopt(opened: Opened, source: TrackSource): Promise<void> {
+  protected adopt(opened: OpenedTrack, source: TrackSource): Promise<void> {
     return this.#onOpened(opened, source);
   }
 }
 
-async function imageOf({ source }: TrackExample): Promise<FilmSource> {
+async function imageOf({ source }: TrackExample): Promise<ImageSource> {
   if ('cine' in source) return source;
   return { files: [{ name: source.file, bytes: await fetchBytes(exampleUrl(source.file)) }] };
 }

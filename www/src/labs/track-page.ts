@@ -1,5 +1,6 @@
+import { text } from '../texts';
 import type { TrackExample } from '../track/examples';
-import type { Opened } from '../track/protocol';
+import type { OpenedImage } from '../track/protocol';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
@@ -59,33 +60,40 @@ export function layOut(root: HTMLElement, parts: Parts): void {
     h(
       'div',
       { class: 'column setup' },
-      section('Image', parts.data, parts.figure),
-      section('Boundary', parts.threshold),
-      section('Box and surface', parts.region),
-      folded('Preparation', parts.preparation),
-      folded('Parameters', parts.params),
+      section(text('track.sectionImage'), parts.data, parts.figure),
+      section(text('track.sectionBoundary'), parts.threshold),
+      section(text('track.sectionRegion'), parts.region),
+      folded(text('track.sectionPreparation'), parts.preparation),
+      folded(text('labs.parameters'), parts.params),
     ),
     h(
       'div',
       { class: 'column results' },
-      section('Beat', parts.curve, parts.warnings),
-      section('Surface of this frame', parts.measures),
-      section('Save', parts.exports, parts.saves, parts.link),
-      folded('Frames', parts.table),
-      folded('With and without', parts.compare),
-      folded('Exercise', parts.exercises),
+      section(text('track.sectionCurve'), parts.curve, parts.warnings),
+      section(text('track.sectionSurface'), parts.measures),
+      section(text('labs.sectionSave'), parts.exports, parts.saves, parts.link),
+      folded(text('labs.frames'), parts.table),
+      folded(text('track.sectionCompare'), parts.compare),
+      folded(text('labs.sectionExercise'), parts.exercises),
     ),
   );
 }
 
 /** Names of the facts about an image; they are shown before one is open, so that the layout does not shift. */
-const FACTS = ['File', 'Frames', 'Voxels', 'Size of a voxel', 'Tracked in', 'Prepared in'];
+const FACTS = [
+  text('labs.factFile'),
+  text('labs.frames'),
+  text('extract.factVoxels'),
+  text('labs.factVoxelSize'),
+  text('track.factPrepared'),
+  text('track.factOpening'),
+];
 
 /** Panel that shows the open image and opens others. */
-export class FilmPanel {
+export class ImagePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
-  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #own = h('option', { value: '', hidden: true }, text('labs.yourFile'));
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
@@ -103,8 +111,8 @@ export class FilmPanel {
       'select',
       { id },
       this.#own,
-      group('Images', examples),
-      ...(figures.length > 0 ? [group('Figures of the paper', figures)] : []),
+      group(text('track.groupImages'), examples),
+      ...(figures.length > 0 ? [group(text('labs.groupFigures'), figures)] : []),
     );
     this.#examples.addEventListener('change', () => {
       const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
@@ -114,13 +122,9 @@ export class FilmPanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, text('labs.example')), this.#examples),
       h('div', { class: 'row' }, chooser),
-      h(
-        'p',
-        { class: 'help' },
-        'Or drop a 4D NIfTI or NRRD anywhere on the page, or several 3D files: frames in the order of their names. It stays on this machine.',
-      ),
+      h('p', { class: 'help' }, text('track.dropHelp')),
       this.#facts,
       this.#credit,
     );
@@ -133,7 +137,7 @@ export class FilmPanel {
   }
 
   show(
-    opened: Pick<Opened, 'dims' | 'spacing' | 'volume' | 'prepared'> | undefined,
+    opened: Pick<OpenedImage, 'dims' | 'spacing' | 'volume' | 'openingMs'> | undefined,
     example: TrackExample | undefined,
     name: string,
   ): void {
@@ -146,7 +150,7 @@ export class FilmPanel {
       sizes(opened.dims),
       `${sizes(opened.spacing)} ${unit}`.trim(),
       `${sizes(opened.volume.dims)}`,
-      milliseconds(opened.prepared),
+      milliseconds(opened.openingMs),
     ];
     const rows = FACTS.map((fact, i) => h('div', {}, h('dt', {}, fact), h('dd', {}, known?.[i] ?? '–')));
     this.#facts.replaceChildren(...rows);

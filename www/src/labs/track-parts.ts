@@ -1,32 +1,33 @@
 import type { MeshFormat } from '../protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
 import type { TrackClient } from '../track/client';
-import { FILMS, type TrackExample } from '../track/examples';
+import { IMAGES, type TrackExample } from '../track/examples';
 import { TRACK_PRESETS, type TrackPreset, type TrackVariant } from '../track/presets';
-import type { Opened, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
-import { BeatCurve } from '../ui/beat-curve';
-import { BeatTable } from '../ui/beat-table';
+import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
 import { h } from '../ui/dom';
+import { EdgeThreshold } from '../ui/edge-threshold';
 import { exercises, TRACK_EXERCISES } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
 import { FigurePanel } from '../ui/figure';
+import { FigureRow } from '../ui/figure-row';
 import { acceptDrops, fileChooser } from '../ui/files';
 import { FrameBar } from '../ui/frame-bar';
+import { FrameTable } from '../ui/frame-table';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
 import { ErrorBanner, StatusLine } from '../ui/status';
-import { StepHeight } from '../ui/step-height';
-import { Stills } from '../ui/stills';
-import { type Other, TrackComparePanel } from '../ui/track-compare';
+import { TrackComparePanel } from '../ui/track-compare';
 import { TrackOptionControls } from '../ui/track-options';
 import { Transport, type TransportEvents } from '../ui/transport';
-import { BeatingView, type TrackViewOptions } from '../view/beating';
+import { VolumeCurve } from '../ui/volume-curve';
+import { TrackView, type TrackViewOptions } from '../view/track';
 import { Saving } from './saving';
 import { TRACK_ROWS } from './track-measures';
-import { FilmPanel, layOut } from './track-page';
+import { ImagePanel, layOut } from './track-page';
 
 export const INITIAL_VIEW: TrackViewOptions = {
   surface: true,
@@ -47,7 +48,7 @@ export interface PartEvents extends TransportEvents, RegionEvents {
   onOptions: (options: TrackViewOptions) => void;
   onFrame: (frame: number) => void;
   onMoved: () => void;
-  onCompare: (other: Other) => void;
+  onCompare: (other: Alternative) => void;
   onCancelCompare: () => void;
   onSave: (what: 'frames' | 'animation' | 'table') => void;
   onSculpt: () => void;
@@ -65,22 +66,22 @@ export class TrackParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label': '3D view of the surface in the frame that is shown. Arrow keys turn it, plus and minus zoom.',
+    'aria-label': text('track.viewLabel'),
   });
   readonly #slices = h('div', { class: 'slices' });
-  readonly view = new BeatingView(this.#canvas, this.#slices, INITIAL_VIEW);
+  readonly view = new TrackView(this.#canvas, this.#slices, INITIAL_VIEW);
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(TRACK_ROWS);
-  readonly table = new BeatTable();
+  readonly table = new FrameTable();
   readonly banner: ErrorBanner;
-  readonly data: FilmPanel;
+  readonly data: ImagePanel;
   readonly options: TrackOptionControls;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
   readonly transport: Transport;
   readonly frames: FrameBar;
-  readonly curve: BeatCurve;
-  readonly stills: Stills;
+  readonly curve: VolumeCurve;
+  readonly stills: FigureRow;
   readonly compare: TrackComparePanel;
   readonly saving: Saving;
   readonly #root: HTMLElement;
@@ -93,7 +94,7 @@ export class TrackParts {
   readonly #paramsHolder = h('div');
   readonly #thresholdHolder = h('div');
   #params: ParamControls | undefined;
-  #threshold: StepHeight | undefined;
+  #threshold: EdgeThreshold | undefined;
   /** Half width k of the window, in voxels. */
   #window = 2;
 
@@ -101,17 +102,17 @@ export class TrackParts {
     this.#root = root;
     this.#events = events;
     this.banner = new ErrorBanner(events.onDismiss);
-    this.data = new FilmPanel(FILMS, TRACK_PRESETS, fileChooser(events.onFiles), events.onExample);
+    this.data = new ImagePanel(IMAGES, TRACK_PRESETS, fileChooser(events.onFiles), events.onExample);
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
     this.region = new RegionControls(events);
     this.transport = new Transport(events);
     this.frames = new FrameBar(events.onFrame);
-    this.curve = new BeatCurve((frame) => {
+    this.curve = new VolumeCurve((frame) => {
       this.frames.stop();
       events.onFrame(frame);
     });
-    this.stills = new Stills(
+    this.stills = new FigureRow(
       (voxel: Vec3) => this.view.goToVoxel(voxel),
       (frame) => {
         this.frames.stop();
@@ -125,11 +126,11 @@ export class TrackParts {
     );
     this.#exports = new ExportButtons((format, type) => this.#saveMesh(format, type));
     this.#saves = [
-      button('All frames (ZIP of PLY)', () => events.onSave('frames'), 'save-frames'),
-      button('Animation (GLB)', () => events.onSave('animation'), 'save-animation'),
-      button('Table of frames (CSV)', () => events.onSave('table'), 'save-table'),
+      button(text('track.saveFrames'), () => events.onSave('frames'), 'save-frames'),
+      button(text('track.saveAnimation'), () => events.onSave('animation'), 'save-animation'),
+      button(text('track.saveTable'), () => events.onSave('table'), 'save-table'),
     ];
-    this.#sculpt = button('Open in Sculpt', events.onSculpt, 'sculpt');
+    this.#sculpt = button(text('labs.openInSculpt'), events.onSculpt, 'sculpt');
     this.options = new TrackOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
@@ -139,7 +140,7 @@ export class TrackParts {
     this.#cancel = h(
       'button',
       { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      'Cancel',
+      text('labs.cancel'),
     );
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
     this.view.onMoved = events.onMoved;
@@ -147,7 +148,7 @@ export class TrackParts {
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a 4D image to open it');
+    const drop = h('div', { class: 'drop', hidden: true }, text('track.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -173,7 +174,7 @@ export class TrackParts {
       compare: this.compare.element,
       exports: this.#exports.element,
       saves: h('div', {}, ...this.#saves, this.#sculpt),
-      link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
+      link: button(text('labs.copyLink'), this.#events.onCopyLink, 'link'),
       exercises: exercises(TRACK_EXERCISES, this.#events.onExampleId),
     });
   }
@@ -185,7 +186,7 @@ export class TrackParts {
     this.#paramsHolder.replaceWith(this.#params.element);
     const threshold = specs.find(({ name }) => name === 'threshold');
     if (!threshold) return;
-    this.#threshold = new StepHeight(
+    this.#threshold = new EdgeThreshold(
       threshold,
       (value) => onParam('threshold', value),
       (value) => this.view.preview(value, this.#window),
@@ -194,7 +195,7 @@ export class TrackParts {
   }
 
   /** Shows a newly opened image. */
-  adopt(opened: Opened, example: TrackExample | undefined, name: string): void {
+  adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
     this.saving.name = (example?.id ?? name).replace(/^.*\//, '');
     this.measures.unit = example?.unit ?? 'mm';
     this.data.show(opened, example, name);
@@ -215,8 +216,8 @@ export class TrackParts {
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'threshold') this.#threshold?.complain(message);
-    else this.#params?.complain(name, message);
+    if (name === 'threshold') this.#threshold?.showError(message);
+    else this.#params?.showError(name, message);
   }
 
   /** `tracked` is the number of frames with a surface; `here`, whether the displayed frame has one. */
@@ -238,7 +239,7 @@ export class TrackParts {
   #saveMesh(format: MeshFormat, type: string): void {
     this.saving
       .mesh(format, type, `-${this.frames.frame + 1}`)
-      .catch((error) => this.#events.onError('The surface could not be saved.', error));
+      .catch((error) => this.#events.onError(text('labs.saveFailed'), error));
   }
 }
 

@@ -1,7 +1,8 @@
 import type { LabState } from '../state';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import { beatOf } from '../track/curve';
-import type { Between, StepEvent, TrackedFrame, VolumeView, Votes } from '../track/protocol';
+import type { BoundaryVotes, InterpolatedSlice, StepEvent, TrackedFrame, VolumeView } from '../track/protocol';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
 import { moreOf } from './track-measures';
@@ -15,7 +16,7 @@ export interface TrackRecord {
 }
 
 /** The image, as far as the results need it. */
-interface Film {
+interface ShownImage {
   volume: VolumeView;
   /** Number of slices of the image before its preparation. */
   slices: number;
@@ -28,19 +29,19 @@ export class TrackResults {
   readonly #ui: TrackParts;
   readonly #states: LabStates;
   readonly #history: History;
-  #film: Film | undefined;
+  #image: ShownImage | undefined;
   #frames: readonly TrackedFrame[] = [];
   #closing: number | undefined;
   #frame = 0;
   /** Whether the user has chosen the displayed frame, so that new frames do not replace it. */
-  #held = false;
-  #votes: Votes | undefined;
-  #between: { key: string; between: Between } | undefined;
+  #frameChosen = false;
+  #votes: BoundaryVotes | undefined;
+  #between: { key: string; between: InterpolatedSlice } | undefined;
   /** Kinds of requests that are pending. */
-  #asked = new Set<string>();
+  #pendingRequests = new Set<string>();
   /** Counts runs, so that replies for a previous one are discarded. */
   #run = 0;
-  #other: { volumes: number[]; name: string } | undefined;
+  #comparedVolumes: { volumes: number[]; name: string } | undefined;
   /** Parameters in force, and the noise of the image. */
   window = 2;
   threshold = 1;
@@ -71,12 +72,12 @@ export class TrackResults {
   }
 
   get truth(): number[] | undefined {
-    return this.#film?.truth;
+    return this.#image?.truth;
   }
 
   /** Sets the image: another one, or the same after another preparation. */
-  setFilm(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
-    this.#film = { volume, slices, truth };
+  setImage(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
+    this.#image = { volume, slices, truth };
     this.#between = undefined;
     this.#ui.view.setVolume(volume, keep);
   }
@@ -84,13 +85,13 @@ export class TrackResults {
   /** Clears all results, for a new run. */
   startOver(): void {
     this.#history.clear();
-    this.#begin([], undefined);
+    this.#reset([], undefined);
   }
 
   /** Sets the results back to an iteration at which no surface was found yet. */
   rewind(iteration: number): void {
     this.#history.rewind(this.#history.marker()(iteration));
-    this.#begin([], undefined);
+    this.#reset([], undefined);
   }
 
   /** Returns the results so far, for undo. */
@@ -101,18 +102,18 @@ export class TrackResults {
   /** Restores results as of an iteration. */
   restore({ frames, closing, mark }: TrackRecord, iteration: number, done: boolean): void {
     this.#history.rewind(mark(iteration));
-    const count = this.#film?.volume.frames ?? 0;
-    this.#begin(frames.slice(0, Math.max(0, iteration - count)), done ? closing : undefined);
+    const count = this.#image?.volume.frames ?? 0;
+    this.#reset(frames.slice(0, Math.max(0, iteration - count)), done ? closing : undefined);
   }
 
-  #begin(frames: readonly TrackedFrame[], closing: number | undefined): void {
+  #reset(frames: readonly TrackedFrame[], closing: number | undefined): void {
     this.#run += 1;
     this.#frames = frames;
     this.#closing = closing;
     this.#votes = undefined;
-    this.#asked.clear();
-    this.#held = false;
-    this.#other = undefined;
+    this.#pendingRequests.clear();
+    this.#frameChosen = false;
+    this.#comparedVolumes = undefined;
     this.#ui.compare.clear();
     this.#ui.frames.stop();
     this.show(frames.length > 0 ? Math.min(this.#frame, frames.length - 1) : 0);
@@ -120,7 +121,7 @@ export class TrackResults {
 
   /** Displays the newest frame from now on, as the run continues. */
   follow(): void {
-    this.#held = false;
+    this.#frameChosen = false;
   }
 
   /** Takes the result of a step. */
@@ -128,22 +129,22 @@ export class TrackResults {
     this.#history.add([report]);
     this.#closing = closing;
     if (frame && index !== undefined) this.#frames = [...this.#frames.slice(0, index), frame];
-    const count = this.#film?.volume.frames ?? 1;
+    const count = this.#image?.volume.frames ?? 1;
     const newest = index ?? Math.min(report.iteration, count) - 1;
-    if (this.#held || (index === undefined && this.#frames.length > 0)) this.show(this.#frame);
+    if (this.#frameChosen || (index === undefined && this.#frames.length > 0)) this.show(this.#frame);
     else this.show(newest);
   }
 
   /** Displays a frame chosen by the user, and stays at it while others are tracked. */
   choose(frame: number): void {
-    this.#held = true;
+    this.#frameChosen = true;
     this.show(frame);
   }
 
   /** Displays a frame with its measures, and updates everything that depends on it. */
   show(frame: number): void {
     const { view, frames: bar, measures } = this.#ui;
-    const count = this.#film?.volume.frames ?? 1;
+    const count = this.#image?.volume.frames ?? 1;
     this.#frame = Math.min(frame, count - 1);
     const tracked = this.#frames[this.#frame];
     view.showFrame(this.#frame, tracked?.surface);
@@ -151,21 +152,28 @@ export class TrackResults {
     if (tracked) measures.showMeasures(tracked.measures);
     else measures.clear();
     const { noise } = this;
-    measures.showMore(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
+    measures.showExtra(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
     this.showCurve();
-    this.showStills();
+    this.showFigures();
     this.#ui.transport.showReport(this.#history.reports.at(-1));
-    this.#ui.showState(this.#states.beneath, this.#states.ready, this.#frames.length, tracked !== undefined);
+    this.#ui.showState(this.#states.modelState, this.#states.ready, this.#frames.length, tracked !== undefined);
     this.#root.dataset.frame = String(this.#frame + 1);
   }
 
   /** Shows the volume curve and the table of frames. */
   showCurve(): void {
     const { curve, table } = this.#ui;
-    const frames = this.#film?.volume.frames ?? 1;
+    const frames = this.#image?.volume.frames ?? 1;
     const facts = this.#frames.map((one) => one.facts);
     const volumes = facts.map(({ volume }) => volume);
-    curve.show({ volumes, truth: this.truth, other: this.#other, frame: this.#frame, frames, unit: this.#unit });
+    curve.show({
+      volumes,
+      truth: this.truth,
+      other: this.#comparedVolumes,
+      frame: this.#frame,
+      frames,
+      unit: this.#unit,
+    });
     const errors = this.#frames.map(({ error }) => error);
     table.show(facts, errors, this.#frame);
   }
@@ -178,42 +186,42 @@ export class TrackResults {
 
   /** Shows the volumes of another run beside these, for comparison. */
   set other(other: { volumes: number[]; name: string } | undefined) {
-    this.#other = other;
+    this.#comparedVolumes = other;
     this.showCurve();
   }
 
   /** Shows the pictures below the view and the boundary votes; requests the data that is missing. */
-  showStills(): void {
-    const film = this.#film;
-    if (!film) return;
+  showFigures(): void {
+    const image = this.#image;
+    if (!image) return;
     const { below, votes } = this.#ui.options.value;
-    if (votes !== 'none' || below === 'boundary') this.#askVotes();
-    if (below === 'between') this.#askBetween(film);
+    if (votes !== 'none' || below === 'boundary') this.#requestVotes();
+    if (below === 'between') this.#requestBetween(image);
     const present = this.#votes?.frame === this.#frame ? this.#votes : undefined;
     this.#ui.view.showVotes(votes === 'none' ? undefined : present);
     if (below === 'slices') return;
     const { voxel } = this.#ui.view.crosshair;
     this.#ui.stills.show({
-      subject: { volume: film.volume, frame: this.#frame, voxel },
+      subject: { volume: image.volume, frame: this.#frame, voxel },
       window: this.window,
       threshold: this.threshold,
       votes: present,
-      between: this.#between?.key === this.#betweenKey(film) ? this.#between.between : undefined,
-      pair: [this.#pair(film), film.slices],
+      between: this.#between?.key === this.#betweenKey(image) ? this.#between.between : undefined,
+      pair: [this.#pair(image), image.slices],
       outlines: () => this.#frames.map(({ surface }) => this.#ui.view.outlineIn(surface, 2)),
     });
   }
 
   /** Describes a state for the status line. */
   describe(state: LabState): string {
-    const count = this.#film?.volume.frames ?? 0;
+    const count = this.#image?.volume.frames ?? 0;
     const steps = this.#history.reports.length;
-    if (state === 'running') return this.#frames.length > 0 ? 'Following the surface.' : 'Finding the boundary.';
-    if (steps === 0) return 'Ready.';
-    if (state !== 'done') return `Paused: ${this.#frames.length} of ${count} frames have their surface.`;
+    if (state === 'running') return this.#frames.length > 0 ? text('track.tracking') : text('track.findingBoundary');
+    if (steps === 0) return text('labs.ready');
+    if (state !== 'done') return text('track.paused', { tracked: this.#frames.length, frames: count });
     const beat = beatOf(this.#frames.map(({ facts }) => facts.volume));
-    const ejection = beat ? ` Ejection fraction ${(100 * beat.ejection).toFixed(1)} %.` : '';
-    return `Done: all ${count} frames have their surface.${ejection}`;
+    if (!beat) return text('track.done', { frames: count });
+    return text('track.doneCycle', { frames: count, ejection: (100 * beat.ejection).toFixed(1) });
   }
 
   get #root(): HTMLElement {
@@ -221,20 +229,20 @@ export class TrackResults {
   }
 
   /** Returns the index of the slice of the unprepared image that is nearest to the crosshair and has two neighbours. */
-  #pair({ volume, slices }: Film): number {
+  #pair({ volume, slices }: ShownImage): number {
     const { voxel } = this.#ui.view.crosshair;
     const factor = slices > 1 ? (volume.dims[2] - 1) / (slices - 1) : 1;
     return Math.max(1, Math.min(slices - 2, Math.round(voxel[2] / factor)));
   }
 
-  #betweenKey(film: Film): string {
-    return `${this.#frame} ${this.#pair(film)}`;
+  #betweenKey(image: ShownImage): string {
+    return `${this.#frame} ${this.#pair(image)}`;
   }
 
-  #askVotes(): void {
+  #requestVotes(): void {
     const { length } = this.#history.reports;
     if (this.#votes?.frame === this.#frame || length <= this.#frame) return;
-    this.#ask(
+    this.#request(
       'votes',
       () => this.#client.request('votes', { frame: this.#frame }),
       (votes) => {
@@ -243,11 +251,11 @@ export class TrackResults {
     );
   }
 
-  #askBetween(film: Film): void {
-    const key = this.#betweenKey(film);
-    if (this.#between?.key === key || film.slices < 3) return;
-    const body = { frame: this.#frame, slice: this.#pair(film), window: film.volume.window };
-    this.#ask(
+  #requestBetween(image: ShownImage): void {
+    const key = this.#betweenKey(image);
+    if (this.#between?.key === key || image.slices < 3) return;
+    const body = { frame: this.#frame, slice: this.#pair(image), window: image.volume.window };
+    this.#request(
       'between',
       () => this.#client.request('between', body),
       (between) => {
@@ -257,21 +265,21 @@ export class TrackResults {
   }
 
   /** Sends at most one request of a kind at a time; after the reply, requests what is needed by then. */
-  #ask<Reply>(kind: string, request: () => Promise<Reply>, take: (reply: Reply) => void): void {
-    if (this.#asked.has(kind)) return;
-    this.#asked.add(kind);
+  #request<Reply>(kind: string, request: () => Promise<Reply>, take: (reply: Reply) => void): void {
+    if (this.#pendingRequests.has(kind)) return;
+    this.#pendingRequests.add(kind);
     const run = this.#run;
     request().then(
       (reply) => {
         if (run !== this.#run) return;
-        this.#asked.delete(kind);
+        this.#pendingRequests.delete(kind);
         take(reply);
-        this.showStills();
+        this.showFigures();
       },
       (error) => {
         if (run !== this.#run) return;
-        this.#asked.delete(kind);
-        this.#states.fail('That could not be shown.', error);
+        this.#pendingRequests.delete(kind);
+        this.#states.fail(text('track.displayFailed'), error);
       },
     );
   }

@@ -1,11 +1,12 @@
 import { toFailure } from '../channel';
 import type { ParamValues } from '../protocol';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Ready, SavedTrack, Setup, VolumeView } from '../track/protocol';
 import type { LabStates } from './lab-states';
-import { Rewinder } from './rewinder';
 import type { TrackParts } from './track-parts';
 import type { TrackRecord, TrackResults } from './track-results';
+import { UndoHistory } from './undo-history';
 
 /** State of the page besides the tracker, which undo restores. */
 interface PageState {
@@ -20,7 +21,7 @@ export class TrackSettings {
   readonly #results: TrackResults;
   readonly #onChange: () => void;
   readonly #onVolume: (volume: VolumeView) => void;
-  readonly #rewinder: Rewinder<PageState, SavedTrack>;
+  readonly #undo: UndoHistory<PageState, SavedTrack>;
   #setup: Setup = {
     preparation: { binning: 1, enrichment: 'none', factor: 0 },
     box: undefined,
@@ -46,7 +47,7 @@ export class TrackSettings {
     this.#results = results;
     this.#onChange = onChange;
     this.#onVolume = onVolume;
-    this.#rewinder = new Rewinder<PageState, SavedTrack>(
+    this.#undo = new UndoHistory<PageState, SavedTrack>(
       client,
       () => ({ record: results.record() }),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
@@ -75,44 +76,44 @@ export class TrackSettings {
 
   /** Adopts a newly opened image, and clears the undo history. */
   adopt(setup: Setup, ready: Ready): void {
-    this.#rewinder.clear();
+    this.#undo.clear();
     this.#take(setup, ready);
   }
 
   /** Saves the present state for undo, before a change. Returns a function that forgets it. */
-  remember(label: string, together = ''): () => void {
-    return this.#rewinder.remember(label, together);
+  checkpoint(label: string, mergeKey = ''): () => void {
+    return this.#undo.checkpoint(label, mergeKey);
   }
 
   /** Changes the setup: builds a new tracker, and runs it. */
   change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       await this.#client.request('pause', undefined);
-      const forget = this.remember(`change of ${what}`);
+      const forget = this.checkpoint(text('labs.changeOf', { name: what }));
       const setup = { ...this.#setup, ...changed };
-      this.#states.load('Preparing the image.');
+      this.#states.load(text('track.preparing'));
       try {
         const ready = await this.#client.request('rebuild', setup);
         this.#take(setup, ready);
         this.#results.startOver();
-        this.#states.stand('Ready.');
+        this.#states.idle(text('labs.ready'));
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         // Cancelled: the engine is being restarted.
         if (this.#states.engineBroken) return;
         this.#onChange();
-        this.#states.fail(`That ${what} cannot be.`, error);
+        this.#states.fail(text('track.settingsRejected', { what }), error);
       }
     });
   }
 
   /** Sets parameters, and tracks again as far as the results depend on them. */
   setParams(values: ParamValues, what: string): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
-      const forget = this.remember(`change of ${what}`, what);
+      const forget = this.checkpoint(text('labs.changeOf', { name: what }), what);
       try {
         const { params, iteration } = await this.#client.request('setParams', values);
         this.#setup = { ...this.#setup, params: { ...this.#setup.params, ...values } };
@@ -120,13 +121,13 @@ export class TrackSettings {
         this.#inForce();
         this.#ui.banner.hide();
         this.#results.rewind(iteration);
-        this.#states.stand('Beginning again.');
+        this.#states.idle(text('track.trackingAgain'));
         this.#onChange();
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#onChange();
         this.#ui.refuseParam(Object.keys(values)[0] ?? '', message);
       }
@@ -135,22 +136,22 @@ export class TrackSettings {
 
   /** Builds a new tracker of the same image, before its first step. */
   rebuild(): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', this.#setup);
-      this.#rewinder.clear();
+      this.#undo.clear();
       this.#take(this.#setup, ready);
       this.#results.startOver();
     });
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       try {
-        const moment = await this.#rewinder.travel(way);
+        const moment = await this.#undo.step(way);
         if (moment) await this.#goTo(moment.saved, moment.page);
       } catch (error) {
-        this.#states.fail(way === 'undo' ? 'That could not be undone.' : 'That could not be done again.', error);
+        this.#states.fail(way === 'undo' ? text('labs.undoFailed') : text('labs.redoFailed'), error);
       }
     });
   }
@@ -163,7 +164,7 @@ export class TrackSettings {
     this.#take(saved.setup, { ...ready, volume });
     this.#results.restore(record, saved.iteration, saved.done);
     this.#onChange();
-    await this.#client.request('tell', undefined);
+    await this.#client.request('sendState', undefined);
   }
 
   #take(setup: Setup, { volume, ...ready }: Ready): void {

@@ -1,11 +1,13 @@
 /**
  * Shares the state of the Track lab as an address, saves its results as files, and passes a surface to the Sculpt lab.
  */
+
 import { zipSync } from 'three/addons/libs/fflate.module.js';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { LabStates } from './lab-states';
-import type { PassOn } from './labs';
+import type { OpenInLab } from './labs';
 import { linkOf, toHash } from './track-link';
 import { framesCsv } from './track-measures';
 import type { TrackOpening } from './track-opening';
@@ -48,20 +50,26 @@ export class TrackSharing {
 
   async copyLink(): Promise<void> {
     this.updateAddress();
-    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
   }
 
   save(what: 'frames' | 'animation' | 'table'): void {
     const work = { frames: () => this.#frames(), animation: () => this.#animation(), table: async () => this.#table() };
-    work[what]().catch((error) => this.#states.fail('That could not be saved.', error));
+    work[what]().catch((error) => this.#states.fail(text('track.fileFailed'), error));
   }
 
   /** Passes the displayed frame's surface on as a mesh to deform. */
-  toSculpt(passOn: PassOn): void {
+  toSculpt(passOn: OpenInLab): void {
     const { frame } = this.#results;
     this.#client.request('export', { frame, format: 'ply' }).then(
-      (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (frame ${frame + 1})`, bytes, params: {} }),
-      (error) => this.#states.fail('The surface could not be passed on.', error),
+      (bytes) =>
+        passOn({
+          lab: 'sculpt',
+          name: text('track.frameName', { name: this.#ui.saving.name, frame: frame + 1 }),
+          bytes,
+          params: {},
+        }),
+      (error) => this.#states.fail(text('labs.toSculptFailed'), error),
     );
   }
 

@@ -1,19 +1,19 @@
 import { RequestError, toFailure } from '../channel';
 import { GUIDES } from '../guides';
 import type { LabState } from '../state';
+import { plural, text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
-import type { StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
-import { wantsStillness } from '../ui/dom';
+import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
+import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
-import type { Other } from '../ui/track-compare';
-import { invert, sliceFrames } from '../view/anatomy';
+import { invert, sliceOrientations } from '../view/anatomy';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn, PassOn } from './labs';
+import type { Handoff, Lab, OpenInLab } from './labs';
 import { compareWith } from './track-comparing';
-import { type Opened, TrackOpening, type TrackSource } from './track-opening';
+import { type OpenedTrack, TrackOpening, type TrackSource } from './track-opening';
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { TrackSettings } from './track-settings';
@@ -33,16 +33,16 @@ export class TrackLab implements Lab {
   readonly #settings: TrackSettings;
   readonly #opening: TrackOpening;
   readonly #sharing: TrackSharing;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   #volume: VolumeView | undefined;
   /** Number of slices of the image before its preparation. */
   #slices = 1;
   #truth: number[] | undefined;
   /** Start and duration of the run in milliseconds, for comparisons; undefined if it was interrupted. */
   #began: number | undefined;
-  #took: number | undefined;
+  #duration: number | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -61,12 +61,12 @@ export class TrackLab implements Lab {
     );
     this.#opening = new TrackOpening(this.#client, ui, states, (opened, source) => this.#adopt(opened, source));
     this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
   }
 
   /** Opens what the address asks for, or else the first example, and runs it. */
-  async start(_passedOn?: PassedOn): Promise<void> {
+  async start(_passedOn?: Handoff): Promise<void> {
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
 
@@ -91,7 +91,7 @@ export class TrackLab implements Lab {
       onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.#ui.labelOf(name)),
       onOptions: () => this.#optionsChanged(),
       onFrame: (frame) => this.#results.choose(frame),
-      onMoved: () => this.#results?.showStills(),
+      onMoved: () => this.#results?.showFigures(),
       onCompare: (other) => void this.#compare(other),
       onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
       onSave: (what) => this.#sharing.save(what),
@@ -112,22 +112,28 @@ export class TrackLab implements Lab {
     const redo = () => void this.#settings.travel('redo');
     const { frames } = this.#ui;
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause the tracking', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'b', shown: 'b', text: 'beat, or hold', act: () => frames.toggle() },
-      { key: ',', shown: ',', text: 'previous frame', act: () => frames.go(-1) },
-      { key: '.', shown: '.', text: 'next frame', act: () => frames.go(1) },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
-      { key: 'Escape', shown: 'Esc', text: 'away with the message', act: () => this.#dismiss() },
+      { key: ' ', shown: text('labs.keySpace'), text: text('track.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => frames.toggle() },
+      { key: ',', shown: ',', text: text('track.previousFrameKey'), act: () => frames.go(-1) },
+      { key: '.', shown: '.', text: text('track.nextFrameKey'), act: () => frames.go(1) },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }
 
   /** Displays an opened image, with the settings of its example or link, and starts tracking. */
-  async #adopt(opened: Opened, { name, example, linked }: TrackSource): Promise<void> {
+  async #adopt(opened: OpenedTrack, { name, example, linked }: TrackSource): Promise<void> {
     const { setup } = opened;
     this.#states.ready = true;
     this.#slices = opened.dims[2];
@@ -138,7 +144,7 @@ export class TrackLab implements Lab {
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
     this.#ui.options.set({ ...viewOf(example), ...linked?.view });
-    if (setup.box && this.#region) this.#ui.view.look(this.#region);
+    if (setup.box && this.#region) this.#ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.#ui.view.goTo(crosshair);
     await this.#client.request('play', undefined);
@@ -146,7 +152,7 @@ export class TrackLab implements Lab {
 
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
-    this.#results.setFilm(volume, this.#slices, this.#truth, keep);
+    this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 
   /** The region of interest in voxels; the whole image by default. */
@@ -163,18 +169,18 @@ export class TrackLab implements Lab {
     const present = this.#region;
     if (!volume || JSON.stringify(region) === JSON.stringify(present)) return;
     const box = region && boxOf(region, volume.affine);
-    void this.#settings.change({ box }, 'box');
+    void this.#settings.change({ box }, text('track.regionChange'));
   }
 
   #setComponent(which: 'here' | 'largest'): void {
     const at = which === 'here' ? this.#ui.view.crosshair.point : undefined;
-    void this.#settings.change({ at }, 'surface');
+    void this.#settings.change({ at }, text('track.surfaceChange'));
   }
 
   #openVariant(preset: TrackPreset, { name, params, view }: TrackVariant): void {
     this.#ui.options.set({ ...viewOf(preset), ...view });
     const differs = Object.entries(params).some(([key, value]) => !Object.is(this.#settings.params[key], value));
-    if (differs) void this.#settings.setParams(params, `figure: ${name}`);
+    if (differs) void this.#settings.setParams(params, text('labs.figureChange', { name }));
   }
 
   #showSettings(): void {
@@ -185,7 +191,7 @@ export class TrackLab implements Lab {
     this.#ui.compare.show(params.prediction === true, setup.preparation);
     const region = this.#region;
     if (region && this.#volume) {
-      const names = sliceFrames(this.#volume).map((frame) => frame.name);
+      const names = sliceOrientations(this.#volume).map((frame) => frame.name);
       this.#ui.region.show(region, this.#volume.dims, names, setup.at, setup.box === undefined);
       this.#ui.view.showRegion(region);
     }
@@ -199,7 +205,7 @@ export class TrackLab implements Lab {
 
   #optionsChanged(): void {
     if (!this.#states?.ready) return;
-    this.#results.showStills();
+    this.#results.showFigures();
     this.#sharing.updateAddress();
   }
 
@@ -218,56 +224,54 @@ export class TrackLab implements Lab {
     if (!this.#states.canRun || this.#states.value === 'running') return;
     this.#ui.banner.hide();
     this.#results.follow();
-    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
-    this.#client
-      .request('step', { count: steps })
-      .catch((error) => this.#states.fail('The step could not be done.', error));
+    this.#settings.checkpoint(plural('counts.step', steps));
+    this.#client.request('step', { count: steps }).catch((error) => this.#states.fail(text('track.stepFailed'), error));
   }
 
   /** Rebuilds the tracker, with the same settings. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    if (engineBroken) return this.#opening.reopen();
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
-      this.#states.stand('Ready to start.');
+      this.#states.idle(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The tracker could not be built.', error);
+      this.#states.fail(text('track.buildFailed'), error);
     }
   }
 
-  async #compare(other: Other): Promise<void> {
+  async #compare(other: Alternative): Promise<void> {
     const { compare } = this.#ui;
     compare.begin();
     try {
-      const present = { results: this.#results, took: this.#took };
+      const present = { results: this.#results, duration: this.#duration };
       const runs = await compareWith(this.#client, this.#settings, present, other);
-      if (!runs) return compare.refuse('Cancelled.');
+      if (!runs) return compare.reject(text('labs.cancelled'));
       compare.finish(runs);
       const [, there] = runs;
       this.#results.other = { volumes: there.facts.map(({ volume }) => volume), name: there.name };
     } catch (error) {
       const { code, message } = toFailure(error);
-      compare.refuse(message);
-      if (code === 'internal') this.#states.fail('The comparison stopped.', error);
+      compare.reject(message);
+      if (code === 'internal') this.#states.fail(text('track.compareFailed'), error);
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'preparing') this.#ui.status.say(event.what);
-    else if (event.event === 'comparing') this.#ui.compare.tell(event.part, event.phase);
-    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    else if (event.event === 'comparing') this.#ui.compare.showProgress(event.part, event.phase);
+    else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'step') {
       this.#results.take(event);
       this.#report(event);
-    } else if (this.#states.enter(event.state)) this.#settled(event.state);
+    } else if (this.#states.setModelState(event.state)) this.#settled(event.state);
   }
 
   /** Reports progress to screen readers occasionally: every frame would be too often. */
@@ -275,29 +279,32 @@ export class TrackLab implements Lab {
     if (index === undefined || this.#states.value !== 'running') return;
     const { frames } = this.#results;
     if (index === 0) this.#ui.status.say(this.#results.describe('running'));
-    else this.#ui.status.report(() => `${frames.length} of ${this.#volume?.frames} frames have their surface.`);
+    else
+      this.#ui.status.report(() =>
+        text('track.tracked', { tracked: frames.length, frames: this.#volume?.frames ?? 0 }),
+      );
   }
 
   #settled(state: 'running' | 'paused' | 'done'): void {
     this.#time(state);
     this.#ui.status.say(this.#results.describe(state));
-    if (state === 'done' && !wantsStillness()) this.#ui.frames.start();
+    if (state === 'done' && !prefersReducedMotion()) this.#ui.frames.start();
     else this.#ui.frames.stop();
   }
 
   /** Measures the duration of a run; only one without a pause can be compared. */
   #time(state: 'running' | 'paused' | 'done'): void {
     if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
-    else if (state === 'done' && this.#began !== undefined) this.#took = performance.now() - this.#began;
+    else if (state === 'done' && this.#began !== undefined) this.#duration = performance.now() - this.#began;
     if (state !== 'running') this.#began = undefined;
-    if (state === 'paused') this.#took = undefined;
+    if (state === 'paused') this.#duration = undefined;
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
+    const { modelState, ready } = this.#states;
     const { frames, frame } = this.#results;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, frames.length, frames[frame] !== undefined);
+    this.#ui.showState(modelState, ready, frames.length, frames[frame] !== undefined);
     if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
   }
 

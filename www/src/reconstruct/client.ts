@@ -12,8 +12,8 @@ export class ReconstructClient extends Channel<Requests, WorkerEvent> {
   }
 
   /** Tells the worker that the surface it sent last is on the screen, so that it may send another. */
-  shown(): void {
+  acknowledge(): void {
     const message: ShownMessage = { kind: 'shown' };
-    this.tell(message);
+    this.post(message);
   }
 }

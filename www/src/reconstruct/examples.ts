@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import type { SurfaceColor } from '../view/surface';
 import type { PointShape } from './clouds';
 import type { ParamValues } from './protocol';
@@ -20,13 +21,13 @@ export interface CloudExample {
   credit: string;
 }
 
-const SPOT = 'Spot by Keenan Crane, public domain; rendered and turned into points for this page.';
+const SPOT = text('reconstructPresets.spotCredit');
 
 /** The examples of the Reconstruct lab. The first one opens by default. */
 export const CLOUDS: [CloudExample, ...CloudExample[]] = [
   {
     id: 'spot-stereo',
-    name: 'Cow, 24 stereo photographs',
+    name: text('reconstructPresets.spotStereoName'),
     source: { file: 'spot/stereo.ply' },
     photographs: 'spot',
     up: 'y',
@@ -34,46 +35,45 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     keepComponents: 1,
     params: {},
     color: 'own',
-    credit: `${SPOT} As stereo gives them: distances in steps, 4 % strays, nothing from below.`,
+    credit: `${SPOT} ${text('reconstructPresets.spotStereoCredit')}`,
   },
   {
     id: 'spot-carved',
-    name: 'Cow, carved out of silhouettes',
+    name: text('reconstructPresets.spotCarvedName'),
     source: { file: 'spot/carved.ply' },
     photographs: 'spot',
     up: 'y',
     front: -1,
     params: {},
     color: 'own',
-    credit: `${SPOT} The voxels that are left when everything outside the 24 silhouettes is taken away.`,
+    credit: `${SPOT} ${text('reconstructPresets.spotCarvedCredit')}`,
   },
   {
     id: 'angel',
-    name: 'Angel, laser scan',
+    name: text('reconstructPresets.angelName'),
     source: { file: 'angel.ply' },
     up: 'z',
     params: {},
     color: 'plain',
-    credit:
-      'Angel statue: scan by Ivan Nikolov (GGG-BenchmarkSfM), CC BY 4.0; decimated, triangles dropped, points shuffled. Its base is open.',
+    credit: text('reconstructPresets.angelCredit'),
   },
   {
     id: 'torus',
-    name: 'Torus with noise',
+    name: text('reconstructPresets.torusName'),
     source: { shape: 'torus' },
     up: 'z',
     params: {},
     color: 'plain',
-    credit: 'Computed: 3,000 points, noise of 0.02 where the ring has a radius of 1.',
+    credit: text('reconstructPresets.torusCredit'),
   },
   {
     id: 'two-balls',
-    name: 'Two balls',
+    name: text('reconstructPresets.twoBallsName'),
     source: { shape: 'two balls' },
     up: 'z',
     params: {},
     color: 'plain',
-    credit: 'Computed: 1,600 points on two balls. One function, two components.',
+    credit: text('reconstructPresets.twoBallsCredit'),
   },
 ];
 

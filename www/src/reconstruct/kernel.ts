@@ -8,8 +8,8 @@ export interface KernelParams {
   sigma: number;
 }
 
-/** Share of τ: below r = NEAR τ the closed form loses its digits, and φ(0) is as accurate. */
-const NEAR = 1e-4;
+/** Share of τ: below r = SMALL_R τ the closed form loses its digits, and φ(0) is as accurate. */
+const SMALL_R = 1e-4;
 
 /** Returns the kernel and its constants from the method's parameters, with defaults for missing ones. */
 export function kernelParams(params: ParamValues): KernelParams {
@@ -38,7 +38,7 @@ export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): num
 
 /** Returns φ(r) of the multi-order kernel: equation 6 of the paper in real form, with δ and τ squared in the energy. */
 function multiOrder(delta: number, tau: number, r: number): number {
-  if (r < NEAR * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));
+  if (r < SMALL_R * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));
   const a = Math.sqrt(1 + 2 * delta * tau) / (2 * tau);
   const [even, odd] = damped((1 - 2 * delta * tau) / (4 * tau * tau), a, r);
   return (1 - (even + (r * odd) / (4 * a * tau * tau))) / (4 * Math.PI * delta * delta * r);

@@ -3,7 +3,7 @@ import { type ImplicitOptions, ImplicitSurface, type PointEdits, parsePoints } f
 import type { Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
-import type { CameraView, Cloud, CloudSource, Edits, Fit, PointShade, Setup } from './protocol';
+import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
 
 /** Least number of voxels along the shortest side of an exported grid. */
 const LEAST_DIM = 8;
@@ -23,7 +23,7 @@ export function buildModel({ points, normals, colors }: Cloud, cameras: CameraVi
   if (keepComponents !== undefined) options.keepComponents = keepComponents;
   const model = new ImplicitSurface(options);
   try {
-    model.setEdits(packed(edits));
+    model.setEdits(toPointEdits(edits));
     return model;
   } catch (error) {
     model.free();
@@ -32,7 +32,7 @@ export function buildModel({ points, normals, colors }: Cloud, cameras: CameraVi
 }
 
 /** Converts edits to the typed arrays that the model expects. */
-export function packed({ added, removed, outside }: Edits): Required<PointEdits> {
+export function toPointEdits({ added, removed, outside }: Edits): Required<PointEdits> {
   return {
     added: Float32Array.from(added.flat()),
     removed: Uint32Array.from(removed),
@@ -41,7 +41,7 @@ export function packed({ added, removed, outside }: Edits): Required<PointEdits>
 }
 
 /** Returns the points in use: those loaded, without the removed and with the added ones. */
-export function edited(points: Float32Array, { added, removed }: Edits): Float32Array {
+export function applyEdits(points: Float32Array, { added, removed }: Edits): Float32Array {
   if (added.length + removed.length === 0) return points;
   const gone = new Set(removed);
   const kept = points.filter((_, i) => !gone.has(Math.floor(i / 3)));
@@ -51,15 +51,15 @@ export function edited(points: Float32Array, { added, removed }: Edits): Float32
   return all;
 }
 
-/** For each shade, a function that returns one value per vertex, in the order of the mesh's arrays. */
-const SHADES: Record<PointShade, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
+/** For each quantity, a function that returns one value per vertex, in the order of the mesh's arrays. */
+const QUANTITIES: Record<PointQuantity, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
   'mean curvature': ({ mesh }) => mesh.curvature('mean'),
   distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
 };
 
-/** Returns the values of a shade at the vertices. `points` are the points in use, after edits. */
-export function valuesFor(model: ImplicitSurface, points: Float32Array, shade: PointShade): Float32Array {
-  return SHADES[shade](model, points);
+/** Returns the values of a quantity at the vertices. `points` are the points in use, after edits. */
+export function valuesFor(model: ImplicitSurface, points: Float32Array, quantity: PointQuantity): Float32Array {
+  return QUANTITIES[quantity](model, points);
 }
 
 /** Returns the level of f that the surface is extracted at: 0, or the mean of f over the surface constraints. */
@@ -81,12 +81,12 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
   return sides.map((side) => Math.max(LEAST_DIM, Math.round((size * side) / longest))) as Vec3;
 }
 
-/** Collects the facts about the fit that the page displays; `whole` if there is a complete surface to measure. */
-export function fitOf(model: ImplicitSurface, residual: number, whole: boolean): Fit {
+/** Collects the facts about the fit that the page displays; `complete` if there is a complete surface to measure. */
+export function fitOf(model: ImplicitSurface, residual: number, complete: boolean): Fit {
   const { surface, exterior } = model.constraints();
   const { cell, spacing, duplicates, spuriousComponents, warning } = model;
   return {
-    ...(whole && { fitness: model.fitness() }),
+    ...(complete && { fitness: model.fitness() }),
     surfaceConstraints: surface.length / 3,
     exteriorConstraints: exterior.length / 3,
     cell,

@@ -43,21 +43,21 @@ class PointGrid {
    * Returns the distance from a position to its nearest point: searches shell by shell around its cell, until no nearer
    * point can follow.
    */
-  distance(places: Float32Array, offset: number): number {
-    const centre = [0, 1, 2].map((axis) => this.#index(places[offset + axis] ?? 0, axis));
+  distance(positions: Float32Array, offset: number): number {
+    const centre = [0, 1, 2].map((axis) => this.#index(positions[offset + axis] ?? 0, axis));
     // Outside the grid, the distance is larger than the number of shells implies.
-    const beyond = this.#beyond(places, offset);
+    const beyond = this.#distanceOutside(positions, offset);
     let best = Number.POSITIVE_INFINITY;
     const last = Math.max(...this.#dims);
     for (let shell = 0; shell <= last; shell++) {
       const near = Math.max(beyond, (shell - 1) * this.#cell);
       if (near * near >= best) break;
-      best = this.#searchShell(centre, shell, places, offset, best);
+      best = this.#searchShell(centre, shell, positions, offset, best);
     }
     return Math.sqrt(best);
   }
 
-  #searchShell(centre: number[], shell: number, places: Float32Array, offset: number, found: number): number {
+  #searchShell(centre: number[], shell: number, positions: Float32Array, offset: number, found: number): number {
     let best = found;
     const [cx = 0, cy = 0, cz = 0] = centre;
     for (let z = cz - shell; z <= cz + shell; z++) {
@@ -65,19 +65,19 @@ class PointGrid {
         const full = Math.abs(z - cz) === shell || Math.abs(y - cy) === shell;
         const step = full || shell === 0 ? 1 : 2 * shell;
         for (let x = cx - shell; x <= cx + shell; x += step) {
-          if (this.#has(x, y, z)) best = this.#searchCell(x, y, z, places, offset, best);
+          if (this.#has(x, y, z)) best = this.#searchCell(x, y, z, positions, offset, best);
         }
       }
     }
     return best;
   }
 
-  #searchCell(x: number, y: number, z: number, places: Float32Array, offset: number, found: number): number {
+  #searchCell(x: number, y: number, z: number, positions: Float32Array, offset: number, found: number): number {
     let best = found;
     const [nx = 1, ny = 1] = this.#dims;
     const cell = x + nx * (y + ny * z);
     for (let i = this.#begin[cell] ?? 0; i < (this.#begin[cell + 1] ?? 0); i++) {
-      best = Math.min(best, squared(this.#points, 3 * (this.#list[i] ?? 0), places, offset));
+      best = Math.min(best, squared(this.#points, 3 * (this.#list[i] ?? 0), positions, offset));
     }
     return best;
   }
@@ -87,10 +87,10 @@ class PointGrid {
     return x >= 0 && y >= 0 && z >= 0 && x < nx && y < ny && z < nz;
   }
 
-  #beyond(places: Float32Array, offset: number): number {
+  #distanceOutside(positions: Float32Array, offset: number): number {
     let most = 0;
     for (let axis = 0; axis < 3; axis++) {
-      const from = (places[offset + axis] ?? 0) - (this.#low[axis] ?? 0);
+      const from = (positions[offset + axis] ?? 0) - (this.#low[axis] ?? 0);
       most = Math.max(most, -from, from - (this.#dims[axis] ?? 1) * this.#cell);
     }
     return most;
@@ -126,10 +126,10 @@ function squared(a: Float32Array, i: number, b: Float32Array, j: number): number
 }
 
 /** Returns the distance of each position to the nearest point; both packed xyz. Infinite if there are no points. */
-export function distances(places: Float32Array, points: Float32Array): Float32Array {
-  const out = new Float32Array(places.length / 3).fill(Number.POSITIVE_INFINITY);
+export function distances(positions: Float32Array, points: Float32Array): Float32Array {
+  const out = new Float32Array(positions.length / 3).fill(Number.POSITIVE_INFINITY);
   if (points.length === 0) return out;
   const grid = new PointGrid(points);
-  for (let i = 0; i < out.length; i++) out[i] = grid.distance(places, 3 * i);
+  for (let i = 0; i < out.length; i++) out[i] = grid.distance(positions, 3 * i);
   return out;
 }

@@ -73,7 +73,7 @@ export interface Loaded extends Ready {
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
-export type PointShade = 'mean curvature' | 'distance';
+export type PointQuantity = 'mean curvature' | 'distance';
 
 /** Facts about the points and the fit, beyond the measures of the mesh. */
 export interface Fit {
@@ -118,7 +118,7 @@ export interface Requests {
    * extracted at.
    */
   volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };
-  shade: { body: PointShade | undefined; reply: undefined };
+  quantity: { body: PointQuantity | undefined; reply: undefined };
   /** Times solves with subsamples of the present points of each size and kernel; undefined if cancelled. */
   timing: { body: { sizes: number[]; kernels: string[] }; reply: Timing[] | undefined };
   cancelTiming: { body: undefined; reply: undefined };

@@ -3,18 +3,18 @@ import { ImplicitSurface } from 'vesicle';
 import type { CameraView, Cloud, Requests, Setup, Timing } from './protocol';
 
 /** Solves that take at most this many milliseconds are timed twice, and the shorter time counts. */
-const QUICK = 2000;
+const RETIME_BELOW_MS = 2000;
 
-type Asked = Requests['timing']['body'];
+type TimingRequest = Requests['timing']['body'];
 
-/** Times one solve per size and kernel, and passes each timing to `tell`. Undefined if the signal aborts. */
+/** Times one solve per size and kernel, and passes each timing to `onTiming`. Undefined if the signal aborts. */
 export async function timeSolves(
   cloud: Cloud,
   cameras: CameraView[],
   setup: Setup,
-  { sizes, kernels }: Asked,
+  { sizes, kernels }: TimingRequest,
   signal: AbortSignal,
-  tell: (timing: Timing) => void,
+  onTiming: (timing: Timing) => void,
 ): Promise<Timing[] | undefined> {
   const timings: Timing[] = [];
   for (const size of sizes) {
@@ -27,7 +27,7 @@ export async function timeSolves(
       );
       if (!timing) return undefined;
       timings.push(timing);
-      tell(timing);
+      onTiming(timing);
     }
   }
   return timings;
@@ -46,7 +46,7 @@ async function timeOne(
     // Time a quick solve again: other load on the machine only ever adds time. Changing the tolerance is the least
     // change that triggers a new solve.
     model.setParams({ tolerance: 1.0001 * model.params.tolerance });
-    const second = first === undefined || first > QUICK ? first : await solveTime(model, signal);
+    const second = first === undefined || first > RETIME_BELOW_MS ? first : await solveTime(model, signal);
     const milliseconds = first !== undefined && second !== undefined ? Math.min(first, second) : undefined;
     const { surface, exterior } = model.constraints();
     const constraints = (surface.length + exterior.length) / 3;

@@ -1,17 +1,19 @@
 /** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
+
 import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
 import type { Surface } from '../protocol';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { noArrays, surfaceIn, transferOf } from '../worker/room';
-import { answer, buffersOf, stop, type Work } from '../worker/serving';
-import { buildModel, cloudFrom, cubicDims, edited, fitOf, levelOf, packed, valuesFor } from './model';
+import { buffersOf, reply, stop, type Task } from '../worker/serving';
+import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
+import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
   CameraView,
   Cloud,
   Edits,
   Loaded,
   ParamValues,
-  PointShade,
+  PointQuantity,
   Ready,
   RequestKind,
   Requests,
@@ -23,7 +25,7 @@ import { timeSolves } from './timing';
 
 /** Least milliseconds between two previews of a surface being extracted, and between two progress events. */
 const PREVIEW_EVERY = 100;
-const TELL_EVERY = 50;
+const REPORT_EVERY = 50;
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -38,10 +40,10 @@ class Session {
   #cameras: CameraView[] = [];
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
-  #shade: PointShade | undefined;
+  #quantity: PointQuantity | undefined;
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
-  #toldAt = 0;
+  #reportedAt = 0;
   #previewedAt = 0;
   /** Whether the page has drawn the last surface it was sent. */
   #shown = true;
@@ -49,8 +51,8 @@ class Session {
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
-  #run: Work | undefined;
-  #timing: Work | undefined;
+  #run: Task | undefined;
+  #timing: Task | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -66,7 +68,7 @@ class Session {
     setEdits: (edits) => this.#setEdits(edits),
     export: ({ format }) => this.#current().mesh.toBytes(format),
     volume: ({ size }) => this.#volume(size),
-    shade: (shade) => this.#setShade(shade),
+    quantity: (quantity) => this.#setQuantity(quantity),
     timing: (body) => this.#time(body),
     cancelTiming: () => stop(this.#timing),
   };
@@ -109,17 +111,17 @@ class Session {
   }
 
   #points(): Cloud {
-    if (!this.#cloud) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    if (!this.#cloud) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
     return this.#cloud;
   }
 
   #pointsInForce(): Float32Array {
     const { points } = this.#points();
-    return this.#setup ? edited(points, this.#setup.edits) : points;
+    return this.#setup ? applyEdits(points, this.#setup.edits) : points;
   }
 
   #current(): ImplicitSurface {
-    if (!this.#model) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
     return this.#model;
   }
 
@@ -140,22 +142,22 @@ class Session {
       if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
-    this.#standStill();
+    this.#reportStopped();
   }
 
   #stepped(report: StepReport): void {
     this.#last = report;
     this.#reports.push(report);
     const now = performance.now();
-    if (now - this.#toldAt > TELL_EVERY) this.#tell();
+    if (now - this.#reportedAt > REPORT_EVERY) this.#flushReports();
     this.#showConstraints();
     if (report.phase === 'extract' && now - this.#previewedAt > PREVIEW_EVERY) this.#preview();
   }
 
-  #tell(): void {
+  #flushReports(): void {
     if (this.#reports.length > 0) send({ event: 'progress', reports: this.#reports });
     this.#reports = [];
-    this.#toldAt = performance.now();
+    this.#reportedAt = performance.now();
   }
 
   #showConstraints(): void {
@@ -178,11 +180,11 @@ class Session {
     for (let i = 0; i < count && !this.#last?.done; i++) this.#stepped(model.step(1));
     this.#previewedAt = 0;
     if (this.#last?.phase === 'extract') this.#preview();
-    this.#standStill();
+    this.#reportStopped();
   }
 
-  #standStill(): void {
-    this.#tell();
+  #reportStopped(): void {
+    this.#flushReports();
     this.#showSurface();
     this.#measure();
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
@@ -198,13 +200,13 @@ class Session {
 
   /** Replaces the edits; a run continues with them. */
   #setEdits(edits: Edits): undefined {
-    this.#current().setEdits(packed(edits));
+    this.#current().setEdits(toPointEdits(edits));
     if (this.#setup) this.#setup = { ...this.#setup, edits };
     this.#startOver();
   }
 
-  #setShade(shade: PointShade | undefined): undefined {
-    this.#shade = shade;
+  #setQuantity(quantity: PointQuantity | undefined): undefined {
+    this.#quantity = quantity;
     this.#sent = '';
     if (!this.#run) this.#showSurface();
   }
@@ -214,7 +216,7 @@ class Session {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
     try {
-      if (mesh.vertexCount > 0) this.#sendSurface(surfaceIn(noArrays(), mesh), true);
+      if (mesh.vertexCount > 0) this.#sendSurface(copySurface(emptyArrays(), mesh), true);
     } finally {
       mesh.free();
       this.#previewedAt = performance.now();
@@ -229,8 +231,8 @@ class Session {
     const version = `${mesh.topologyVersion} ${mesh.geometryVersion} ${this.#last?.done}`;
     if (version === this.#sent) return;
     this.#sent = version;
-    const values = this.#shade && valuesFor(model, this.#pointsInForce(), this.#shade);
-    this.#sendSurface({ ...surfaceIn(noArrays(), mesh), ...(values && { values }) }, false);
+    const values = this.#quantity && valuesFor(model, this.#pointsInForce(), this.#quantity);
+    this.#sendSurface({ ...copySurface(emptyArrays(), mesh), ...(values && { values }) }, false);
   }
 
   #sendSurface(surface: Surface, preview: boolean): void {
@@ -281,5 +283,5 @@ const session = new Session();
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'shown') session.shown();
-  else void answer(session.handlers, data);
+  else void reply(session.handlers, data);
 };

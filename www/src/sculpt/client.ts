@@ -7,23 +7,23 @@ export const spawnSculpt = () =>
 
 /** The page's client of the Sculpt lab's worker. */
 export class SculptClient extends Channel<Requests, WorkerEvent> {
-  #turn = 0;
+  #lastPoseId = 0;
 
   constructor(onEvent: (event: WorkerEvent) => void) {
     super(spawnSculpt, onEvent);
   }
 
   /** Tells the worker that the frame it sent last is on the screen, so that it may send another. */
-  shown(): void {
+  acknowledge(): void {
     const message: ShownMessage = { kind: 'shown' };
-    this.tell(message);
+    this.post(message);
   }
 
-  /** Sends a target pose of the ellipsoids; returns its number, which the frames that follow it report as `turn`. */
+  /** Sends a target pose of the ellipsoids; returns its number, which the frames that follow it report as `poseId`. */
   pose(pose: Pose, dragging: boolean): number {
-    this.#turn += 1;
-    const message: PoseMessage = { kind: 'pose', pose, turn: this.#turn, dragging };
-    this.tell(message);
-    return this.#turn;
+    this.#lastPoseId += 1;
+    const message: PoseMessage = { kind: 'pose', pose, poseId: this.#lastPoseId, dragging };
+    this.post(message);
+    return this.#lastPoseId;
   }
 }

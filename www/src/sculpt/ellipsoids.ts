@@ -113,12 +113,12 @@ function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
 }
 
 /** Returns an ellipsoid as twelve numbers: its centre and its semi-axes. */
-export function packed({ center, axes }: ControlEllipsoid): number[] {
+export function toNumbers({ center, axes }: ControlEllipsoid): number[] {
   return [...center, ...axes.flat()];
 }
 
 /** Converts twelve numbers back to an ellipsoid; undefined if they are too few, too many or not finite. */
-export function unpacked(numbers: number[]): ControlEllipsoid | undefined {
+export function fromNumbers(numbers: number[]): ControlEllipsoid | undefined {
   if (numbers.length !== 12 || !numbers.every(Number.isFinite)) return undefined;
   const vector = (at: number) => numbers.slice(at, at + 3) as Vec3;
   return { center: vector(0), axes: [vector(3), vector(6), vector(9)] };
@@ -127,12 +127,12 @@ export function unpacked(numbers: number[]): ControlEllipsoid | undefined {
 /** Returns the bounding box of all ellipsoids: its least and largest corner. */
 export function boxOf(pose: readonly ControlEllipsoid[]): { min: Vec3; max: Vec3 } {
   const corner = (sign: number, choose: (...values: number[]) => number) =>
-    [0, 1, 2].map((k) => choose(...pose.map((one) => (one.center[k] ?? 0) + sign * reach(one, k)))) as Vec3;
+    [0, 1, 2].map((k) => choose(...pose.map((one) => (one.center[k] ?? 0) + sign * halfWidth(one, k)))) as Vec3;
   return { min: corner(-1, Math.min), max: corner(1, Math.max) };
 }
 
 /** Returns the half width of an ellipsoid along coordinate `k`. */
-function reach({ axes }: ControlEllipsoid, k: number): number {
+function halfWidth({ axes }: ControlEllipsoid, k: number): number {
   return Math.hypot(...axes.map((axis) => axis[k] ?? 0));
 }
 
@@ -143,6 +143,6 @@ export function samePose(one: readonly ControlEllipsoid[], other: readonly Contr
 
 function isSame(one: ControlEllipsoid, other: ControlEllipsoid): boolean {
   const least = 1e-5 * Math.min(...lengthsOf(one));
-  const numbers = packed(other);
-  return packed(one).every((value, k) => Math.abs(value - (numbers[k] ?? value)) <= least);
+  const numbers = toNumbers(other);
+  return toNumbers(one).every((value, k) => Math.abs(value - (numbers[k] ?? value)) <= least);
 }

@@ -1,4 +1,5 @@
 import type { Vec3 } from '../protocol';
+import { text } from '../texts';
 import type { SurfaceColor } from '../view/surface';
 import { ball, moved, turnedAbout, upright } from './ellipsoids';
 import { type Film, poseAt } from './film';
@@ -29,8 +30,7 @@ export interface SculptExample {
 }
 
 /** Credits of the bust. */
-export const NEFERTITI =
-  'Bust of Nefertiti: scan by Nora Al-Badri and Jan Nikolai Nelles, public domain; 70,000 triangles, from odedstein-meshes.';
+export const NEFERTITI = text('sculptPresets.nefertitiCredit');
 
 /** Ellipsoids of the bust: crown, head, neck and chest. */
 export const BUST: Pose = [
@@ -46,7 +46,12 @@ export const BUST: Pose = [
   upright([0, -110, 40], [42, 70, 42]),
   upright([0, -205, 5], [92, 42, 60]),
 ];
-export const BUST_NAMES = ['crown', 'head', 'neck', 'chest'];
+export const BUST_NAMES = [
+  text('sculptPresets.crown'),
+  text('sculptPresets.head'),
+  text('sculptPresets.neck'),
+  text('sculptPresets.chest'),
+];
 export const BUST_MESHES = { detail: { file: 'nefertiti.ply' }, base: { file: 'nefertiti-base.ply' } } as const;
 
 /** Where head and neck meet. */
@@ -69,7 +74,7 @@ export const LAVA: Film = { motion: 'lava', loop: false };
 export const SCENES: [SculptExample, ...SculptExample[]] = [
   {
     id: 'bust',
-    name: 'Bust of Nefertiti',
+    name: text('sculptPresets.bustName'),
     ...BUST_MESHES,
     up: 'y',
     start: BUST,
@@ -82,28 +87,34 @@ export const SCENES: [SculptExample, ...SculptExample[]] = [
   },
   {
     id: 'lava',
-    name: 'Lava lamp',
+    name: text('sculptPresets.lavaName'),
     up: 'y',
     start: poseAt(LAVA, 0),
-    names: ['pool', 'large blob', 'small blob', 'middle blob', 'drop'],
+    names: [
+      text('sculptPresets.pool'),
+      text('sculptPresets.largeBlob'),
+      text('sculptPresets.smallBlob'),
+      text('sculptPresets.middleBlob'),
+      text('sculptPresets.dropBlob'),
+    ],
     film: LAVA,
     params: { edgeMin: 0.07, edgeMax: 0.16, topology: 'split-and-join' },
     color: 'component',
     layout: 'result',
-    credit: 'Computed: five ellipsoids that rise and sink, after the lamp that the paper was inspired by.',
+    credit: text('sculptPresets.lavaCredit'),
   },
   {
     id: 'globe',
-    name: 'Globe with longitudes and latitudes',
+    name: text('sculptPresets.globeName'),
     base: { shape: 'globe' },
     up: 'y',
     // Both in the same place: when they separate, each takes half of the map along.
     start: [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97)],
-    names: ['large', 'small'],
+    names: [text('sculptPresets.large'), text('sculptPresets.small')],
     pose: [ball(-0.6, 0, 0, 0.85), ball(0.75, 0.3, 0, 0.6)],
     params: {},
     color: 'texture',
     layout: 'result',
-    credit: 'Computed: a ball with its longitude and latitude as texture coordinates.',
+    credit: text('sculptPresets.globeCredit'),
   },
 ];

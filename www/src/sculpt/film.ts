@@ -29,23 +29,23 @@ function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): Contr
 }
 
 /**
- * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless `MOST_GLIDES`
+ * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless `MAX_GLIDE_FRAMES`
  * limits the number of frames. The model's own steps are longer.
  */
-const GLIDE = 0.4;
+const GLIDE_STEP = 0.4;
 /** Most frames of a glide: one small ellipsoid that moves far should not delay all others. */
-const MOST_GLIDES = 40;
+const MAX_GLIDE_FRAMES = 40;
 
 /**
  * Returns the poses of a glide, in which all ellipsoids arrive together, so that the surface moves as a whole. Moved by
  * the model alone, large ellipsoids run ahead of small ones and strain the membrane between them.
  */
 export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): ControlEllipsoid[][] {
-  const ways = to.map((one, k) => {
+  const distances = to.map((one, k) => {
     const { center } = from[k] ?? one;
     return Math.hypot(...one.center.map((x, i) => x - (center[i] ?? 0))) / Math.min(...lengthsOf(from[k] ?? one));
   });
-  const frames = Math.min(MOST_GLIDES, Math.max(1, Math.ceil(Math.max(0, ...ways) / GLIDE)));
+  const frames = Math.min(MAX_GLIDE_FRAMES, Math.max(1, Math.ceil(Math.max(0, ...distances) / GLIDE_STEP)));
   return Array.from({ length: frames }, (_, i) => to.map((one, k) => between(from[k] ?? one, one, (i + 1) / frames)));
 }
 

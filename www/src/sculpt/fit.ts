@@ -4,18 +4,18 @@ import type { Vec3 } from '../protocol';
 import { added, times } from './ellipsoids';
 
 /** Most ellipsoids in a row. */
-const MOST = 5;
+const MAX_ELLIPSOIDS = 5;
 /**
  * Semi-axes as a share of the width of a slice. If larger, the membrane bulges where the mesh is concave; if smaller,
  * it is slack.
  */
-const WITHIN = 0.9;
+const FILL = 0.9;
 /** Least semi-axis as a share of the size of the mesh; shorter ones would make needles. */
-const LEAST = 0.03;
+const MIN_SEMI_AXIS = 0.03;
 
 /**
  * Returns a row of ellipsoids from one end of the mesh to the other; their number is 1.5 times its length over its
- * width, within 1 and `MOST`.
+ * width, within 1 and `MAX_ELLIPSOIDS`.
  */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
@@ -25,19 +25,19 @@ export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const spans = [0, 1, 2].map((k) => spanOf(local, k));
   const [long = 1, ...others] = spans.map(([low, high]) => high - low);
   const size = Math.max(long, ...others);
-  const number = Math.min(MOST, Math.max(1, Math.round((1.5 * long) / Math.max(...others, 1e-9))));
+  const number = Math.min(MAX_ELLIPSOIDS, Math.max(1, Math.round((1.5 * long) / Math.max(...others, 1e-9))));
   const [low] = spans[0] ?? [0, 0];
   return Array.from({ length: number }, (_, slice) => {
     const [from, to] = [low + (slice * long) / number, low + ((slice + 1) * long) / number];
-    return ofSlice(local, [from, to], number === 1, LEAST * size);
+    return sliceEllipsoid(local, [from, to], number === 1, MIN_SEMI_AXIS * size);
   }).map(({ middle, halves }) => ({
     center: axes.reduce((sum, axis, k) => added(sum, times(axis, middle[k] ?? 0)), centroid),
     axes: axes.map((axis, k) => times(axis, halves[k] ?? 1)) as ControlEllipsoid['axes'],
   }));
 }
 
-/** Returns the centre and half widths of the vertices between two planes, `whole` if they are all of the mesh. */
-function ofSlice(local: Float32Array, [from, to]: [number, number], whole: boolean, least: number) {
+/** Returns the centre and half widths of the vertices between two planes, `isWhole` if they are all of the mesh. */
+function sliceEllipsoid(local: Float32Array, [from, to]: [number, number], isWhole: boolean, least: number) {
   const sums = [0, 0, 0, 0, 0];
   for (let i = 0; i < local.length; i += 3) {
     const [x = 0, y = 0, z = 0] = [local[i], local[i + 1], local[i + 2]];
@@ -49,8 +49,8 @@ function ofSlice(local: Float32Array, [from, to]: [number, number], whole: boole
   const [meanY, meanZ] = [y / count, z / count];
   // Along one coordinate, the points of a circle of radius r have a root mean square of r/√2, those of a sphere r/√3.
   const width = (squares: number, mean: number) =>
-    Math.max(least, WITHIN * Math.sqrt((whole ? 3 : 2) * Math.max(0, squares / count - mean * mean)));
-  const half = (WITHIN * (to - from)) / 2;
+    Math.max(least, FILL * Math.sqrt((isWhole ? 3 : 2) * Math.max(0, squares / count - mean * mean)));
+  const half = (FILL * (to - from)) / 2;
   const middle: Vec3 = [(from + to) / 2, meanY, meanZ];
   return { middle, halves: [half, width(yy, meanY), width(zz, meanZ)] as Vec3 };
 }

@@ -2,14 +2,14 @@
 
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
-import { noArrays, surfaceIn, texturedSurface } from '../worker/room';
+import { copySurface, emptyArrays, texturedSurface } from '../worker/surface-buffers';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
-import type { Facts, MeshSource, Pose, SceneSource, SculptShade, Setup } from './protocol';
+import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';
 import { computedMesh } from './shapes';
 
 /** The ellipsoid of a model that has neither a mesh nor ellipsoids: the membrane needs at least one. */
-const ALONE: Pose = [
+const DEFAULT_ELLIPSOIDS: Pose = [
   {
     center: [0, 0, 0],
     axes: [
@@ -48,18 +48,18 @@ export function freeScene({ detail, base }: Scene): void {
 }
 
 /** Scales tried for fitted ellipsoids: the largest for which a base can be built preserves the shape best. */
-const SIZES = [1, 0.8, 0.6, 0.4];
+const FIT_SCALES = [1, 0.8, 0.6, 0.4];
 
 /** Builds the first model of a scene; also returns the ellipsoids it starts with, given or fitted. */
 export function firstModel(scene: Scene, setup: Setup): { model: MultiresolutionModel; start: Pose } {
   const mesh = scene.detail ?? scene.base;
   if (setup.start || !mesh) {
-    const start = setup.start ?? ALONE;
+    const start = setup.start ?? DEFAULT_ELLIPSOIDS;
     return { model: buildModel(scene, start, setup), start };
   }
   const row = fitted(mesh);
   let refusal: unknown;
-  for (const size of SIZES) {
+  for (const size of FIT_SCALES) {
     const start = row.map((one) => scaled(one, [size, size, size]));
     try {
       return { model: buildModel(scene, start, setup), start };
@@ -82,7 +82,7 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
 
 /** Returns a copy of a mesh for the page to draw. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
-  const { uvs: _, ...surface } = surfaceIn(noArrays(), mesh);
+  const { uvs: _, ...surface } = copySurface(emptyArrays(), mesh);
   // Values computed for another mesh do not belong to these vertices.
   return values && values.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
 }
@@ -101,10 +101,10 @@ export function texturedSurfaceOf(mesh: Mesh): Surface {
  * Returns one value per vertex: curvature of the result, or distortion of the base as a power of two, 0 where there is
  * none.
  */
-export function valuesFor(model: MultiresolutionModel, shade: SculptShade): Float32Array {
-  if (shade === 'mean curvature') return model.mesh.curvature('mean');
+export function valuesFor(model: MultiresolutionModel, quantity: SculptQuantity): Float32Array {
+  if (quantity === 'mean curvature') return model.mesh.curvature('mean');
   const { area, angle } = model.distortion();
-  return (shade === 'area distortion' ? area : angle).map(Math.log2);
+  return (quantity === 'area distortion' ? area : angle).map(Math.log2);
 }
 
 /** Collects the facts about the correspondence and the detail that the page displays. */

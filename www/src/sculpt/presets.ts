@@ -1,4 +1,5 @@
 /** Presets of the Sculpt lab: the paper's figures, on meshes that are served with the page or computed in it. */
+import { text } from '../texts';
 import type { SculptViewOptions } from '../view/sculpture';
 import { ball, moved, samePose, scaled, turned, upright } from './ellipsoids';
 import { BUST, BUST_MESHES, BUST_NAMES, LAVA, LOOKING_ASIDE, NEFERTITI, SCENES, type SculptExample } from './examples';
@@ -20,13 +21,13 @@ export interface SculptVariant {
   params: ParamValues;
   /** Pose that the ellipsoids move to. */
   pose?: Pose;
-  came: string;
-  outcome?: SculptOutcome;
+  ourResult: string;
+  expected?: SculptOutcome;
 }
 
 /** A figure of the paper, as an example of the Sculpt lab. */
 export interface SculptPreset extends SculptExample {
-  saw: string;
+  paperResult: string;
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
   view?: Partial<SculptViewOptions>;
@@ -73,65 +74,65 @@ const BLOBS: Pose = [ball(-0.8, 0, 0, 1), ball(0.85, 0.35, 0, 0.75)];
 export const SCULPT_PRESETS: SculptPreset[] = [
   {
     id: 'figure-1',
-    name: 'Figure 1: original, base, link, and both deformed',
+    name: text('sculptPresets.figure1Name'),
     ...BUST_SCENE,
     layout: 'row',
     view: { ellipsoids: false },
-    saw: 'From S₁ and its low-frequency S₀ through the linking mesh T to the deformed S₀′ and S₁′: vertices of T lie on S₀, with the triangles of S₀′, so that λ is looked up where it belongs.',
+    paperResult: text('sculptPresets.figure1Paper'),
     variants: [
       {
         id: '1',
-        name: 'Figure 1',
+        name: text('sculptPresets.figure1PictureName'),
         params: {},
         pose: LOOKING_ASIDE,
-        came: 'Here a bust turns its head by 29° on a longer neck. T has no triangle turned over; its areas are 0.8 to 1.2 times those of S₀′, and brow, ears and collar stay where they belong.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.4, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure1PictureHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.4, 1], areaHigh: [1, 2.2] },
       },
     ],
-    hint: 'Colour by distortion: red where a piece of the base has shrunk, blue where it was stretched.',
+    hint: text('sculptPresets.figure1Hint'),
   },
   {
     id: 'figure-3',
-    name: 'Figure 3: why vertices have to be restructured',
+    name: text('sculptPresets.figure3Name'),
     ...BALL_SCENE,
     base: { shape: 'ball' },
     start: ONE_BALL,
     layout: 'stages',
-    credit: 'Computed: a ball whose cap is pulled out by nine tenths of its radius.',
-    saw: 'Moving some vertices distorts the triangles next to them. Refining everywhere does not help; restructuring gives triangles of good shape.',
+    credit: text('sculptPresets.figure3Credit'),
+    paperResult: text('sculptPresets.figure3Paper'),
     variants: [
       {
         id: '3',
-        name: 'Figure 3',
+        name: text('sculptPresets.figure3PictureName'),
         params: {},
-        came: 'Here a twentieth of the triangles is worse than 0.3, where 1 is equilateral. Refined everywhere there are three times as many, and as bad; restructured, with a tenth more triangles, a twentieth is worse than 0.6.',
+        ourResult: text('sculptPresets.figure3PictureHere'),
       },
     ],
     stages: 'restructuring',
   },
   {
     id: 'figure-6',
-    name: 'Figure 6: collapse, split, flip',
+    name: text('sculptPresets.figure6Name'),
     ...BALL_SCENE,
     base: { shape: 'ball' },
     start: ONE_BALL,
     layout: 'stages',
-    credit: 'Computed: the same ball as for figure 3.',
-    saw: 'The quality of a modified mesh (1) is improved by collapsing short edges (2), splitting long edges (3), and flipping edges where valences come nearer to six (4).',
+    credit: text('sculptPresets.figure6Credit'),
+    paperResult: text('sculptPresets.figure6Paper'),
     variants: [
       {
         id: '6',
-        name: 'Figure 6',
+        name: text('sculptPresets.figure6PictureName'),
         params: {},
-        came: 'Here one round leaves much to do: splits halve long triangles that are no better for it. After five rounds more the worst twentieth has gone from below 0.3 to below 0.6, where 1 is equilateral.',
+        ourResult: text('sculptPresets.figure6PictureHere'),
       },
     ],
-    hint: 'ε_min is 0.6 and ε_max 1.35 times the edge of the ball.',
+    hint: text('sculptPresets.figure6Hint'),
     stages: 'passes',
   },
   {
     id: 'figure-7',
-    name: 'Figure 7: a bubble as in a lava lamp',
+    name: text('sculptPresets.figure7Name'),
     up: 'y',
     start: poseAt(LAVA, 0),
     names: SCENES.find(({ id }) => id === 'lava')?.names ?? [],
@@ -139,113 +140,113 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     params: { edgeMin: 0.07, edgeMax: 0.16, topology: 'split-and-join' },
     color: 'plain',
     layout: 'result',
-    credit: 'Computed: five ellipsoids that rise and sink.',
-    saw: 'A skin around moving ellipsoids, restructured in each frame: triangles stay good however the bubble is stretched. It cannot part.',
+    credit: text('sculptPresets.figure7Credit'),
+    paperResult: text('sculptPresets.figure7Paper'),
     variants: [
       {
         id: '7',
-        name: 'Figure 7',
+        name: text('sculptPresets.figure7PictureName'),
         params: {},
-        came: 'Here the blobs part from each other and join again: the number of components changes on the way, and no triangle crosses another.',
+        ourResult: text('sculptPresets.figure7PictureHere'),
       },
     ],
-    hint: 'Set “Necks and contacts” to “never” for what the paper shows: threads between the blobs.',
+    hint: text('sculptPresets.figure7Hint'),
     view: { edges: true },
   },
   {
     id: 'figure-8',
-    name: 'Figure 8: levels of the solver',
+    name: text('sculptPresets.figure8Name'),
     ...BALL_SCENE,
     start: BLOBS,
-    names: ['large', 'small'],
+    names: [text('sculptPresets.large'), text('sculptPresets.small')],
     layout: 'levels',
     params: { edgeMin: 0.05, edgeMax: 0.115, levels: 2, refineFactor: 0.5 },
-    credit: 'Computed: a skin around two ellipsoids.',
-    saw: 'Meshes of the multi-level solver, with ε_min and ε_max halved from one to the next: none is a refinement of the one before.',
+    credit: text('sculptPresets.figure8Credit'),
+    paperResult: text('sculptPresets.figure8Paper'),
     variants: [
       {
         id: '8',
-        name: 'Figure 8',
+        name: text('sculptPresets.figure8PictureName'),
         params: { edgeMin: 0.05, edgeMax: 0.115, levels: 2, refineFactor: 0.5 },
-        came: 'Here three levels, each with about four times the triangles of the one before: pulls cross the coarsest in a few iterations.',
-        outcome: { components: [1, 1], folded: [0, 0] },
+        ourResult: text('sculptPresets.figure8PictureHere'),
+        expected: { components: [1, 1], folded: [0, 0] },
       },
     ],
   },
   {
     id: 'figure-9',
-    name: 'Figure 9: a head deformed, with its detail',
+    name: text('sculptPresets.figure9Name'),
     ...BUST_SCENE,
     layout: 'pair',
     view: { ellipsoids: false },
-    saw: 'A head over a sphere as its base: after each modification, wireframe of the deformed base and the head with its detail. Detail stays where it belongs.',
+    paperResult: text('sculptPresets.figure9Paper'),
     variants: [
       {
         id: '9a',
-        name: 'a: a long neck',
+        name: text('sculptPresets.figure9aName'),
         params: {},
         pose: LONG_NECK,
-        came: 'Here a bust in place of the head, as the model cannot be passed on, over its own smooth base. The neck is drawn out evenly; above the brow, where the base is hollow, detail is held back and a slit shows.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9aHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
       {
         id: '9b',
-        name: 'b: a wide crown',
+        name: text('sculptPresets.figure9bName'),
         params: {},
         pose: WIDE_CROWN,
-        came: 'Here the crown is 1.45 times as wide. Its detail is as deep as before: λ is a length, and does not grow with the base.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9bHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
       {
         id: '9c',
-        name: 'c: looking aside',
+        name: text('sculptPresets.figure9cName'),
         params: {},
         pose: LOOKING_ASIDE,
-        came: 'Here the head is turned by 29°, and the neck takes the turn up along its whole length.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9cHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
     ],
   },
   {
     id: 'figure-10',
-    name: 'Figure 10: a textured globe',
+    name: text('sculptPresets.figure10Name'),
     base: { shape: 'globe' },
     up: 'y',
     start: GLOBE_START,
-    names: ['west', 'middle', 'east'],
+    names: [text('sculptPresets.west'), text('sculptPresets.middle'), text('sculptPresets.east')],
     params: {},
     color: 'texture',
     layout: 'pair',
     view: { ellipsoids: false },
-    credit: 'Computed: a ball and a map drawn for this page.',
-    saw: 'A textured sphere deformed by ellipsoids, with a grid of longitude and latitude: cells of the grid stay nearly square, since T distorts little.',
+    credit: text('sculptPresets.figure10Credit'),
+    paperResult: text('sculptPresets.figure10Paper'),
     variants: [
       {
         id: '10a',
-        name: 'a: two balls',
+        name: text('sculptPresets.figure10aName'),
         params: {},
         pose: APART,
-        came: 'Here cells are larger on the large ball and smaller on the small one, and still have right angles.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10aHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [0.7, 3] },
       },
       {
         id: '10b',
-        name: 'b: a lens',
+        name: text('sculptPresets.figure10bName'),
         params: {},
         pose: LENS,
-        came: 'Here the poles are pressed flat: cells widen towards the rim.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10bHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
       },
       {
         id: '10c',
-        name: 'c: a bow',
+        name: text('sculptPresets.figure10cName'),
         params: {},
         pose: BOW,
-        came: 'Here three ellipsoids bend it. Where it is hollow cells are narrow, and outside they are wide.',
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10cHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
       },
     ],
-    hint: 'Colour by distortion of angles to see where cells are no squares any more.',
+    hint: text('sculptPresets.figure10Hint'),
   },
 ];
 

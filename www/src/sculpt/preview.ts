@@ -1,9 +1,9 @@
 import type { MultiresolutionModel, MultiresParams } from 'vesicle';
 
 /** Milliseconds that a frame may take during a drag; after a slower one the preview uses longer edges. */
-const SLOW = 60;
+const SLOW_FRAME_MS = 60;
 /** Factor of the edge lengths of the preview: 2 means a quarter of the triangles. */
-const COARSER = 2;
+const EDGE_FACTOR = 2;
 
 /**
  * Reduces the model's resolution during motion: the result is no finer than the base surface and, during a drag with
@@ -11,36 +11,36 @@ const COARSER = 2;
  */
 export class Preview {
   /** Set values of the parameters that the preview has changed. */
-  #fine: MultiresParams | undefined;
+  #saved: MultiresParams | undefined;
   #coarse = false;
 
   get on(): boolean {
-    return this.#fine !== undefined;
+    return this.#saved !== undefined;
   }
 
-  /** Adjusts the model before a step; `took` is the duration of the last step in milliseconds. */
-  prepare(model: MultiresolutionModel, motion: 'none' | 'course' | 'hand', took: number): void {
+  /** Adjusts the model before a step; `durationMs` is the duration of the last step in milliseconds. */
+  prepare(model: MultiresolutionModel, motion: 'none' | 'path' | 'drag', durationMs: number): void {
     if (motion === 'none') this.end(model);
-    else if (motion === 'hand' && !this.#coarse && took > SLOW) this.#coarsen(model);
-    else if (!this.#fine && model.params.supersample > 0) this.#change(model, { supersample: 0 });
+    else if (motion === 'drag' && !this.#coarse && durationMs > SLOW_FRAME_MS) this.#coarsen(model);
+    else if (!this.#saved && model.params.supersample > 0) this.#change(model, { supersample: 0 });
   }
 
   /** Restores the set parameters. */
   end(model: MultiresolutionModel): void {
-    if (this.#fine) model.setParams(this.#fine);
-    this.#fine = undefined;
+    if (this.#saved) model.setParams(this.#saved);
+    this.#saved = undefined;
     this.#coarse = false;
   }
 
   #coarsen(model: MultiresolutionModel): void {
     const { edgeMin, edgeMax } = model.params;
     this.#coarse = true;
-    this.#change(model, { edgeMin: COARSER * edgeMin, edgeMax: COARSER * edgeMax, supersample: 0 });
+    this.#change(model, { edgeMin: EDGE_FACTOR * edgeMin, edgeMax: EDGE_FACTOR * edgeMax, supersample: 0 });
   }
 
   #change(model: MultiresolutionModel, params: MultiresParams): void {
     const { edgeMin, edgeMax, supersample } = model.params;
     model.setParams(params);
-    this.#fine = { edgeMin, edgeMax, supersample, ...this.#fine };
+    this.#saved = { edgeMin, edgeMax, supersample, ...this.#saved };
   }
 }

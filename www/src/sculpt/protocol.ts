@@ -66,7 +66,7 @@ export interface Ready {
   pose: Pose;
 }
 
-export interface Opened extends Ready {
+export interface OpenedScene extends Ready {
   box: { min: Vec3; max: Vec3 };
   /** Number of triangles of the detailed surface; undefined if there is none. */
   detail: number | undefined;
@@ -74,7 +74,7 @@ export interface Opened extends Ready {
   /** The texture of the surface, if it has one. */
   texture: MeshTexture | undefined;
   /** Milliseconds spent building the model, most of them for its base. */
-  made: number;
+  buildMs: number;
 }
 
 /**
@@ -93,12 +93,12 @@ export interface Stage {
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
-export type SculptShade = 'area distortion' | 'angle distortion' | 'mean curvature';
+export type SculptQuantity = 'area distortion' | 'angle distortion' | 'mean curvature';
 
 /** Data requested for each frame. */
-export interface Shown {
+export interface FrameContents {
   layout: Layout;
-  shade: SculptShade | undefined;
+  quantity: SculptQuantity | undefined;
   /** Whether the surface is sent with texture coordinates. */
   textured: boolean;
 }
@@ -127,7 +127,7 @@ export interface Facts {
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens meshes and builds a model of them. On failure, the previous model stays. */
-  open: { body: { source: SceneSource; setup: Setup }; reply: Opened };
+  open: { body: { source: SceneSource; setup: Setup }; reply: OpenedScene };
   /** Builds a new model of the same meshes. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   /** Loads a film at a frame, without playing it. */
@@ -142,7 +142,7 @@ export interface Requests {
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
-  show: { body: Shown; reply: undefined };
+  show: { body: FrameContents; reply: undefined };
   /** The undeformed base and the detailed surface, as given. */
   originals: { body: undefined; reply: { base: Surface; detail: Surface | undefined } };
   /** Saves the present state of the model, also while it is running. */
@@ -167,7 +167,7 @@ export interface PoseMessage {
   kind: 'pose';
   pose: Pose;
   /** Number of the pose; frames report the number of the last one they follow. */
-  turn: number;
+  poseId: number;
   /** Whether the pose is part of a drag that continues. */
   dragging: boolean;
 }
@@ -188,16 +188,16 @@ export interface FrameEvent {
   /** Target pose. */
   pose: Pose;
   /** Number of the last pose received before this step. */
-  turn: number;
+  poseId: number;
   /** Frame of the film. */
   frame: number;
   /** Duration of the step in milliseconds. */
-  took: number;
+  durationMs: number;
   /**
    * Whether the frame is a preview: its detail is reduced and, after slow frames of a drag, its edges are twice as long
    * as set.
    */
-  coarse: boolean;
+  preview: boolean;
 }
 /** Measures and facts, sent when the model has converged or was stopped. */
 export interface MeasuredEvent {
@@ -212,8 +212,14 @@ export interface RefusedEvent {
   pose: Pose;
 }
 /** Progress of a recording, 0 to 1. */
-export interface RecordedEvent {
+export interface RecordingProgressEvent {
   event: 'recorded';
-  part: number;
+  progress: number;
 }
-export type WorkerEvent = RecordedEvent | FrameEvent | MeasuredEvent | RefusedEvent | StateEvent | FailureEvent;
+export type WorkerEvent =
+  | RecordingProgressEvent
+  | FrameEvent
+  | MeasuredEvent
+  | RefusedEvent
+  | StateEvent
+  | FailureEvent;

@@ -17,7 +17,7 @@ export async function recorded(
   film: Film,
   frameSeconds: number,
   signal: AbortSignal,
-  tell: (part: number) => void,
+  onProgress: (part: number) => void,
 ): Promise<Uint8Array | undefined> {
   const frames: Mesh[] = [];
   const last = lastFrame(film) - (film.loop ? 1 : 0);
@@ -28,7 +28,7 @@ export async function recorded(
       model.setEllipsoids(poseAt(film, frame));
       model.step(1);
       frames.push(model.mesh.clone());
-      tell((frame + 1) / (last + 2));
+      onProgress((frame + 1) / (last + 2));
       if (await isCancelled(signal)) return undefined;
     }
     return animationGlb(frames, { frameSeconds });

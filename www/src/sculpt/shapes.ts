@@ -26,7 +26,7 @@ export function plainMesh(shape: ComputedMesh): Mesh {
 function globeAsObj(): Uint8Array {
   const lines: string[] = [];
   const rings = CIRCLES + 1;
-  for (let ring = 1; ring < rings; ring++) for (let m = 0; m < MERIDIANS; m++) lines.push(place(ring, m, rings));
+  for (let ring = 1; ring < rings; ring++) for (let m = 0; m < MERIDIANS; m++) lines.push(vertexLine(ring, m, rings));
   lines.push('v 0 1 0', 'v 0 -1 0');
   for (let ring = 0; ring <= rings; ring++)
     for (let m = 0; m <= MERIDIANS; m++) lines.push(`vt ${m / MERIDIANS} ${1 - ring / rings}`);
@@ -42,10 +42,10 @@ function globeAsObj(): Uint8Array {
   return new TextEncoder().encode(`${lines.join('\n')}\n`);
 }
 
-function place(ring: number, m: number, rings: number): string {
-  const [down, around] = [(Math.PI * ring) / rings, (2 * Math.PI * m) / MERIDIANS];
-  const out = Math.sin(down);
-  return `v ${-out * Math.cos(around)} ${Math.cos(down)} ${out * Math.sin(around)}`;
+function vertexLine(ring: number, m: number, rings: number): string {
+  const [colatitude, longitude] = [(Math.PI * ring) / rings, (2 * Math.PI * m) / MERIDIANS];
+  const out = Math.sin(colatitude);
+  return `v ${-out * Math.cos(longitude)} ${Math.cos(colatitude)} ${out * Math.sin(longitude)}`;
 }
 
 function vertex(ring: number, m: number, rings: number, north: number): number {

@@ -1,16 +1,18 @@
 /** Rows of meshes to compare: levels of the solver, and stages of restructuring. Used by the worker only. */
+
 import { Mesh, type MultiresolutionModel } from 'vesicle';
+import { text } from '../texts';
 import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
 /** Most meshes in a row. */
-const MOST = 5;
+const MAX_MESHES = 5;
 
 /** Returns the meshes that the membrane was solved on, from coarse to fine; the finest ones if there are too many. */
 export function levelsOf(model: MultiresolutionModel): Stage[] {
   const levels = model.levelMeshes();
   try {
-    return levels.slice(-MOST).map((mesh) => ({ caption: sizeOf(mesh), surface: surfaceOf(mesh) }));
+    return levels.slice(-MAX_MESHES).map((mesh) => ({ caption: sizeOf(mesh), surface: surfaceOf(mesh) }));
   } finally {
     for (const mesh of levels) mesh.free();
   }
@@ -18,22 +20,25 @@ export function levelsOf(model: MultiresolutionModel): Stage[] {
 
 function sizeOf(mesh: Mesh): string {
   const { edge, triangles } = mesh.info();
-  return `${triangles} triangles, mean edge ${edge.mean.toPrecision(2)}`;
+  return text('sculpt.stageSize', { triangles, edge: edge.mean.toPrecision(2) });
 }
 
 /**
- * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST` of them falls below; 1
+ * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST_SHARE` of them falls below; 1
  * is equilateral.
  */
-function staged(mesh: Mesh, what: string): Stage {
+function withCaption(mesh: Mesh, name: string): Stage {
   const surface = surfaceOf(mesh);
   const shapes = shapesOf(surface).sort();
-  const worst = shapes[Math.floor(WORST * shapes.length)] ?? 0;
-  return { caption: `${what}: ${mesh.triangleCount} triangles, the worst below ${worst.toFixed(2)}`, surface };
+  const worst = shapes[Math.floor(WORST_SHARE * shapes.length)] ?? 0;
+  return {
+    caption: text('sculpt.stageQuality', { name: name, triangles: mesh.triangleCount, quality: worst.toFixed(2) }),
+    surface,
+  };
 }
 
 /** Share of the triangles that are counted as the worst. */
-const WORST = 0.05;
+const WORST_SHARE = 0.05;
 
 /**
  * Returns the quality of each triangle: its area over that of an equilateral triangle with the same mean squared edge
@@ -86,7 +91,11 @@ function restructured(mesh: Mesh): Stage[] {
   try {
     refined.refine();
     for (let round = 0; round < ROUNDS; round++) good.restructure(BOUNDS);
-    return [staged(mesh, 'Moved'), staged(refined, 'Refined everywhere'), staged(good, 'Restructured')];
+    return [
+      withCaption(mesh, text('sculpt.stageDeformed')),
+      withCaption(refined, text('sculpt.stageRefined')),
+      withCaption(good, text('sculpt.stageRestructured')),
+    ];
   } finally {
     refined.free();
     good.free();
@@ -102,17 +111,17 @@ const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();
   try {
-    const stages = [staged(at, '1 Moved')];
+    const stages = [withCaption(at, text('sculpt.passDeformed'))];
     for (const [pass, name] of [
-      ['collapse', '2 Collapsed'],
-      ['split', '3 Split'],
-      ['flip', '4 Flipped'],
+      ['collapse', text('sculpt.passCollapsed')],
+      ['split', text('sculpt.passSplit')],
+      ['flip', text('sculpt.passFlipped')],
     ] as const) {
       at.restructure(BOUNDS, [pass]);
-      stages.push(staged(at, name));
+      stages.push(withCaption(at, name));
     }
     for (let round = 1; round < ROUNDS; round++) at.restructure(BOUNDS);
-    return [...stages, staged(at, `${ROUNDS} rounds`)];
+    return [...stages, withCaption(at, text('sculpt.passRounds', { rounds: ROUNDS }))];
   } finally {
     at.free();
   }

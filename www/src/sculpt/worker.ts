@@ -1,9 +1,10 @@
 /** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
+
 import init, { paramSpecs, type StepReport, version } from 'vesicle';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { transferOf } from '../worker/room';
-import { answer, stop, type Work } from '../worker/serving';
-import { Course } from './course';
+import { reply, stop, type Task } from '../worker/serving';
+import { transferOf } from '../worker/surface-buffers';
 import {
   buildModel,
   factsOf,
@@ -17,8 +18,9 @@ import {
 } from './model';
 import { Preview } from './preview';
 import type {
+  FrameContents,
   FrameEvent,
-  Opened,
+  OpenedScene,
   ParamValues,
   Pose,
   PoseMessage,
@@ -27,12 +29,12 @@ import type {
   Requests,
   SavedPose,
   Setup,
-  Shown,
   ToWorker,
   WorkerEvent,
 } from './protocol';
 import { recorded } from './recording';
 import { levelsOf, stagesOf } from './stages';
+import { TargetPath } from './target-path';
 
 type Model = ReturnType<typeof buildModel>;
 type Handlers = {
@@ -48,18 +50,18 @@ class Session {
   #model: Model | undefined;
   #preview = new Preview();
   #start: Pose = [];
-  #view: Shown = { layout: 'result', shade: undefined, textured: false };
-  readonly #course = new Course();
+  #view: FrameContents = { layout: 'result', quantity: undefined, textured: false };
+  readonly #path = new TargetPath();
   #dragging = false;
-  #turn = 0;
+  #poseId = 0;
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #last: StepReport | undefined;
-  #took = 0;
+  #durationMs = 0;
   /** Whether the page has drawn the last frame it was sent. */
   #shown = true;
-  #run: Work | undefined;
-  #recording: Work | undefined;
+  #run: Task | undefined;
+  #recording: Task | undefined;
   /** Resumes a run that waits for the page or for a new pose. */
   #wake: () => void = () => undefined;
 
@@ -71,7 +73,7 @@ class Session {
     open: (body) => this.#open(body),
     rebuild: (setup) => this.#rebuild(setup),
     film: ({ film, frame }) => {
-      this.#course.setFilm(film, frame);
+      this.#path.setFilm(film, frame);
       return undefined;
     },
     play: () => this.#play(),
@@ -95,22 +97,22 @@ class Session {
   }
 
   /** Takes a target pose at once, so that the next step uses the newest one; starts a run if none is active. */
-  pose({ pose, turn, dragging }: PoseMessage): void {
+  pose({ pose, poseId, dragging }: PoseMessage): void {
     if (!this.#model) return;
     try {
-      if (dragging) this.#course.goTo(this.#model, pose);
-      else this.#course.glideTo(this.#model, pose);
+      if (dragging) this.#path.jumpTo(this.#model, pose);
+      else this.#path.glideTo(this.#model, pose);
     } catch (error) {
-      send({ event: 'refused', failure: toFailure(error), pose: this.#course.goalOf(this.#model) });
+      send({ event: 'refused', failure: toFailure(error), pose: this.#path.finalTarget(this.#model) });
     }
-    this.#turn = turn;
+    this.#poseId = poseId;
     this.#dragging = dragging;
     this.#last = undefined;
     if (this.#run) this.#wake();
     else this.#begin();
   }
 
-  async #open({ source, setup }: Requests['open']['body']): Promise<Opened> {
+  async #open({ source, setup }: Requests['open']['body']): Promise<OpenedScene> {
     await stop(this.#run);
     await stop(this.#recording);
     const scene = await sceneFrom(source);
@@ -123,7 +125,7 @@ class Session {
       const { bandCount: bands, mesh } = this.#current();
       const detail = scene.detail?.triangleCount;
       const { texture } = mesh;
-      return { ...ready, box: mesh.info().bounds, detail, bands, texture, made: performance.now() - began };
+      return { ...ready, box: mesh.info().bounds, detail, bands, texture, buildMs: performance.now() - began };
     } catch (error) {
       freeScene(scene);
       throw error;
@@ -142,9 +144,9 @@ class Session {
     this.#start = start;
     this.#preview = new Preview();
     this.#dragging = false;
-    this.#course.rewind(0);
+    this.#path.rewind(0);
     this.#forget();
-    if (pose) this.#course.glideTo(model, pose);
+    if (pose) this.#path.glideTo(model, pose);
     return { params: { ...model.params }, start, pose: pose ?? start };
   }
 
@@ -156,13 +158,13 @@ class Session {
   }
 
   #current(): Model {
-    if (!this.#model) throw new Refusal('invalid-argument', 'nothing is open: open a mesh first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('sculpt.noMesh'));
     return this.#model;
   }
 
   #play(): undefined {
     this.#current();
-    this.#course.play();
+    this.#path.play();
     this.#last = undefined;
     this.#begin();
   }
@@ -189,7 +191,7 @@ class Session {
       queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
-    this.#course.stop();
+    this.#path.stop();
     this.#standStill();
   }
 
@@ -209,7 +211,7 @@ class Session {
   }
 
   #isAtRest(): boolean {
-    return this.#last?.done === true && !this.#course.isUnderWay && !(this.#preview.on && !this.#dragging);
+    return this.#last?.done === true && !this.#path.isUnderWay && !(this.#preview.on && !this.#dragging);
   }
 
   async #until(holds: () => boolean, signal: AbortSignal): Promise<void> {
@@ -223,28 +225,28 @@ class Session {
   /** Does one step of the model, and of the film while it plays. */
   #next(): void {
     const model = this.#current();
-    this.#course.next(model);
-    this.#preview.prepare(model, this.#motion(), this.#took);
+    this.#path.next(model);
+    this.#preview.prepare(model, this.#motion(), this.#durationMs);
     const began = performance.now();
     const report = model.step(1);
-    this.#took = performance.now() - began;
+    this.#durationMs = performance.now() - began;
     if (report.iteration !== this.#last?.iteration) this.#reports.push(report);
     this.#last = report;
   }
 
-  #motion(): 'none' | 'course' | 'hand' {
-    if (this.#dragging) return 'hand';
-    return this.#course.isUnderWay || !this.#last?.done ? 'course' : 'none';
+  #motion(): 'none' | 'path' | 'drag' {
+    if (this.#dragging) return 'drag';
+    return this.#path.isUnderWay || !this.#last?.done ? 'path' : 'none';
   }
 
   async #steps(count: number): Promise<undefined> {
     await stop(this.#run);
     for (let i = 0; i < count; i++) {
-      this.#course.playOne();
+      this.#path.playOne();
       if (this.#isAtRest()) break;
       this.#next();
     }
-    this.#course.stop();
+    this.#path.stop();
     this.#preview.end(this.#current());
     this.#sendFrame();
     this.#standStill();
@@ -267,15 +269,15 @@ class Session {
     return { ...model.params };
   }
 
-  #show(view: Shown): undefined {
+  #show(view: FrameContents): undefined {
     this.#view = view;
     if (!this.#run && this.#model) this.#sendFrame();
   }
 
   #sendFrame(): void {
     const model = this.#current();
-    const { layout, shade, textured } = this.#view;
-    const values = shade && valuesFor(model, shade);
+    const { layout, quantity, textured } = this.#view;
+    const values = quantity && valuesFor(model, quantity);
     const result = textured ? texturedSurfaceOf(model.mesh) : surfaceOf(model.mesh, values);
     const frame: FrameEvent = {
       event: 'frame',
@@ -285,8 +287,8 @@ class Session {
       ...(layout === 'levels' && { levels: levelsOf(model) }),
       reports: this.#reports,
       ellipsoids: model.ellipsoids,
-      pose: this.#course.goalOf(model),
-      ...{ turn: this.#turn, frame: this.#course.frame, took: this.#took, coarse: this.#preview.on },
+      pose: this.#path.finalTarget(model),
+      ...{ poseId: this.#poseId, frame: this.#path.frame, durationMs: this.#durationMs, preview: this.#preview.on },
     };
     this.#reports = [];
     this.#shown = false;
@@ -311,11 +313,13 @@ class Session {
     await stop(this.#run);
     await stop(this.#recording);
     const model = this.#current();
-    const { film } = this.#course;
-    if (!film) throw new Refusal('invalid-argument', 'there is no film: add two keyframes first');
+    const { film } = this.#path;
+    if (!film) throw new Refusal('invalid-argument', text('sculpt.noFilm'));
     const before = model.save();
     const abort = new AbortController();
-    const result = recorded(model, film, frameSeconds, abort.signal, (part) => send({ event: 'recorded', part }));
+    const result = recorded(model, film, frameSeconds, abort.signal, (progress) =>
+      send({ event: 'recorded', progress }),
+    );
     this.#recording = { abort, ended: result };
     try {
       return await result;
@@ -327,7 +331,7 @@ class Session {
 
   #save(): SavedPose {
     this.#preview.end(this.#current());
-    return { state: this.#current().save(), iteration: this.#last?.iteration ?? 0, frame: this.#course.frame };
+    return { state: this.#current().save(), iteration: this.#last?.iteration ?? 0, frame: this.#path.frame };
   }
 
   async #restore({ state, frame }: SavedPose): Promise<Ready> {
@@ -335,7 +339,7 @@ class Session {
     const model = this.#current();
     model.restore(state);
     this.#preview = new Preview();
-    this.#course.rewind(frame);
+    this.#path.rewind(frame);
     this.#forget();
     return { params: { ...model.params }, start: this.#start, pose: model.targets };
   }
@@ -350,5 +354,5 @@ const session = new Session();
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'shown') session.shown();
   else if (data.kind === 'pose') session.pose(data);
-  else void answer(session.handlers, data);
+  else void reply(session.handlers, data);
 };

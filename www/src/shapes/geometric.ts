@@ -7,7 +7,7 @@ const RING_RADIUS = 15;
 const TUBE_RADIUS = 5.5;
 /** The same radii for the chain. */
 const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
-/** Number of empty voxels around the sponge. */
+/** Width of the empty margin on each side of the sponge, voxels. */
 const SPONGE_MARGIN = 4;
 
 /** Two linked rings: two components of genus 1. */

@@ -1,5 +1,5 @@
 /** A head phantom similar to a CT: skin around soft tissue, and in it a skull with openings around a brain. */
-import { noise, type ShapeVoxels, sample, soft } from './sampling';
+import { noise, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 const SIZE = 112;
 const MIDDLE = (SIZE - 1) / 2;
@@ -28,7 +28,7 @@ export function headPhantom(): ShapeVoxels {
     const skin = depthInEllipsoid(at, SKIN);
     const outside = depthInEllipsoid(at, SKULL);
     const bone = Math.min(outside, THICKNESS - outside, -depthInOpenings(at));
-    return SOFT_TISSUE * soft(skin) + (BONE - SOFT_TISSUE) * soft(bone) + grain();
+    return SOFT_TISSUE * smoothStep(skin) + (BONE - SOFT_TISSUE) * smoothStep(bone) + grain();
   });
 }
 

@@ -50,6 +50,6 @@ export function distance(a: Point, b: Point): number {
 /**
  * Smooth step from 0 (outside) to 1 (inside), ½ at the border; `depth` in voxels, positive inside, over three voxels.
  */
-export function soft(depth: number): number {
+export function smoothStep(depth: number): number {
   return Math.min(1, Math.max(0, 0.5 + depth / 3));
 }

@@ -1,5 +1,5 @@
 /** A tree of bright vessels on a dark background, similar to an angiography. */
-import { distance, noise, random, type ShapeVoxels, sample, soft } from './sampling';
+import { distance, noise, random, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 type Point = [number, number, number];
 
@@ -90,7 +90,7 @@ function draw({ from, to, radius }: Segment, strength: Float32Array): void {
         const t = Math.min(1, Math.max(0, along / length));
         const nearest = from.map((x, axis) => x + t * ((to[axis] ?? 0) - x)) as Point;
         const at = i + SIZE * (j + SIZE * k);
-        strength[at] = Math.max(strength[at] ?? 0, soft(radius - distance([i, j, k], nearest)));
+        strength[at] = Math.max(strength[at] ?? 0, smoothStep(radius - distance([i, j, k], nearest)));
       }
     }
   }

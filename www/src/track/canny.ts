@@ -15,14 +15,14 @@ export interface CannySettings {
 }
 
 /** A greyscale image, row by row. */
-export interface Picture {
+export interface GreyImage {
   width: number;
   height: number;
   values: ArrayLike<number>;
 }
 
 /** Returns the edge map of a picture: 1 for each edge pixel, else 0. */
-export function canny(picture: Picture, { deviation, low, high }: CannySettings): Uint8Array {
+export function canny(picture: GreyImage, { deviation, low, high }: CannySettings): Uint8Array {
   const { width, height } = picture;
   const smooth = smoothed(picture, deviation);
   const at = (x: number, y: number) => smooth[clamp(y, height) * width + clamp(x, width)] ?? 0;
@@ -35,7 +35,7 @@ export function canny(picture: Picture, { deviation, low, high }: CannySettings)
     for (let x = 0; x < width; x++) {
       const [dx, dy] = slope(x, y);
       const here = slopes[y * width + x] ?? 0;
-      const [ahead, behind] = [1, -1].map((way) => along(slopes, width, height, x, y, dx, dy, way));
+      const [ahead, behind] = [1, -1].map((direction) => along(slopes, width, height, x, y, dx, dy, direction));
       // Strict on one side only, so that one of two equal neighbours is kept.
       if (here > (ahead ?? 0) && here >= (behind ?? 0)) ridge[y * width + x] = 1;
     }
@@ -53,10 +53,10 @@ function along(
   y: number,
   dx: number,
   dy: number,
-  way: number,
+  direction: number,
 ): number {
   const size = Math.max(Math.abs(dx), Math.abs(dy)) || 1;
-  const [toX, toY] = [x + (way * dx) / size, y + (way * dy) / size];
+  const [toX, toY] = [x + (direction * dx) / size, y + (direction * dy) / size];
   const [x0, y0] = [Math.floor(toX), Math.floor(toY)];
   const [u, v] = [toX - x0, toY - y0];
   const at = (i: number, j: number) => slopes[clamp(j, height) * width + clamp(i, width)] ?? 0;
@@ -75,28 +75,28 @@ function connected(
   high: number,
 ): Uint8Array {
   const edges = new Uint8Array(width * height);
-  const open: number[] = [];
-  const take = (i: number, least: number) => {
+  const stack: number[] = [];
+  const push = (i: number, least: number) => {
     if (!ridge[i] || edges[i] || (slopes[i] ?? 0) < least) return;
     edges[i] = 1;
-    open.push(i);
+    stack.push(i);
   };
   for (let i = 0; i < edges.length; i++) {
-    take(i, high);
-    for (let from = open.pop(); from !== undefined; from = open.pop()) {
+    push(i, high);
+    for (let from = stack.pop(); from !== undefined; from = stack.pop()) {
       const [x, y] = [from % width, Math.floor(from / width)];
       for (let j = Math.max(0, y - 1); j <= Math.min(height - 1, y + 1); j++)
-        for (let k = Math.max(0, x - 1); k <= Math.min(width - 1, x + 1); k++) take(j * width + k, low);
+        for (let k = Math.max(0, x - 1); k <= Math.min(width - 1, x + 1); k++) push(j * width + k, low);
     }
   }
   return edges;
 }
 
 /** Convolves with a Gaussian, first along rows, then along columns; the border is padded with the nearest values. */
-function smoothed({ width, height, values }: Picture, deviation: number): Float32Array {
-  const reach = Math.ceil(3 * deviation);
-  const kernel = Array.from({ length: 2 * reach + 1 }, (_, i) =>
-    Math.exp(-((i - reach) ** 2) / (2 * deviation ** 2 || 1)),
+function smoothed({ width, height, values }: GreyImage, deviation: number): Float32Array {
+  const radius = Math.ceil(3 * deviation);
+  const kernel = Array.from({ length: 2 * radius + 1 }, (_, i) =>
+    Math.exp(-((i - radius) ** 2) / (2 * deviation ** 2 || 1)),
   );
   const sum = kernel.reduce((a, b) => a + b, 0);
   const pass = (from: ArrayLike<number>, stepX: number, stepY: number) => {
@@ -105,7 +105,7 @@ function smoothed({ width, height, values }: Picture, deviation: number): Float3
       for (let x = 0; x < width; x++) {
         let total = 0;
         for (const [i, weight] of kernel.entries()) {
-          const [atX, atY] = [clamp(x + (i - reach) * stepX, width), clamp(y + (i - reach) * stepY, height)];
+          const [atX, atY] = [clamp(x + (i - radius) * stepX, width), clamp(y + (i - radius) * stepY, height)];
           total += weight * (from[atY * width + atX] ?? 0);
         }
         out[y * width + x] = total / sum;

@@ -18,11 +18,11 @@ const BLOOD = 200;
 const MUSCLE = 90;
 const LUNG = 45;
 /** Long half axis, mm, that the other lengths in this file refer to. */
-const UNIT = 42;
+const REFERENCE_HALF_AXIS = 42;
 /** Samples through the thickness of a slice, averaged for the partial volume effect. */
 const SAMPLES = 3;
-/** Edge of the cells that the true volume is integrated over, mm for a heart of half axis `UNIT`. */
-const CELL = 1.5;
+/** Edge of the cells that the true volume is integrated over, mm for a heart of half axis `REFERENCE_HALF_AXIS`. */
+const INTEGRATION_STEP = 1.5;
 
 /** Returns the contraction in a frame: 0 in diastole, 1 in systole. */
 export function contraction({ frames }: CineSpec, frame: number): number {
@@ -32,16 +32,16 @@ export function contraction({ frames }: CineSpec, frame: number): number {
 }
 
 /** Returns the centre of the image in world coordinates, where the ventricle lies. */
-export function middleOf({ dims, spacing }: CineSpec): Vec3 {
+export function centreOf({ dims, spacing }: CineSpec): Vec3 {
   return dims.map((n, k) => ((n - 1) / 2) * (spacing[k] ?? 1)) as Vec3;
 }
 
 /** Returns approximate signed distances of a point to the cavity and to the heart; negative inside. */
 function distances(spec: CineSpec, at: Vec3, contracted: number): [number, number] {
-  const unit = spec.size / UNIT;
-  const middle = middleOf(spec);
+  const unit = spec.size / REFERENCE_HALF_AXIS;
+  const middle = centreOf(spec);
   const p = at.map((x, k) => (x - (middle[k] ?? 0)) / unit) as Vec3;
-  const [wide, long] = [25 * (1 - 0.34 * contracted), UNIT * (1 - 0.1 * contracted)];
+  const [wide, long] = [25 * (1 - 0.34 * contracted), REFERENCE_HALF_AXIS * (1 - 0.1 * contracted)];
   const base = 20 - 6 * contracted;
   let cavity = smoothMax(ellipsoid(p, [wide, wide, long]), p[2] - base, 3);
   const thick = 9 + 4 * contracted;
@@ -91,25 +91,25 @@ export function cineVoxels(spec: CineSpec): Uint8Array {
 function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
   const { spacing } = spec;
   const at = (off: number): Vec3 => [index[0] * spacing[0], index[1] * spacing[1], (index[2] + off) * spacing[2]];
-  const shade = ([cavity, heart]: [number, number]) => {
-    const share = (d: number) => Math.min(1, Math.max(0, 0.5 - d / spacing[0]));
-    const around = LUNG + (MUSCLE - LUNG) * share(heart);
-    return around + (BLOOD - around) * share(cavity);
+  const blend = ([cavity, heart]: [number, number]) => {
+    const coverage = (d: number) => Math.min(1, Math.max(0, 0.5 - d / spacing[0]));
+    const around = LUNG + (MUSCLE - LUNG) * coverage(heart);
+    return around + (BLOOD - around) * coverage(cavity);
   };
   const middle = distances(spec, at(0), contracted);
   // Far from any wall the whole voxel has one intensity.
-  if (Math.min(Math.abs(middle[0]), Math.abs(middle[1])) > Math.max(...spacing)) return shade(middle);
+  if (Math.min(Math.abs(middle[0]), Math.abs(middle[1])) > Math.max(...spacing)) return blend(middle);
   let sum = 0;
-  for (let k = 0; k < SAMPLES; k++) sum += shade(distances(spec, at((k + 0.5) / SAMPLES - 0.5), contracted));
+  for (let k = 0; k < SAMPLES; k++) sum += blend(distances(spec, at((k + 0.5) / SAMPLES - 0.5), contracted));
   return sum / SAMPLES;
 }
 
 /** Returns the true volume of the cavity in a frame, mm³. */
 export function trueVolume(spec: CineSpec, frame: number): number {
   const contracted = contraction(spec, frame);
-  const step = (CELL * spec.size) / UNIT;
-  const middle = middleOf(spec);
-  const reach = (mm: number) => Math.ceil((mm * spec.size) / UNIT / step);
+  const step = (INTEGRATION_STEP * spec.size) / REFERENCE_HALF_AXIS;
+  const middle = centreOf(spec);
+  const reach = (mm: number) => Math.ceil((mm * spec.size) / REFERENCE_HALF_AXIS / step);
   const [wide, low, high] = [reach(28), reach(45), reach(24)];
   let cells = 0;
   for (let k = -low; k <= high; k++)

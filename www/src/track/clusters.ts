@@ -2,12 +2,12 @@
  * The paper's boundary on one slice: 2-means clustering of windows into bright and dark, and the votes of the windows
  * (section 2.1).
  */
-import type { Picture } from './canny';
+import type { GreyImage } from './canny';
 
 /** Least share of a window that each of its two clusters must hold. */
-const LEAST_SHARE = 0.1;
+const MIN_SHARE = 0.1;
 /** Most iterations of 2-means. */
-const MOST_ROUNDS = 10;
+const MAX_ITERATIONS = 10;
 
 /** Result of 2-means on the values of a window. */
 export interface Clusters {
@@ -21,7 +21,7 @@ export interface Clusters {
 export function twoMeans(values: ArrayLike<number>): Clusters {
   let means: [number, number] = [Math.min(...Array.from(values)), Math.max(...Array.from(values))];
   const bright = new Uint8Array(values.length);
-  for (let round = 0; round < MOST_ROUNDS; round++) {
+  for (let round = 0; round < MAX_ITERATIONS; round++) {
     const [sums, counts] = [
       [0, 0],
       [0, 0],
@@ -44,9 +44,9 @@ export function twoMeans(values: ArrayLike<number>): Clusters {
  * Tests whether a window contains a boundary: both clusters are large enough, and their means differ by more than
  * `threshold`.
  */
-export function isSplit({ means, bright }: Clusters, threshold: number): boolean {
+export function hasBoundary({ means, bright }: Clusters, threshold: number): boolean {
   const share = bright.reduce((sum, one) => sum + one, 0) / bright.length;
-  return Math.min(share, 1 - share) > LEAST_SHARE && means[1] - means[0] > threshold;
+  return Math.min(share, 1 - share) > MIN_SHARE && means[1] - means[0] > threshold;
 }
 
 /**
@@ -54,15 +54,16 @@ export function isSplit({ means, bright }: Clusters, threshold: number): boolean
  * pixels, the share of the windows containing both pixels that separate them.
  */
 export function sliceVotes(
-  { width, height, values }: Picture,
-  reach: number,
+  { width, height, values }: GreyImage,
+  halfWidth: number,
   threshold: number,
 ): { x: number; y: number; weight: number }[] {
   const [right, below] = [new Float32Array(width * height), new Float32Array(width * height)];
-  for (let y = reach; y + reach < height; y++)
-    for (let x = reach; x + reach < width; x++) voteOf({ width, values }, x, y, reach, threshold, right, below);
+  for (let y = halfWidth; y + halfWidth < height; y++)
+    for (let x = halfWidth; x + halfWidth < width; x++)
+      voteOf({ width, values }, x, y, halfWidth, threshold, right, below);
   // Number of windows that contain both pixels of a face.
-  const most = 2 * reach * (2 * reach + 1);
+  const most = 2 * halfWidth * (2 * halfWidth + 1);
   const out = [];
   for (let i = 0; i < width * height; i++) {
     const [x, y] = [i % width, Math.floor(i / width)];
@@ -73,28 +74,28 @@ export function sliceVotes(
 }
 
 function voteOf(
-  { width, values }: Pick<Picture, 'width' | 'values'>,
+  { width, values }: Pick<GreyImage, 'width' | 'values'>,
   x: number,
   y: number,
-  reach: number,
+  halfWidth: number,
   threshold: number,
   right: Float32Array,
   below: Float32Array,
 ): void {
-  const side = 2 * reach + 1;
-  const from = (y - reach) * width + x - reach;
-  let [least, largest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  const side = 2 * halfWidth + 1;
+  const from = (y - halfWidth) * width + x - halfWidth;
+  let [smallest, largest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (let j = 0; j < side; j++)
     for (let i = 0; i < side; i++) {
       const value = values[from + j * width + i] ?? 0;
-      if (value < least) least = value;
+      if (value < smallest) smallest = value;
       if (value > largest) largest = value;
     }
   // Quick test: most windows end here.
-  if (largest - least <= threshold) return;
+  if (largest - smallest <= threshold) return;
   const inside = Array.from({ length: side * side }, (_, k) => from + Math.floor(k / side) * width + (k % side));
   const found = twoMeans(inside.map((at) => values[at] ?? 0));
-  if (!isSplit(found, threshold)) return;
+  if (!hasBoundary(found, threshold)) return;
   for (const [k, at] of inside.entries()) {
     if ((k + 1) % side !== 0 && found.bright[k] !== found.bright[k + 1]) right[at] = (right[at] ?? 0) + 1;
     if (k + side < side * side && found.bright[k] !== found.bright[k + side]) below[at] = (below[at] ?? 0) + 1;
@@ -102,10 +103,10 @@ function voteOf(
 }
 
 /** Returns the pixels of the window around a pixel, row by row; clipped at the border. */
-export function windowAt({ width, height }: Picture, x: number, y: number, reach: number): number[] {
+export function windowAt({ width, height }: GreyImage, x: number, y: number, halfWidth: number): number[] {
   const out: number[] = [];
-  for (let j = Math.max(0, y - reach); j <= Math.min(height - 1, y + reach); j++)
-    for (let i = Math.max(0, x - reach); i <= Math.min(width - 1, x + reach); i++) out.push(j * width + i);
+  for (let j = Math.max(0, y - halfWidth); j <= Math.min(height - 1, y + halfWidth); j++)
+    for (let i = Math.max(0, x - halfWidth); i <= Math.min(width - 1, x + halfWidth); i++) out.push(j * width + i);
   return out;
 }
 
@@ -113,8 +114,8 @@ export function windowAt({ width, height }: Picture, x: number, y: number, reach
  * Sums votes on pixel faces into a picture, as in the paper's figures: each pixel gets the square roots of the votes on
  * the faces to its left and above, so that slanted edges do not count twice.
  */
-export function boundaryPicture(
-  { width, height }: Pick<Picture, 'width' | 'height'>,
+export function boundaryImage(
+  { width, height }: Pick<GreyImage, 'width' | 'height'>,
   faces: Iterable<{ x: number; y: number; weight: number }>,
 ): Float32Array {
   const out = new Float32Array(width * height);

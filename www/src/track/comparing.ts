@@ -3,22 +3,22 @@ import type { Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';
 import type { ComparedTrack, Setup, SurfaceError } from './protocol';
-import { buildTracker, prepared } from './source';
+import { buildTracker, prepare } from './source';
 
-type Tell = (part: number, phase: string) => void;
+type OnProgress = (part: number, phase: string) => void;
 
 /** Prepares the image, tracks all frames with `setup` and returns the results. Undefined if the signal aborts. */
-export async function compared(
+export async function trackForComparison(
   original: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onProgress: OnProgress,
 ): Promise<ComparedTrack | undefined> {
   const began = performance.now();
-  const volume = prepared(original, setup.preparation, (what) => tell(0, what));
+  const volume = prepare(original, setup.preparation, (what) => onProgress(0, what));
   try {
-    return await followed(volume, spec, setup, signal, tell, began);
+    return await trackAll(volume, spec, setup, signal, onProgress, began);
   } catch (error) {
     if (signal.aborted) return undefined;
     throw error;
@@ -27,29 +27,29 @@ export async function compared(
   }
 }
 
-async function followed(
+async function trackAll(
   volume: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onProgress: OnProgress,
   began: number,
 ): Promise<ComparedTrack> {
   const { tracker } = buildTracker(volume, setup);
   try {
-    await tracker.run({ signal, onStep: ({ progress, phase }) => tell(progress, phase) });
-    const took = performance.now() - began;
+    await tracker.run({ signal, onStep: ({ progress, phase }) => onProgress(progress, phase) });
+    const duration = performance.now() - began;
     const errors: SurfaceError[] = [];
-    let crossings = 0;
+    let selfIntersections = 0;
     for (let frame = 0; frame < tracker.frames; frame++) {
       const mesh = tracker.meshAt(frame);
-      crossings += mesh.check().selfIntersections;
+      selfIntersections += mesh.check().selfIntersections;
       if (spec) errors.push(errorOf(spec, frame, mesh.arrays().positions));
       mesh.free();
     }
-    const mean = (of: 'mean' | 'most') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
-    const error = errors.length > 0 ? { mean: mean('mean'), most: mean('most') } : undefined;
-    return { facts: tracker.statistics, closing: tracker.cycleClosureError, error, took, crossings };
+    const mean = (of: 'mean' | 'p95') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
+    const error = errors.length > 0 ? { mean: mean('mean'), p95: mean('p95') } : undefined;
+    return { facts: tracker.statistics, closing: tracker.cycleClosureError, error, duration, selfIntersections };
   } finally {
     tracker.free();
   }

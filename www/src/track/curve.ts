@@ -21,30 +21,30 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
 }
 
 /** Share of triangles facing the other way in a frame, above which a warning is shown. */
-export const FOLDED = 0.01;
+export const MAX_FOLDED_SHARE = 0.01;
 /**
  * Relative deviation of a frame's area from that expected from its volume, above which a warning is shown; a body that
  * only grows or shrinks changes its area as its volume to the power of 2/3.
  */
-export const AREA_JUMP = 0.15;
+export const MAX_AREA_JUMP = 0.15;
 
-export interface Warned {
+export interface FrameWarning {
   frame: number;
   kind: 'folded' | 'area';
   share: number;
 }
 
-type Suspect = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
+type CheckedFacts = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
 
 /** Returns the frames that are suspicious even if their volume and error are plausible. */
-export function warningsOf(facts: readonly Suspect[]): Warned[] {
+export function warningsOf(facts: readonly CheckedFacts[]): FrameWarning[] {
   return facts.flatMap(({ folded, triangles, area, volume }, frame) => {
     const before = facts[frame - 1];
     const expected = before && before.area * (volume / before.volume) ** (2 / 3);
     const [share, jump] = [folded / (triangles || 1), expected ? area / expected - 1 : 0];
     return [
-      ...(share > FOLDED ? [{ frame, kind: 'folded' as const, share }] : []),
-      ...(Math.abs(jump) > AREA_JUMP ? [{ frame, kind: 'area' as const, share: jump }] : []),
+      ...(share > MAX_FOLDED_SHARE ? [{ frame, kind: 'folded' as const, share }] : []),
+      ...(Math.abs(jump) > MAX_AREA_JUMP ? [{ frame, kind: 'area' as const, share: jump }] : []),
     ];
   });
 }

@@ -1,6 +1,7 @@
 import type { Unit } from '../examples';
 import type { ParamValues, Vec3 } from '../protocol';
-import { type CineSpec, middleOf } from './cine';
+import { text } from '../texts';
+import { type CineSpec, centreOf } from './cine';
 import type { Box, Preparation } from './protocol';
 
 /** An example of the Track lab: a 4D image, suitable settings and credits. */
@@ -32,8 +33,7 @@ const around = (middle: Vec3, reach: number): Box => ({
   max: middle.map((x) => x + reach) as Vec3,
 });
 
-export const HEART_CREDIT =
-  'Cine MR of a pig’s heart, short axis, 20 slices in 20 phases of one beat: WrightGroupSRI, ep-dataset, CC0. Pixels binned 2 × 2.';
+export const HEART_CREDIT = text('trackPresets.heartCredit');
 
 /** The measured heart, with its settings; also the image of all presets. */
 export const HEART = {
@@ -59,29 +59,28 @@ const VENTRICLE: CineSpec = {
 const THICK: CineSpec = { dims: [48, 48, 12], spacing: [1.6, 1.6, 5], frames: 12, noise: 8, size: 26, papillary: true };
 
 /** The examples of the Track lab. The first one opens by default. */
-export const FILMS: [TrackExample, ...TrackExample[]] = [
-  { id: 'heart', name: 'Beating heart, MR: left ventricle', ...HEART },
+export const IMAGES: [TrackExample, ...TrackExample[]] = [
+  { id: 'heart', name: text('trackPresets.heartName'), ...HEART },
   {
     id: 'ventricle',
-    name: 'Computed ventricle, with its truth',
+    name: text('trackPresets.ventricleName'),
     source: { cine: VENTRICLE },
     unit: 'mm',
     preparation: PLAIN,
-    box: around(middleOf(VENTRICLE), 29),
-    at: middleOf(VENTRICLE),
+    box: around(centreOf(VENTRICLE), 29),
+    at: centreOf(VENTRICLE),
     params: { threshold: 60, cyclic: true },
-    credit: 'Computed: a cavity whose volume is known in every frame, with the noise of MR.',
+    credit: text('trackPresets.ventricleCredit'),
   },
   {
     id: 'thick-slices',
-    name: 'Computed ventricle in thick slices, with muscles',
+    name: text('trackPresets.thickSlicesName'),
     source: { cine: THICK },
     unit: 'mm',
     preparation: { binning: 1, enrichment: 'flow', factor: 0 },
-    box: around(middleOf(THICK), 32),
-    at: middleOf(THICK),
+    box: around(centreOf(THICK), 32),
+    at: centreOf(THICK),
     params: { threshold: 60, cyclic: true },
-    credit:
-      'Computed: the same with two muscles in the cavity, in slices of 5 mm. Without in-between slices the muscles come out in steps.',
+    credit: text('trackPresets.thickSlicesCredit'),
   },
 ];

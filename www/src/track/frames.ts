@@ -1,6 +1,6 @@
 /** Collects what the page displays of a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
-import { noArrays, surfaceIn } from '../worker/room';
+import { copySurface, emptyArrays } from '../worker/surface-buffers';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 
@@ -8,7 +8,7 @@ import type { SurfaceError, TrackedFrame } from './protocol';
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
-    const surface = surfaceIn(noArrays(), mesh);
+    const surface = copySurface(emptyArrays(), mesh);
     const facts = tracker.statistics[index];
     if (!facts) throw new Error(`frame ${index} has no facts`);
     const error = spec && errorOf(spec, index, surface.positions.subarray(0, 3 * surface.vertices));
@@ -22,5 +22,5 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
 export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);
-  return { mean, most: distances[Math.floor(0.95 * distances.length)] ?? 0 };
+  return { mean, p95: distances[Math.floor(0.95 * distances.length)] ?? 0 };
 }

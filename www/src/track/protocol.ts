@@ -39,7 +39,7 @@ export type {
 /**
  * Source of a 4D image: one file, several files that are its frames in the order of their names, or a computed phantom.
  */
-export type FilmSource = { files: NamedBytes[] } | { cine: CineSpec };
+export type ImageSource = { files: NamedBytes[] } | { cine: CineSpec };
 
 /** Method of inserting slices between slices: none, linear interpolation, or interpolation along the optical flow. */
 export type Enrichment = 'none' | 'linear' | 'flow';
@@ -74,13 +74,13 @@ export interface Setup {
 export interface SurfaceError {
   mean: number;
   /** 95th percentile of the distances of the vertices. */
-  most: number;
+  p95: number;
 }
 
 /** Reply about a newly built tracker, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** The edge threshold τ that the noise suggests. */
+  /** The tracker's default for the edge threshold τ, from the noise and the range of intensities. */
   suggested: number;
   /** Standard deviation of the noise, in intensity units. */
   noise: number;
@@ -88,7 +88,7 @@ export interface Ready {
   volume: VolumeView | undefined;
 }
 
-export interface Opened extends Ready {
+export interface OpenedImage extends Ready {
   volume: VolumeView;
   /** Dimensions of the image before its preparation. */
   dims: Vec3;
@@ -96,7 +96,7 @@ export interface Opened extends Ready {
   /** The true volume of each frame, if the image is computed. */
   truth: number[] | undefined;
   /** Milliseconds spent opening and preparing the image. */
-  prepared: number;
+  openingMs: number;
 }
 
 /** A saved run, from which the worker can restore it; kept by the page for undo. */
@@ -111,14 +111,14 @@ export interface SavedTrack {
  * Boundary votes of a frame: the points, packed xyz, between two voxels, and the share of windows that separate the
  * two.
  */
-export interface Votes {
+export interface BoundaryVotes {
   frame: number;
   points: Float32Array;
   weights: Float32Array;
 }
 
 /** A measured slice, its neighbours, and its interpolations from these; greys as in the volume's view. */
-export interface Between {
+export interface InterpolatedSlice {
   width: number;
   height: number;
   before: Uint8Array;
@@ -127,7 +127,7 @@ export interface Between {
   linear: Uint8Array;
   after: Uint8Array;
   /** Root mean square difference of each interpolation from the measured slice, in intensity units. */
-  off: { linear: number; flow: number };
+  rmsError: { linear: number; flow: number };
 }
 
 /** The choice that a comparison changes: switches the prediction, or takes another enrichment. */
@@ -140,14 +140,14 @@ export interface ComparedTrack {
   /** Mean over all frames, if the true surface is known. */
   error: SurfaceError | undefined;
   /** Milliseconds, preparation included. */
-  took: number;
-  crossings: number;
+  duration: number;
+  selfIntersections: number;
 }
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens an image and builds a tracker of it. On failure, the previous image and tracker stay. */
-  open: { body: { name: string; source: FilmSource; setup: Setup }; reply: Opened };
+  open: { body: { name: string; source: ImageSource; setup: Setup }; reply: OpenedImage };
   /** Builds a new tracker of the same image. On failure, the previous one stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
@@ -155,15 +155,15 @@ export interface Requests {
   step: { body: { count: number }; reply: undefined };
   /** Changes parameters; replies with all parameters and with the iteration that the run was set back to. */
   setParams: { body: ParamValues; reply: { params: ParamValues; iteration: number } };
-  votes: { body: { frame: number }; reply: Votes };
-  between: { body: { frame: number; slice: number; window: [number, number] }; reply: Between };
+  votes: { body: { frame: number }; reply: BoundaryVotes };
+  between: { body: { frame: number; slice: number; window: [number, number] }; reply: InterpolatedSlice };
   save: { body: undefined; reply: SavedTrack };
-  /** Restores a saved run of the same image; the state is sent only in reply to `tell`. */
+  /** Restores a saved run of the same image; the state is sent only in reply to `sendState`. */
   restore: { body: SavedTrack; reply: Ready };
   /** The image as it is prepared at present. */
   view: { body: undefined; reply: VolumeView };
   /** Makes the worker send a state event. */
-  tell: { body: undefined; reply: undefined };
+  sendState: { body: undefined; reply: undefined };
   export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
   /** All tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
@@ -198,9 +198,9 @@ export interface StepEvent {
   closing: number | undefined;
 }
 /** Progress of a comparison: its share, 0 to 1, and its phase. */
-export interface ComparingEvent {
+export interface ComparisonProgressEvent {
   event: 'comparing';
   part: number;
   phase: string;
 }
-export type WorkerEvent = PreparingEvent | StepEvent | ComparingEvent | StateEvent | FailureEvent;
+export type WorkerEvent = PreparingEvent | StepEvent | ComparisonProgressEvent | StateEvent | FailureEvent;

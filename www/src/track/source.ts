@@ -1,18 +1,20 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
+
 import { SurfaceTracker, Volume } from 'vesicle';
-import { readForeign } from '../foreign';
+import { importVolume } from '../importers';
+import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
 import { voxelsOf } from './box';
 import { cineVoxels } from './cine';
-import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
+import type { ImageSource, NamedBytes, Preparation, Setup } from './protocol';
 
 /** Seconds between frames of a computed image. */
 const CINE_SECONDS = 0.04;
 
 /** Opens a 4D image from files or computes it. */
-export async function filmFrom(source: FilmSource): Promise<Volume> {
+export async function openImage(source: ImageSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
     return new Volume({
@@ -22,7 +24,7 @@ export async function filmFrom(source: FilmSource): Promise<Volume> {
       frameSeconds: CINE_SECONDS,
     });
   }
-  const foreign = await readForeign(source.files);
+  const foreign = await importVolume(source.files);
   return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
 }
 
@@ -40,7 +42,7 @@ export function framesOf(files: NamedBytes[]): NamedBytes[][] {
 
 function fromParts(parts: NamedBytes[][]): Volume {
   const [first] = parts;
-  if (!first) throw new Refusal('bad-file', 'there is no image among the files, only data without a header');
+  if (!first) throw new Refusal('bad-file', text('track.noHeader'));
   if (parts.length === 1) return parseFiles(first);
   const frames: Volume[] = [];
   try {
@@ -52,29 +54,29 @@ function fromParts(parts: NamedBytes[][]): Volume {
 }
 
 /**
- * Bins and enriches an image as asked; returns a new volume, or `film` itself if there is nothing to do. `tell`
+ * Bins and enriches an image as asked; returns a new volume, or `image` itself if there is nothing to do. `onStage`
  * receives each step in words.
  */
-export function prepared(film: Volume, preparation: Preparation, tell: (what: string) => void): Volume {
+export function prepare(image: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
-  let present = film;
+  let present = image;
   const take = (next: Volume) => {
-    if (present !== film) present.free();
+    if (present !== image) present.free();
     present = next;
   };
   try {
     if (binning > 1) {
-      tell('Binning pixels.');
+      onStage(text('track.binning'));
       take(present.binned(factorsOf(present, binning)));
     }
     if (enrichment !== 'none' && factor !== 1) {
-      const how = enrichment === 'flow' ? 'by optical flow' : 'by linear interpolation';
-      tell(`Making in-between slices of ${present.frames} frames ${how}.`);
+      const key = enrichment === 'flow' ? 'track.enrichingFlow' : 'track.enrichingLinear';
+      onStage(text(key, { frames: present.frames }));
       take(present.enrichSlices({ method: enrichment, ...(factor > 0 && { factor }) }));
     }
     return present;
   } catch (error) {
-    if (present !== film) present.free();
+    if (present !== image) present.free();
     throw error;
   }
 }

@@ -1,16 +1,19 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
+
 import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { transferOf } from '../worker/room';
-import { answer, givingAway, stop, type Work } from '../worker/serving';
+import { reply, stop, type Task, withTransfer } from '../worker/serving';
+import { transferOf } from '../worker/surface-buffers';
 import { viewOf } from '../worker/volumes';
-import { betweenSlices } from './between';
 import { type CineSpec, trueVolume } from './cine';
-import { compared } from './comparing';
+import { trackForComparison } from './comparing';
 import { trackedFrame } from './frames';
+import { interpolateSlice } from './interpolate-slice';
 import type {
+  BoundaryVotes,
   ComparedTrack,
-  Opened,
+  OpenedImage,
   ParamValues,
   Preparation,
   Ready,
@@ -20,10 +23,9 @@ import type {
   Setup,
   ToWorker,
   VolumeView,
-  Votes,
   WorkerEvent,
 } from './protocol';
-import { buildTracker, filmFrom, prepared } from './source';
+import { buildTracker, openImage, prepare } from './source';
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -33,23 +35,23 @@ type Handlers = {
  * Parameters that the boundary depends on. A change of any other keeps the boundary, and only the surfaces are computed
  * again.
  */
-const OF_THE_BOUNDARY = ['threshold', 'window', 'windowFrames', 'cyclic'];
+const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
 function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
 }
 
 /** An image as opened, and as prepared. */
-interface Film {
+interface LoadedImage {
   name: string;
   original: Volume;
   spec: CineSpec | undefined;
-  prepared: Volume;
+  preparedVolume: Volume;
   preparation: Preparation;
 }
 
 class Session {
-  #film: Film | undefined;
+  #loaded: LoadedImage | undefined;
   #tracker: SurfaceTracker | undefined;
   #setup: Setup | undefined;
   #suggested = 0;
@@ -58,9 +60,9 @@ class Session {
   /** Number of frames whose surfaces were sent to the page. */
   #sent = 0;
   /** Saved state of the tracker when the boundary of all frames was found, before the first surface. */
-  #bounded: { state: Uint8Array; iteration: number } | undefined;
-  #run: Work | undefined;
-  #comparison: Work | undefined;
+  #boundaryState: { state: Uint8Array; iteration: number } | undefined;
+  #run: Task | undefined;
+  #comparison: Task | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -74,34 +76,34 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     votes: ({ frame }) => this.#votes(frame),
-    between: ({ frame, slice, window }) => betweenSlices(this.#image().original, frame, slice, window),
+    between: ({ frame, slice, window }) => interpolateSlice(this.#image().original, frame, slice, window),
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     view: () => this.#view(),
-    tell: () => this.#standStill(),
+    sendState: () => this.#reportStopped(),
     export: ({ frame, format }) => this.#export(frame, format),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => stop(this.#comparison),
   };
 
-  async #open({ name, source, setup }: Requests['open']['body']): Promise<Opened> {
+  async #open({ name, source, setup }: Requests['open']['body']): Promise<OpenedImage> {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
-    const original = await filmFrom(source);
+    const original = await openImage(source);
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
-      made = prepared(original, setup.preparation, tell);
+      made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
       const ready = this.#adopt(made, setup);
       const { dims, spacing } = original;
-      this.#forgetFilm();
-      this.#film = { name, original, spec, prepared: made, preparation: setup.preparation };
+      this.#freeImage();
+      this.#loaded = { name, original, spec, preparedVolume: made, preparation: setup.preparation };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
-      return givingAway({ ...ready, volume, dims, spacing, truth, prepared: took }, [volume.voxels]);
+      return withTransfer({ ...ready, volume, dims, spacing, truth, openingMs: took }, [volume.voxels]);
     } catch (error) {
       if (made !== original) made.free();
       original.free();
@@ -116,17 +118,18 @@ class Session {
 
   /** Builds a tracker of the present image, which is prepared again if the preparation has changed. */
   #build(setup: Setup): Ready {
-    const film = this.#image();
-    if (same(film.preparation, setup.preparation)) return { ...this.#adopt(film.prepared, setup), volume: undefined };
-    const made = prepared(film.original, setup.preparation, (what) => send({ event: 'preparing', what }));
+    const loaded = this.#image();
+    if (same(loaded.preparation, setup.preparation))
+      return { ...this.#adopt(loaded.preparedVolume, setup), volume: undefined };
+    const made = prepare(loaded.original, setup.preparation, (what) => send({ event: 'preparing', what }));
     try {
       const ready = this.#adopt(made, setup);
-      if (film.prepared !== film.original) film.prepared.free();
-      this.#film = { ...film, prepared: made, preparation: setup.preparation };
+      if (loaded.preparedVolume !== loaded.original) loaded.preparedVolume.free();
+      this.#loaded = { ...loaded, preparedVolume: made, preparation: setup.preparation };
       const volume = this.#view();
-      return givingAway({ ...ready, volume }, [volume.voxels]);
+      return withTransfer({ ...ready, volume }, [volume.voxels]);
     } catch (error) {
-      if (made !== film.original) made.free();
+      if (made !== loaded.original) made.free();
       throw error;
     }
   }
@@ -137,8 +140,8 @@ class Session {
     this.#tracker = tracker;
     this.#setup = setup;
     this.#suggested = suggested;
-    this.#bounded = undefined;
-    this.#standAt(0, false);
+    this.#boundaryState = undefined;
+    this.#setProgress(0, false);
     return this.#ready();
   }
 
@@ -147,32 +150,32 @@ class Session {
     return { params: { ...params }, suggested: this.#suggested, noise };
   }
 
-  #standAt(iteration: number, done: boolean): void {
+  #setProgress(iteration: number, done: boolean): void {
     this.#iteration = iteration;
     this.#done = done;
     this.#sent = this.#current().statistics.length;
   }
 
   #view(): VolumeView {
-    const { name, prepared } = this.#image();
-    return viewOf(prepared, name, prepared.frames);
+    const { name, preparedVolume } = this.#image();
+    return viewOf(preparedVolume, name, preparedVolume.frames);
   }
 
-  #image(): Film {
-    if (!this.#film) throw new Refusal('invalid-argument', 'no image is open: open one first');
-    return this.#film;
+  #image(): LoadedImage {
+    if (!this.#loaded) throw new Refusal('invalid-argument', text('track.noImage'));
+    return this.#loaded;
   }
 
   #current(): SurfaceTracker {
-    if (!this.#tracker) throw new Refusal('invalid-argument', 'no image is open: open one first');
+    if (!this.#tracker) throw new Refusal('invalid-argument', text('track.noImage'));
     return this.#tracker;
   }
 
-  #forgetFilm(): void {
-    const film = this.#film;
-    if (!film) return;
-    if (film.prepared !== film.original) film.prepared.free();
-    film.original.free();
+  #freeImage(): void {
+    const loaded = this.#loaded;
+    if (!loaded) return;
+    if (loaded.preparedVolume !== loaded.original) loaded.preparedVolume.free();
+    loaded.original.free();
   }
 
   async #play(): Promise<undefined> {
@@ -192,7 +195,7 @@ class Session {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
     this.#run = undefined;
-    this.#standStill();
+    this.#reportStopped();
   }
 
   #stepped(report: StepReport): void {
@@ -201,7 +204,7 @@ class Session {
     this.#done = report.done;
     const { length } = tracker.statistics;
     if (length === 0 && report.iteration === tracker.frames)
-      this.#bounded = { state: tracker.save(), iteration: report.iteration };
+      this.#boundaryState = { state: tracker.save(), iteration: report.iteration };
     const index = length > this.#sent ? length - 1 : undefined;
     this.#sent = length;
     const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
@@ -220,11 +223,11 @@ class Session {
     try {
       for (let i = 0; i < count && !this.#done; i++) this.#stepped(tracker.step(1));
     } finally {
-      this.#standStill();
+      this.#reportStopped();
     }
   }
 
-  #standStill(): undefined {
+  #reportStopped(): undefined {
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
 
@@ -238,25 +241,25 @@ class Session {
     const changed = Object.keys(params).filter((name) => !Object.is(params[name], before[name]));
     const setup = { ...(this.#setup as Setup) };
     this.#setup = { ...setup, params: { ...setup.params, ...values } };
-    if (changed.some((name) => OF_THE_BOUNDARY.includes(name))) {
-      this.#bounded = undefined;
-      this.#standAt(0, false);
+    if (changed.some((name) => BOUNDARY_PARAMS.includes(name))) {
+      this.#boundaryState = undefined;
+      this.#setProgress(0, false);
     } else if (changed.length > 0 && this.#sent > 0) this.#backToBoundary(params);
     return { params, iteration: this.#iteration };
   }
 
   #backToBoundary(params: ParamValues): void {
-    if (!this.#bounded) {
-      this.#adopt(this.#image().prepared, this.#setup as Setup);
+    if (!this.#boundaryState) {
+      this.#adopt(this.#image().preparedVolume, this.#setup as Setup);
       return;
     }
     const tracker = this.#current();
-    tracker.restore(this.#bounded.state);
-    tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !OF_THE_BOUNDARY.includes(name))));
-    this.#standAt(this.#bounded.iteration, false);
+    tracker.restore(this.#boundaryState.state);
+    tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !BOUNDARY_PARAMS.includes(name))));
+    this.#setProgress(this.#boundaryState.iteration, false);
   }
 
-  #votes(frame: number): Votes {
+  #votes(frame: number): BoundaryVotes {
     const all = this.#current().boundary(frame);
     const count = all.length / 5;
     const [points, weights] = [new Float32Array(3 * count), new Float32Array(count)];
@@ -279,8 +282,8 @@ class Session {
     if (!fits) this.#build(setup);
     this.#current().restore(state);
     this.#setup = setup;
-    this.#bounded = undefined;
-    this.#standAt(iteration, done);
+    this.#boundaryState = undefined;
+    this.#setProgress(iteration, done);
     return { ...this.#ready(), volume: undefined };
   }
 
@@ -298,7 +301,7 @@ class Session {
     const { original, spec } = this.#image();
     const abort = new AbortController();
     const tell = (part: number, phase: string) => send({ event: 'comparing', part, phase });
-    const result = compared(original, spec, setup, abort.signal, tell);
+    const result = trackForComparison(original, spec, setup, abort.signal, tell);
     this.#comparison = { abort, ended: result };
     try {
       return await result;
@@ -318,4 +321,4 @@ starting.catch(() => undefined);
 
 const session = new Session();
 
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => void answer(session.handlers, data);
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => void reply(session.handlers, data);

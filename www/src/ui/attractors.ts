@@ -1,10 +1,25 @@
 import type { Attractor, Vec3 } from '../protocol';
+import { text } from '../texts';
 import { h, uniqueId } from './dom';
 import { figure } from './format';
 
 const STRENGTH = 0.1;
-const PLACE = 'Click to place';
+const PLACE = text('extractPanels.attractorPlace');
 const STRONGEST = 1000;
+
+/** Texts of the two values of an attractor: label, full name, and name of a change. */
+const FIELDS = {
+  strength: {
+    shown: 'extractPanels.attractorStrength',
+    label: 'extractPanels.attractorStrengthOf',
+    change: 'extractPanels.attractorStrengthChange',
+  },
+  radius: {
+    shown: 'extractPanels.attractorRadius',
+    label: 'extractPanels.attractorRadiusOf',
+    change: 'extractPanels.attractorRadiusChange',
+  },
+} as const;
 
 export interface AttractorEvents {
   /**
@@ -37,19 +52,18 @@ export class AttractorControls {
   constructor(events: AttractorEvents) {
     this.#events = events;
     const add = () => this.add(events.crosshair());
-    const label = 'At crosshair: place an attractor there';
+    const label = text('extractPanels.attractorAtCrosshairLabel');
     const button = h(
       'button',
       { type: 'button', onclick: add, 'data-attractor': 'add', title: label, 'aria-label': label },
-      'At crosshair',
+      text('extractPanels.attractorAtCrosshair'),
     );
     this.#place = h(
       'button',
       { type: 'button', 'aria-pressed': 'false', 'data-attractor': 'place', onclick: () => this.place(!this.#placing) },
       PLACE,
     );
-    const help =
-      'Points that pull the surface like springs, or push it where the strength is negative, and fade out at their radius. A strong pull draws out a tip that never quite comes to rest: press Pause then.';
+    const help = text('extractPanels.attractorsHelp');
     this.element = h(
       'div',
       {},
@@ -71,19 +85,22 @@ export class AttractorControls {
     this.#list.replaceChildren(...attractors.map((attractor, index) => this.#item(attractor, index)));
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
   add(point: Vec3): void {
     const rounded = point.map((x) => Number(x.toPrecision(6))) as Vec3;
-    this.#change([...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }], 'new attractor');
+    this.#change(
+      [...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }],
+      text('extractPanels.newAttractor'),
+    );
   }
 
   place(placing: boolean): void {
     this.#placing = placing;
     this.#place.setAttribute('aria-pressed', String(placing));
-    this.#place.textContent = placing ? 'Stop placing' : PLACE;
+    this.#place.textContent = placing ? text('extractPanels.attractorStopPlacing') : PLACE;
     this.#events.onPlacing(placing);
   }
 
@@ -93,15 +110,15 @@ export class AttractorControls {
   }
 
   #item(attractor: Attractor, index: number): HTMLElement {
-    const name = `Attractor ${index + 1}`;
+    const name = text('extractPanels.attractorName', { number: index + 1 });
     const where = attractor.point.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
     const goTo = h(
       'button',
       {
         type: 'button',
         class: 'quiet',
-        title: 'Show it in the slices',
-        'aria-label': `${name} at ${where}: show it in the slices`,
+        title: text('extractPanels.showInSlices'),
+        'aria-label': text('extractPanels.attractorShow', { name, where }),
         onclick: () => this.#events.onGoTo(attractor.point),
       },
       `${index + 1}: ${where}`,
@@ -111,30 +128,27 @@ export class AttractorControls {
       {
         type: 'button',
         class: 'quiet',
-        'aria-label': `Remove ${name.toLowerCase()}`,
+        'aria-label': text('extractPanels.attractorRemove', { number: index + 1 }),
         onclick: () => this.#remove(index),
       },
-      'Remove',
+      text('controls.remove'),
     );
-    const field = (key: 'strength' | 'radius', label: string, range: Record<string, number>) =>
-      this.#field({ attractor, index, key, label: `${label} of ${name.toLowerCase()}`, shown: label, range });
+    const field = (key: 'strength' | 'radius', range: Record<string, number>) => {
+      const [label, shown] = [text(FIELDS[key].label, { number: index + 1 }), text(FIELDS[key].shown)];
+      return this.#field({ attractor, index, key, label, shown, range });
+    };
     return h(
       'li',
       {},
       h('div', { class: 'row' }, goTo, remove),
-      h(
-        'div',
-        { class: 'row' },
-        field('strength', 'Strength', { min: -STRONGEST, max: STRONGEST }),
-        field('radius', 'Radius', { min: 0 }),
-      ),
+      h('div', { class: 'row' }, field('strength', { min: -STRONGEST, max: STRONGEST }), field('radius', { min: 0 })),
     );
   }
 
   #remove(index: number): void {
     this.#change(
       this.#attractors.filter((_, i) => i !== index),
-      `removal of attractor ${index + 1}`,
+      text('extractPanels.attractorRemoval', { number: index + 1 }),
     );
     // The focused button was removed.
     this.#place.focus();
@@ -156,12 +170,14 @@ export class AttractorControls {
       const number = input.valueAsNumber;
       if (!Number.isFinite(number) || (key === 'radius' && number <= 0)) {
         input.valueAsNumber = value;
-        return this.complain(key === 'radius' ? 'A radius above 0 is needed.' : 'A number is needed.');
+        return this.showError(
+          key === 'radius' ? text('extractPanels.attractorRadiusError') : text('controls.numberError'),
+        );
       }
       const next = this.#attractors.map((one, i) => (i === index ? { ...one, [key]: number } : one));
       this.#attractors = next;
       this.#error.textContent = '';
-      this.#events.onChange(next, `${key} of attractor ${index + 1}`, true);
+      this.#events.onChange(next, text(FIELDS[key].change, { number: index + 1 }), true);
     });
     return h('span', { class: 'value' }, h('label', { for: id }, shown), input);
   }

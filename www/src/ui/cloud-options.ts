@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import type { CloudViewOptions } from '../view/reconstruction';
 import type { SurfaceColor } from '../view/surface';
 import { h } from './dom';
@@ -6,19 +7,19 @@ import { choice } from './view-options';
 type Switch = 'surface' | 'edges' | 'points' | 'constraints' | 'cameras';
 
 const SWITCHES: { name: Switch; label: string }[] = [
-  { name: 'surface', label: 'Surface' },
-  { name: 'edges', label: 'Wireframe' },
-  { name: 'points', label: 'Points' },
-  { name: 'constraints', label: 'Constraints' },
-  { name: 'cameras', label: 'Cameras' },
+  { name: 'surface', label: text('controls.viewSurface') },
+  { name: 'edges', label: text('controls.viewWireframe') },
+  { name: 'points', label: text('pointPanels.viewPoints') },
+  { name: 'constraints', label: text('pointPanels.viewConstraints') },
+  { name: 'cameras', label: text('pointPanels.viewCameras') },
 ];
 
 export const CLOUD_COLORS: { value: SurfaceColor; label: string }[] = [
-  { value: 'own', label: 'photographs or points' },
-  { value: 'plain', label: 'plain' },
-  { value: 'component', label: 'component' },
-  { value: 'mean curvature', label: 'mean curvature' },
-  { value: 'distance', label: 'distance from the points' },
+  { value: 'own', label: text('pointPanels.colorOwn') },
+  { value: 'plain', label: text('controls.colorPlain') },
+  { value: 'component', label: text('controls.colorComponent') },
+  { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
+  { value: 'distance', label: text('pointPanels.colorDistance') },
 ];
 
 /** View options of the Reconstruct lab. */
@@ -29,8 +30,8 @@ export class CloudOptionControls {
   readonly #key = h(
     'p',
     { class: 'legend' },
-    h('span', {}, h('span', { class: 'dot point', 'aria-hidden': 'true' }), 'surface'),
-    h('span', {}, h('span', { class: 'dot exterior', 'aria-hidden': 'true' }), 'exterior'),
+    h('span', {}, h('span', { class: 'dot point', 'aria-hidden': 'true' }), text('pointPanels.legendSurface')),
+    h('span', {}, h('span', { class: 'dot exterior', 'aria-hidden': 'true' }), text('pointPanels.legendExterior')),
   );
   readonly #value: CloudViewOptions;
   readonly #onChange: (options: CloudViewOptions) => void;
@@ -44,12 +45,12 @@ export class CloudOptionControls {
       this.#boxes.set(name, box);
       return h('label', {}, box, label);
     });
-    const color = choice('Colour', 'color', CLOUD_COLORS, initial.color, (color) => this.set({ color }));
+    const color = choice(text('controls.color'), 'color', CLOUD_COLORS, initial.color, (color) => this.set({ color }));
     this.#color = color.select;
     this.#key.hidden = !initial.constraints;
     this.element = h(
       'div',
-      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
       ...switches,
       this.#key,
       color.element,

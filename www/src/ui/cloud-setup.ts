@@ -1,6 +1,7 @@
+import { LANGUAGE, text } from '../texts';
 import { h, uniqueId } from './dom';
 
-const MOST = 20_000;
+const DEFAULT_MAX_POINTS = 20_000;
 
 /** Options of an implicit surface besides its parameters. */
 export interface CloudChoice {
@@ -17,24 +18,30 @@ interface Field {
 /** Fields for the number of points used and the number of clusters kept. */
 export class CloudSetup {
   readonly element: HTMLElement;
-  readonly #most: Field;
+  readonly #maxPoints: Field;
   readonly #keep: Field;
   #inForce: CloudChoice = { maxPoints: undefined, keepComponents: undefined };
 
   constructor(onChange: (choice: CloudChoice, what: string) => void) {
-    this.#most = numberField('Points at most', 'maxPoints', { min: 4, max: 100_000, placeholder: String(MOST) }, [
-      'Above this an even subsample is taken. Empty: 20,000.',
-    ]);
-    this.#keep = numberField('Clusters kept', 'keepComponents', { min: 1, max: 10_000, placeholder: 'all' }, [
-      'Points that lie together; with 1 only the largest cluster stays and strays go. Empty: all.',
-    ]);
+    this.#maxPoints = numberField(
+      text('pointPanels.maxPoints'),
+      'maxPoints',
+      { min: 4, max: 100_000, placeholder: String(DEFAULT_MAX_POINTS) },
+      [text('pointPanels.maxPointsHelp')],
+    );
+    this.#keep = numberField(
+      text('pointPanels.clustersToKeep'),
+      'keepComponents',
+      { min: 1, max: 10_000, placeholder: text('pointPanels.all') },
+      [text('pointPanels.clustersToKeepHelp')],
+    );
     const fields: [Field, string][] = [
-      [this.#most, 'number of points'],
-      [this.#keep, 'clusters kept'],
+      [this.#maxPoints, text('pointPanels.maxPointsChange')],
+      [this.#keep, text('pointPanels.clustersToKeepChange')],
     ];
     for (const [field, what] of fields)
       field.input.addEventListener('change', () => this.#changed(field, what, onChange));
-    this.element = h('div', { class: 'params' }, this.#most.element, this.#keep.element);
+    this.element = h('div', { class: 'params' }, this.#maxPoints.element, this.#keep.element);
   }
 
   get value(): CloudChoice {
@@ -43,20 +50,23 @@ export class CloudSetup {
 
   show({ maxPoints, keepComponents }: CloudChoice): void {
     this.#inForce = { maxPoints, keepComponents };
-    this.#most.input.value = maxPoints === undefined ? '' : String(maxPoints);
+    this.#maxPoints.input.value = maxPoints === undefined ? '' : String(maxPoints);
     this.#keep.input.value = keepComponents === undefined ? '' : String(keepComponents);
-    for (const { error } of [this.#most, this.#keep]) error.textContent = '';
+    for (const { error } of [this.#maxPoints, this.#keep]) error.textContent = '';
   }
 
   #changed({ input, error }: Field, what: string, onChange: (choice: CloudChoice, what: string) => void): void {
     error.textContent = '';
     if (!input.checkValidity()) {
       this.show(this.#inForce);
-      error.textContent = `A whole number from ${input.min} to ${Number(input.max).toLocaleString('en')} is needed, or nothing.`;
+      error.textContent = text('controls.integerOrEmptyError', {
+        min: input.min,
+        max: Number(input.max).toLocaleString(LANGUAGE),
+      });
       return;
     }
     const number = (one: HTMLInputElement) => (one.value === '' ? undefined : one.valueAsNumber);
-    onChange({ maxPoints: number(this.#most.input), keepComponents: number(this.#keep.input) }, what);
+    onChange({ maxPoints: number(this.#maxPoints.input), keepComponents: number(this.#keep.input) }, what);
   }
 }
 

@@ -1,11 +1,12 @@
-import type { ComparedRun, ComparingEvent, Requests } from '../protocol';
+import type { ComparisonProgressEvent, ExtractionRun, Requests } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { count, figure, levelSymbol } from './format';
 import { addTimes, seconds, TIME_NOTE, TIME_ROWS, timeOf } from './times';
 
 type Result = NonNullable<Requests['compare']['reply']>;
 
-const NAMES = { direct: 'direct', coarseToFine: 'coarse to fine' } as const;
+const NAMES = { direct: text('extractPanels.direct'), coarseToFine: text('extractPanels.coarseToFine') } as const;
 
 export interface CompareEvents {
   onStart: () => void;
@@ -17,15 +18,23 @@ export class ComparePanel {
   readonly element: HTMLElement;
   readonly #start: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
-  readonly #progress = h('progress', { max: 2, value: 0, 'aria-label': 'Progress of the comparison', hidden: true });
+  readonly #progress = h('progress', {
+    max: 2,
+    value: 0,
+    'aria-label': text('controls.comparisonProgress'),
+    hidden: true,
+  });
   readonly #status = h('p', { class: 'help', role: 'status' });
   readonly #tables = h('div', { 'data-comparison': '{}' });
 
   constructor({ onStart, onCancel }: CompareEvents) {
-    this.#start = h('button', { type: 'button', onclick: onStart, 'data-compare': 'start' }, 'Compare');
-    this.#cancel = h('button', { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true }, 'Cancel');
-    const help =
-      'Runs twice with the volume, start and parameters as they are now: on the volume itself, and through the pyramid; attractors take no part. The surface shown stays.';
+    this.#start = h('button', { type: 'button', onclick: onStart, 'data-compare': 'start' }, text('controls.compare'));
+    this.#cancel = h(
+      'button',
+      { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true },
+      text('controls.cancel'),
+    );
+    const help = text('extractPanels.compareHelp');
     this.element = h(
       'div',
       { class: 'compare' },
@@ -56,68 +65,73 @@ export class ComparePanel {
     this.#cancel.focus();
     this.#progress.hidden = false;
     this.#progress.value = 0;
-    this.#status.textContent = 'Comparing.';
+    this.#status.textContent = text('controls.comparing');
   }
 
   /** Shows the progress, without announcing it to screen readers. */
-  tell({ run, report }: ComparingEvent): void {
+  showProgress({ run, report }: ComparisonProgressEvent): void {
     this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
-    this.#cancel.textContent = `Cancel (${NAMES[run]}, iteration ${count(report.iteration)})`;
+    this.#cancel.textContent = text('extractPanels.compareCancel', {
+      run: NAMES[run],
+      iteration: count(report.iteration),
+    });
   }
 
-  refuse(message: string): void {
+  reject(message: string): void {
     this.#end(message);
   }
 
   finish(result: Result | undefined): void {
     if (result) this.#show(result);
-    else this.#end('Cancelled.');
+    else this.#end(text('controls.cancelled'));
   }
 
   #show(result: Result): void {
     const { direct, coarseToFine } = result;
     const factor = total(direct) / total(coarseToFine);
-    this.#end(
-      `Coarse to fine took ${factor >= 1 ? `${figure(round(factor))} times less` : `${figure(round(1 / factor))} times more`} time than direct. ${difference(result)}`,
-    );
+    const [key, times] =
+      factor >= 1
+        ? (['extractPanels.compareFaster', factor] as const)
+        : (['extractPanels.compareSlower', 1 / factor] as const);
+    this.#end(text(key, { factor: figure(round(times)), difference: difference(result) }));
     this.#tables.dataset.comparison = JSON.stringify({ direct: summary(direct), coarseToFine: summary(coarseToFine) });
     this.#tables.replaceChildren(
-      scrolling('Time of both ways, as in the paper’s table 1', timeTable(coarseToFine, direct)),
+      scrolling(text('extractPanels.compareTimes'), timeTable(coarseToFine, direct)),
       h('p', { class: 'help' }, TIME_NOTE),
-      scrolling('What came of both ways', outcomeTable(coarseToFine, direct)),
+      scrolling(text('controls.compareResults'), outcomeTable(coarseToFine, direct)),
     );
   }
 
-  #end(text: string): void {
+  #end(message: string): void {
     const hadFocus = document.activeElement === this.#cancel;
     this.#start.hidden = false;
     this.#cancel.hidden = true;
-    this.#cancel.textContent = 'Cancel';
+    this.#cancel.textContent = text('controls.cancel');
     this.#progress.hidden = true;
-    this.#status.textContent = text;
+    this.#status.textContent = message;
     if (hadFocus) this.#start.focus();
   }
 }
 
 const round = (value: number) => Number(value.toPrecision(2));
 
-function total(run: ComparedRun): number {
+function total(run: ExtractionRun): number {
   return timeOf(addTimes(run.byLevel.map(({ times }) => new Map(Object.entries(times)))));
 }
 
-function summary(run: ComparedRun) {
+function summary(run: ExtractionRun) {
   const { vertices, components, genus, area, volume } = run.info;
   const { iteration: iterations, done } = run.report;
   return { levels: run.levels, iterations, done, milliseconds: total(run), vertices, components, genus, area, volume };
 }
 
 function difference({ direct, coarseToFine }: Result): string {
-  if (direct.info.vertices === 0 || coarseToFine.info.vertices === 0) return 'One of the two surfaces has vanished.';
+  if (direct.info.vertices === 0 || coarseToFine.info.vertices === 0) return text('extractPanels.compareVanished');
   const part = (key: 'area' | 'volume') => {
     const off = Math.abs(coarseToFine.info[key] / direct.info[key] - 1);
-    return `${(100 * off).toFixed(off < 0.1 ? 2 : 0)} %`;
+    return text('controls.percent', { value: (100 * off).toFixed(off < 0.1 ? 2 : 0) });
   };
-  return `Area differs by ${part('area')}, volume by ${part('volume')}.`;
+  return text('extractPanels.compareDifference', { area: part('area'), volume: part('volume') });
 }
 
 function scrolling(label: string, table: HTMLTableElement): HTMLElement {
@@ -125,16 +139,21 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 }
 
 /** Creates the table of times: rows T, N, F and their sum, a column per level, for both runs. */
-function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
+function timeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
-  const head = ['Part', ...levels.map((level) => levelSymbol(level)), 'total'].map((title) =>
-    h('th', { scope: 'col' }, title),
-  );
-  const body = [...rowsOf('coarse to fine', coarseToFine, levels), ...rowsOf('direct', direct, levels)];
+  const head = [
+    text('extractPanels.timePart'),
+    ...levels.map((level) => levelSymbol(level)),
+    text('extractPanels.timeTotal'),
+  ].map((title) => h('th', { scope: 'col' }, title));
+  const body = [
+    ...rowsOf(text('extractPanels.coarseToFine'), coarseToFine, levels),
+    ...rowsOf(text('extractPanels.direct'), direct, levels),
+  ];
   return h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...body));
 }
 
-function rowsOf(name: string, run: ComparedRun, levels: number[]): HTMLElement[] {
+function rowsOf(name: string, run: ExtractionRun, levels: number[]): HTMLElement[] {
   const byLevel = new Map(run.byLevel.map(({ level, times }) => [level, new Map(Object.entries(times))]));
   const all = addTimes([...byLevel.values()]);
   const row = (head: string, parts?: readonly string[]) => {
@@ -152,17 +171,19 @@ function rowsOf(name: string, run: ComparedRun, levels: number[]): HTMLElement[]
   const stepRow = h(
     'tr',
     { class: 'detail' },
-    h('th', { scope: 'row' }, 'steps'),
+    h('th', { scope: 'row' }, text('extractPanels.timeSteps')),
     ...steps.map((value) => h('td', {}, value === undefined ? '' : count(value))),
   );
   return [title, ...TIME_ROWS.map(({ letter, parts }) => row(letter, parts)), sum, stepRow];
 }
 
-function outcomeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
+function outcomeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const runs = [coarseToFine, direct];
-  const row = (name: string, value: (run: ComparedRun) => string) =>
+  const row = (name: string, value: (run: ExtractionRun) => string) =>
     h('tr', {}, h('th', { scope: 'row' }, name), ...runs.map((run) => h('td', {}, value(run))));
-  const head = ['Measure', 'coarse to fine', 'direct'].map((title) => h('th', { scope: 'col' }, title));
+  const head = [text('controls.measure'), text('extractPanels.coarseToFine'), text('extractPanels.direct')].map(
+    (title) => h('th', { scope: 'col' }, title),
+  );
   return h(
     'table',
     { class: 'times' },
@@ -170,14 +191,16 @@ function outcomeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTable
     h(
       'tbody',
       {},
-      row('Iterations', ({ report }) => count(report.iteration)),
-      row('Came to rest', ({ report }) => (report.done ? 'yes' : 'no')),
-      row('Time', (run) => `${seconds(total(run))} s`),
-      row('Vertices', ({ info }) => count(info.vertices)),
-      row('Components', ({ info }) => count(info.components)),
-      row('Genus', ({ info }) => count(info.genus)),
-      row('Area', ({ info }) => figure(info.area)),
-      row('Volume', ({ info }) => figure(info.volume)),
+      row(text('extractPanels.outcomeIterations'), ({ report }) => count(report.iteration)),
+      row(text('extractPanels.outcomeConverged'), ({ report }) =>
+        report.done ? text('controls.yes') : text('controls.no'),
+      ),
+      row(text('controls.time'), (run) => text('controls.seconds', { value: seconds(total(run)) })),
+      row(text('measures.vertices'), ({ info }) => count(info.vertices)),
+      row(text('measures.components'), ({ info }) => count(info.components)),
+      row(text('measures.genus'), ({ info }) => count(info.genus)),
+      row(text('measures.area'), ({ info }) => figure(info.area)),
+      row(text('measures.volume'), ({ info }) => figure(info.volume)),
     ),
   );
 }

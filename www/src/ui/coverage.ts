@@ -1,11 +1,15 @@
-import type { CoveringEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../protocol';
+import type { CoverageProgressEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../protocol';
+import { plural, text } from '../texts';
 import { h } from './dom';
-import { count, figure, plural } from './format';
+import { count, figure } from './format';
 
 /** Largest number of uncovered regions listed and marked; the sentence above them counts all. */
 const MOST_PARTS = 20;
 
-const KINDS: Record<UncoveredRegion['kind'], string> = { matter: 'Missing matter', cavity: 'Missing cavity' };
+const KINDS: Record<UncoveredRegion['kind'], string> = {
+  matter: text('extractPanels.missingObject'),
+  cavity: text('extractPanels.missingCavity'),
+};
 
 export interface CoverageEvents {
   onStart: () => void;
@@ -26,10 +30,15 @@ export class CoveragePanel {
   readonly #start: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
   readonly #seed: HTMLButtonElement;
-  readonly #progress = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the measurement', hidden: true });
+  readonly #progress = h('progress', {
+    max: 1,
+    value: 0,
+    'aria-label': text('controls.measurementProgress'),
+    hidden: true,
+  });
   readonly #status = h('p', { class: 'help', role: 'status' });
   readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
-  readonly #list = h('ol', { class: 'uncovered', 'aria-label': 'Uncovered parts, largest first' });
+  readonly #list = h('ol', { class: 'uncovered', 'aria-label': text('extractPanels.uncoveredList') });
 
   /** `guide` is the address of the explanation in the documentation. */
   constructor(guide: string, events: CoverageEvents) {
@@ -37,28 +46,23 @@ export class CoveragePanel {
     this.#start = h(
       'button',
       { type: 'button', onclick: events.onStart, 'data-coverage-action': 'start' },
-      'Measure coverage',
+      text('extractPanels.measureCoverage'),
     );
     this.#cancel = h(
       'button',
       { type: 'button', onclick: events.onCancel, 'data-coverage-action': 'cancel', hidden: true },
-      'Cancel',
+      text('controls.cancel'),
     );
     this.#seed = h(
       'button',
       { type: 'button', onclick: events.onSeed, 'data-coverage-action': 'seed' },
-      'Seed missing parts',
+      text('extractPanels.seedMissing'),
     );
-    const why = h('a', { href: guide, target: '_blank', rel: 'noopener' }, 'What can a surface miss, and why?');
+    const why = h('a', { href: guide, target: '_blank', rel: 'noopener' }, text('extractPanels.coverageGuide'));
     this.element = h(
       'div',
       { class: 'coverage' },
-      h(
-        'p',
-        { class: 'help' },
-        'How much of the iso-surface of the image the surface covers (recall), and how much of the surface lies on it (precision). ',
-        why,
-      ),
+      h('p', { class: 'help' }, text('extractPanels.coverageHelp'), why),
       h('div', { class: 'buttons' }, this.#start, this.#cancel, this.#seed),
       this.#progress,
       this.#status,
@@ -87,10 +91,10 @@ export class CoveragePanel {
     this.#cancel.focus();
     this.#progress.hidden = false;
     this.#progress.value = 0;
-    this.#status.textContent = 'Measuring.';
+    this.#status.textContent = text('controls.measuring');
   }
 
-  tell({ share }: CoveringEvent): void {
+  showProgress({ share }: CoverageProgressEvent): void {
     this.#progress.value = share;
   }
 
@@ -101,22 +105,23 @@ export class CoveragePanel {
 
   finish(coverage: MeasuredCoverage | undefined): void {
     if (!coverage) {
-      this.#end('Cancelled.');
+      this.#end(text('controls.cancelled'));
       return;
     }
     this.#show(coverage);
     const { iteration, uncovered } = coverage;
-    const parts = uncovered.length === 0 ? 'No part is uncovered.' : `${plural(uncovered.length, 'part')} uncovered`;
-    const most = uncovered.length > MOST_PARTS ? `; the ${MOST_PARTS} largest are listed and marked.` : '.';
-    this.#end(`At iteration ${count(iteration)}: ${parts}${uncovered.length === 0 ? '' : most}`);
+    const values = { iteration: count(iteration), listed: MOST_PARTS };
+    if (uncovered.length === 0) this.#end(text('extractPanels.uncoveredNone', values));
+    else if (uncovered.length <= MOST_PARTS) this.#end(plural('extractPanels.uncoveredAll', uncovered.length, values));
+    else this.#end(plural('extractPanels.uncoveredMost', uncovered.length, values));
   }
 
   #show(coverage: MeasuredCoverage | undefined): void {
     this.#figures.dataset.coverage = JSON.stringify(coverage ?? {});
     const rows: [string, string, string][] = coverage
       ? [
-          ['Recall', percent(coverage.recall), 'share of the iso-surface within one voxel of this surface'],
-          ['Precision', percent(coverage.precision), 'share of this surface within one voxel of the iso-surface'],
+          [text('extractPanels.recall'), percent(coverage.recall), text('extractPanels.recallHelp')],
+          [text('extractPanels.precision'), percent(coverage.precision), text('extractPanels.precisionHelp')],
         ]
       : [];
     this.#figures.replaceChildren(
@@ -131,7 +136,7 @@ export class CoveragePanel {
   #item({ kind, area, position }: UncoveredRegion): HTMLElement {
     const where = position.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
     const size = `${figure(Number(area.toPrecision(3)))} ${this.unit ? `${this.unit}²` : ''}`.trim();
-    const label = `${KINDS[kind]}, area ${size}, at ${where}: show it in the views`;
+    const label = text('extractPanels.uncoveredShow', { kind: KINDS[kind], size, where });
     const goTo = h(
       'button',
       { type: 'button', class: 'quiet', 'aria-label': label, onclick: () => this.#events.onGoTo(position) },
@@ -143,18 +148,18 @@ export class CoveragePanel {
     return h('li', {}, goTo);
   }
 
-  #end(text: string): void {
+  #end(message: string): void {
     const hadFocus = document.activeElement === this.#cancel;
     this.#start.hidden = false;
     this.#seed.hidden = false;
     this.#cancel.hidden = true;
     this.#progress.hidden = true;
-    this.#status.textContent = text;
+    this.#status.textContent = message;
     if (hadFocus) this.#start.focus();
   }
 }
 
 /** Formats a fraction in percent, rounded down, so that 100 % means complete coverage. */
 function percent(share: number): string {
-  return `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
+  return text('controls.percent', { value: (Math.floor(share * 1000) / 10).toFixed(1) });
 }

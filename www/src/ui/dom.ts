@@ -26,7 +26,7 @@ function setAttribute(element: HTMLElement, name: string, value: unknown): void 
  * Returns a 2D context that draws on the CPU, for small images. With an accelerated context, after a few images, the
  * browser would wait until the GPU has completed all rendering of the 3D view: up to half a second without a GPU.
  */
-export function pen(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
+export function context2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
   return canvas.getContext('2d', { willReadFrequently: true });
 }
 
@@ -67,7 +67,7 @@ export function onSchemeChange(callback: () => void): void {
 }
 
 /** Whether the user prefers reduced motion. */
-export function wantsStillness(): boolean {
+export function prefersReducedMotion(): boolean {
   return matchMedia('(prefers-reduced-motion: reduce)').matches;
 }
 

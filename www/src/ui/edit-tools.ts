@@ -1,25 +1,25 @@
+import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
-import { plural } from './format';
 
 /** Effect of a click in the view on the points. */
 export type EditTool = 'none' | 'add' | 'remove' | 'outside';
 
 const TOOLS: { tool: EditTool; label: string; help: string }[] = [
-  { tool: 'none', label: 'Only look', help: 'Clicks do nothing. Choose what they should do.' },
+  { tool: 'none', label: text('pointPanels.toolNone'), help: text('pointPanels.toolNoneHelp') },
   {
     tool: 'add',
-    label: 'Add a point',
-    help: 'A click puts a point before the surface, so far away as the distance says; below 0 behind it. The surface follows.',
+    label: text('pointPanels.toolAdd'),
+    help: text('pointPanels.toolAddHelp'),
   },
   {
     tool: 'remove',
-    label: 'Remove points',
-    help: 'A click removes all points within the distance of the place, and leaves a gap.',
+    label: text('pointPanels.toolRemove'),
+    help: text('pointPanels.toolRemoveHelp'),
   },
   {
     tool: 'outside',
-    label: 'Add a point outside',
-    help: 'A click says that this place, so far before the surface, is outside. It binds as much as λe lets it.',
+    label: text('pointPanels.toolOutside'),
+    help: text('pointPanels.toolOutsideHelp'),
   },
 ];
 
@@ -60,24 +60,28 @@ export class EditTools {
     });
     this.#distance.setAttribute('aria-describedby', `${id}-error`);
     this.#distance.addEventListener('change', () => this.#checkDistance());
-    this.#clear = h('button', { type: 'button', onclick: onClear, 'data-edit': 'clear' }, 'Take all back');
+    this.#clear = h(
+      'button',
+      { type: 'button', onclick: onClear, 'data-edit': 'clear' },
+      text('pointPanels.discardEdits'),
+    );
     this.element = h(
       'div',
       { class: 'edit-tools' },
-      h('div', { class: 'tools', role: 'radiogroup', 'aria-label': 'What a click in the view does' }, ...radios),
+      h('div', { class: 'tools', role: 'radiogroup', 'aria-label': text('pointPanels.clickAction') }, ...radios),
       h(
         'div',
         { class: 'row' },
-        h('label', { for: id }, 'Distance'),
-        h('span', { class: 'value' }, this.#distance, h('span', { class: 'unit' }, '% of size')),
+        h('label', { for: id }, text('pointPanels.distance')),
+        h('span', { class: 'value' }, this.#distance, h('span', { class: 'unit' }, text('pointPanels.distanceUnit'))),
       ),
       this.#error,
       this.#help,
-      h('p', { class: 'help' }, 'By keyboard: Enter in the view is a click in its middle.'),
+      h('p', { class: 'help' }, text('pointPanels.editKeyboardHelp')),
       this.#counts,
       this.#clear,
     );
-    this.#tell();
+    this.#showHelp();
     this.show({ added: [], removed: [], outside: [] });
   }
 
@@ -91,7 +95,7 @@ export class EditTools {
   }
 
   /** Deselects the tool: clicks have no effect. */
-  putAway(): void {
+  deselect(): void {
     const [first] = this.#radios;
     if (first) first.checked = true;
     this.#choose('none');
@@ -99,27 +103,27 @@ export class EditTools {
 
   show({ added, removed, outside }: { added: unknown[]; removed: unknown[]; outside: unknown[] }): void {
     const parts = [
-      ...(added.length > 0 ? [`${plural(added.length, 'point')} added`] : []),
-      ...(removed.length > 0 ? [`${plural(removed.length, 'point')} removed`] : []),
-      ...(outside.length > 0 ? [`${plural(outside.length, 'point')} put outside`] : []),
+      ...(added.length > 0 ? [plural('pointPanels.pointsAdded', added.length)] : []),
+      ...(removed.length > 0 ? [plural('pointPanels.pointsRemoved', removed.length)] : []),
+      ...(outside.length > 0 ? [plural('pointPanels.exteriorAdded', outside.length)] : []),
     ];
-    this.#counts.textContent = parts.length > 0 ? `${parts.join(', ')}.` : 'Nothing was changed by hand.';
+    this.#counts.textContent = parts.length > 0 ? `${parts.join(', ')}.` : text('pointPanels.noEdits');
     this.#clear.disabled = parts.length === 0;
   }
 
   #choose(tool: EditTool): void {
     this.#tool = tool;
-    this.#tell();
+    this.#showHelp();
     this.#onTool(tool);
   }
 
   #checkDistance(): void {
     const valid = this.#distance.checkValidity();
-    this.#error.textContent = valid ? '' : `A number from −50 to 50 is needed; it is ${DISTANCE} again.`;
+    this.#error.textContent = valid ? '' : text('pointPanels.distanceError', { distance: DISTANCE });
     if (!valid) this.#distance.valueAsNumber = DISTANCE;
   }
 
-  #tell(): void {
+  #showHelp(): void {
     const tool = this.#tool;
     this.#help.textContent = TOOLS.find((one) => one.tool === tool)?.help ?? '';
   }

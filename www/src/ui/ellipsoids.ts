@@ -1,26 +1,27 @@
 import { lengthsOf, turned, withLengths } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Vec3 } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { HandleMode } from '../view/handles';
 import { h, uniqueId } from './dom';
 
 const MODES: { mode: HandleMode; label: string; key: string; help: string }[] = [
   {
     mode: 'move',
-    label: 'Move',
+    label: text('sculptPanels.modeMove'),
     key: 'm',
-    help: 'Arrow keys move it across the view, Page Up and Page Down towards you and away.',
+    help: text('sculptPanels.modeMoveHelp'),
   },
   {
     mode: 'turn',
-    label: 'Turn',
+    label: text('sculptPanels.modeRotate'),
     key: 't',
-    help: 'Arrow keys turn it as they turn the view, Page Up and Page Down like a steering wheel.',
+    help: text('sculptPanels.modeRotateHelp'),
   },
   {
     mode: 'size',
-    label: 'Size',
+    label: text('sculptPanels.modeScale'),
     key: 'e',
-    help: 'Up and down change its size, left and right its first axis, Page Up and Page Down its third.',
+    help: text('sculptPanels.modeScaleHelp'),
   },
 ];
 const AXES = ['x', 'y', 'z'] as const;
@@ -43,7 +44,7 @@ export interface EllipsoidEvents {
 export class EllipsoidControls {
   readonly element: HTMLElement;
   readonly #events: EllipsoidEvents;
-  readonly #list = h('div', { class: 'buttons chips', role: 'group', 'aria-label': 'Ellipsoids' });
+  readonly #list = h('div', { class: 'buttons chips', role: 'group', 'aria-label': text('sculptPanels.ellipsoids') });
   readonly #modes = new Map<HandleMode, HTMLButtonElement>();
   readonly #help = h('p', { class: 'help' });
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
@@ -59,29 +60,37 @@ export class EllipsoidControls {
 
   constructor(events: EllipsoidEvents) {
     this.#events = events;
-    this.#center = AXES.map((axis, k) => this.#field(`Centre, ${axis}`, (value) => this.#setCenter(k, value)));
-    this.#lengths = AXES.map((_, k) => this.#field(`Semi-axis ${k + 1}`, (value) => this.#setLength(k, value)));
+    this.#center = AXES.map((axis, k) =>
+      this.#field(text('sculptPanels.centreAxis', { axis }), (value) => this.#setCenter(k, value)),
+    );
+    this.#lengths = AXES.map((_, k) =>
+      this.#field(text('sculptPanels.semiAxis', { number: k + 1 }), (value) => this.#setLength(k, value)),
+    );
     this.#degrees = h('input', {
       type: 'number',
       value: 15,
       min: -180,
       max: 180,
       step: 'any',
-      'aria-label': 'Degrees to turn by',
+      'aria-label': text('sculptPanels.rotationAngle'),
     });
-    this.#add = h('button', { type: 'button', 'data-ellipsoid': 'add', onclick: events.onAdd }, 'Add');
-    this.#remove = h('button', { type: 'button', 'data-ellipsoid': 'remove', onclick: events.onRemove }, 'Remove');
+    this.#add = h(
+      'button',
+      { type: 'button', 'data-ellipsoid': 'add', onclick: events.onAdd },
+      text('sculptPanels.add'),
+    );
+    this.#remove = h(
+      'button',
+      { type: 'button', 'data-ellipsoid': 'remove', onclick: events.onRemove },
+      text('controls.remove'),
+    );
     this.#numbers = this.#layOutNumbers();
-    const modes = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What handles and arrow keys do' });
+    const modes = h('div', { class: 'buttons', role: 'group', 'aria-label': text('sculptPanels.handleMode') });
     modes.append(...MODES.map(({ mode, label, key }) => this.#modeButton(mode, label, key)));
     this.element = h(
       'div',
       { class: 'ellipsoids' },
-      h(
-        'p',
-        { class: 'help' },
-        'Choose one by clicking it, here, or by its number key in the view; then drag its handles. Esc lets it go.',
-      ),
+      h('p', { class: 'help' }, text('sculptPanels.ellipsoidsHelp')),
       this.#list,
       h('div', { class: 'buttons' }, this.#add, this.#remove),
       modes,
@@ -95,7 +104,9 @@ export class EllipsoidControls {
 
   set mode(mode: HandleMode) {
     for (const [one, button] of this.#modes) button.setAttribute('aria-pressed', String(one === mode));
-    this.#help.textContent = `In the view: ${MODES.find((one) => one.mode === mode)?.help ?? ''} With Shift a fifth as far.`;
+    this.#help.textContent = text('sculptPanels.modeHelp', {
+      help: MODES.find((one) => one.mode === mode)?.help ?? '',
+    });
   }
 
   show(pose: ControlEllipsoid[], names: string[], chosen: number | undefined): void {
@@ -111,7 +122,7 @@ export class EllipsoidControls {
     if (ellipsoid) this.#showNumbers(ellipsoid);
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -153,23 +164,38 @@ export class EllipsoidControls {
     const turns = AXES.map((axis, k) =>
       h(
         'button',
-        { type: 'button', 'aria-label': `Turn about ${axis}`, 'data-turn': axis, onclick: () => this.#turn(k) },
+        {
+          type: 'button',
+          'aria-label': text('sculptPanels.rotateAbout', { axis }),
+          'data-turn': axis,
+          onclick: () => this.#turn(k),
+        },
         axis,
       ),
     );
     return h(
       'div',
       { class: 'numbers' },
-      row('Centre x, y, z', this.#center),
-      row('Semi-axes', this.#lengths),
-      h('div', { class: 'triple' }, h('span', {}, 'Turn by', this.#degrees, '° about'), ...turns),
+      row(text('sculptPanels.centre'), this.#center),
+      row(text('sculptPanels.semiAxes'), this.#lengths),
+      h(
+        'div',
+        { class: 'triple' },
+        h('span', {}, text('sculptPanels.rotateBy'), this.#degrees, text('sculptPanels.degreesAbout')),
+        ...turns,
+      ),
     );
   }
 
   #modeButton(mode: HandleMode, label: string, key: string): HTMLButtonElement {
     const button = h(
       'button',
-      { type: 'button', 'data-mode': mode, title: `Key ${key}`, onclick: () => this.#events.onMode(mode) },
+      {
+        type: 'button',
+        'data-mode': mode,
+        title: text('sculptPanels.modeKey', { key }),
+        onclick: () => this.#events.onMode(mode),
+      },
       label,
     );
     this.#modes.set(mode, button);
@@ -190,37 +216,37 @@ export class EllipsoidControls {
     const ellipsoid = this.#ellipsoid;
     if (!ellipsoid) return;
     if (!Number.isFinite(value)) {
-      this.#refuse('A number is needed.');
+      this.#reject(text('controls.numberError'));
       return;
     }
     const center: Vec3 = [...ellipsoid.center];
     center[k] = value;
-    this.#events.onChange({ ...ellipsoid, center }, 'move');
+    this.#events.onChange({ ...ellipsoid, center }, text('sculpt.moved'));
   }
 
   #setLength(k: number, value: number): void {
     const ellipsoid = this.#ellipsoid;
     if (!ellipsoid) return;
     if (!(value > 0)) {
-      this.#refuse('A length above 0 is needed.');
+      this.#reject(text('sculptPanels.lengthError'));
       return;
     }
     const lengths = lengthsOf(ellipsoid);
     lengths[k] = value;
-    this.#events.onChange(withLengths(ellipsoid, lengths), 'size');
+    this.#events.onChange(withLengths(ellipsoid, lengths), text('sculpt.scaled'));
   }
 
   #turn(k: number): void {
     const [ellipsoid, about, degrees] = [this.#ellipsoid, DIRECTIONS[k], this.#degrees.valueAsNumber];
     if (!ellipsoid || !about) return;
     if (!Number.isFinite(degrees)) {
-      this.#refuse('A number of degrees is needed.');
+      this.#reject(text('sculptPanels.angleError'));
       return;
     }
-    this.#events.onChange(turned(ellipsoid, about, (degrees * Math.PI) / 180), 'turn');
+    this.#events.onChange(turned(ellipsoid, about, (degrees * Math.PI) / 180), text('sculpt.rotated'));
   }
 
-  #refuse(message: string): void {
+  #reject(message: string): void {
     const ellipsoid = this.#ellipsoid;
     if (ellipsoid) {
       const lengths = lengthsOf(ellipsoid);
@@ -231,7 +257,7 @@ export class EllipsoidControls {
         field.value = short(lengths[k] ?? 0);
       });
     }
-    this.complain(message);
+    this.showError(message);
   }
 }
 

@@ -1,17 +1,18 @@
 import type { MeshFormat } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 
 const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   {
     format: 'ply',
-    help: 'PLY: points and triangles, for MeshLab, CloudCompare and most research software',
+    help: text('controls.exportPly'),
     type: 'application/octet-stream',
   },
-  { format: 'stl', help: 'STL: triangles only, for 3D printing', type: 'model/stl' },
-  { format: 'glb', help: 'GLB: for web viewers, Blender and game engines', type: 'model/gltf-binary' },
-  { format: 'obj', help: 'OBJ: text, for nearly everything', type: 'model/obj' },
-  { format: 'vtp', help: 'VTP: for ParaView and vtk.js', type: 'application/xml' },
-  { format: 'mz3', help: 'MZ3: for Surfice and NiiVue', type: 'application/octet-stream' },
+  { format: 'stl', help: text('controls.exportStl'), type: 'model/stl' },
+  { format: 'glb', help: text('controls.exportGlb'), type: 'model/gltf-binary' },
+  { format: 'obj', help: text('controls.exportObj'), type: 'model/obj' },
+  { format: 'vtp', help: text('controls.exportVtp'), type: 'application/xml' },
+  { format: 'mz3', help: text('controls.exportMz3'), type: 'application/octet-stream' },
 ];
 
 /** Buttons that save the current surface in each file format. */
@@ -21,7 +22,12 @@ export class ExportButtons {
 
   constructor(onExport: (format: MeshFormat, type: string) => void) {
     this.#buttons = FORMATS.map(({ format, help, type }) => {
-      const attributes = { type: 'button', title: help, 'aria-label': `Save as ${help}`, 'data-export': format };
+      const attributes = {
+        type: 'button',
+        title: help,
+        'aria-label': text('controls.saveAs', { format: help }),
+        'data-export': format,
+      };
       return h('button', { ...attributes, onclick: () => onExport(format, type) }, format.toUpperCase());
     });
     this.element = h('div', { class: 'buttons exports' }, ...this.#buttons);

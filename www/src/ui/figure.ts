@@ -1,29 +1,30 @@
+import { text } from '../texts';
 import { h } from './dom';
 
 /** One of several images of a figure. */
-interface Picture {
+interface FigureVariant {
   /** Name on its button. */
   name: string;
   /** The result here. */
-  came: string;
+  ourResult: string;
 }
 
 /** A figure of a paper. */
-interface Figure<One extends Picture> {
+interface PaperFigure<One extends FigureVariant> {
   /** The result in the paper. */
-  saw: string;
+  paperResult: string;
   variants: [One, ...One[]];
   /** Hint at further details to observe. */
   hint?: string;
 }
 
 /** Describes the figure of the paper that is open: the paper's result, the result here, and its other images. */
-export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>> {
+export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
   readonly #onVariant: (preset: Preset, variant: Variant) => void;
   #shown: Preset | undefined;
   #buttons: { variant: Variant; button: HTMLButtonElement }[] = [];
-  readonly #came = h('p', { 'data-figure': 'came' });
+  readonly #ourResult = h('p', { 'data-figure': 'came' });
 
   constructor(onVariant: (preset: Preset, variant: Variant) => void) {
     this.#onVariant = onVariant;
@@ -33,26 +34,26 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
   show(preset: Preset | undefined, variant?: Variant): void {
     this.element.hidden = preset === undefined;
     // Existing buttons are kept, so that the focus stays.
-    if (preset && preset !== this.#shown) this.#layOut(preset);
+    if (preset && preset !== this.#shown) this.#build(preset);
     this.#shown = preset;
     if (preset) this.#choose(variant);
   }
 
-  #layOut(preset: Preset): void {
+  #build(preset: Preset): void {
     this.#buttons = preset.variants.map((one) => ({ variant: one, button: this.#button(preset, one) }));
     const several = preset.variants.length > 1;
-    const group = h('div', { class: 'buttons', role: 'group', 'aria-label': 'Pictures of the figure' });
+    const group = h('div', { class: 'buttons', role: 'group', 'aria-label': text('controls.figureImages') });
     group.append(...this.#buttons.map(({ button }) => button));
     this.element.replaceChildren(
-      h('p', {}, h('strong', {}, 'Paper: '), preset.saw),
-      this.#came,
+      h('p', {}, h('strong', {}, text('controls.figurePaper')), preset.paperResult),
+      this.#ourResult,
       ...(several ? [group] : []),
       ...(preset.hint ? [h('p', { class: 'help' }, preset.hint)] : []),
     );
   }
 
   #choose(variant: Variant | undefined): void {
-    this.#came.textContent = variant?.came ?? 'Here the settings are others than those of the figure.';
+    this.#ourResult.textContent = variant?.ourResult ?? text('controls.figureChanged');
     for (const { variant: one, button } of this.#buttons) button.setAttribute('aria-pressed', String(one === variant));
   }
 

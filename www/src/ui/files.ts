@@ -1,4 +1,5 @@
 import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
 const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
@@ -13,7 +14,7 @@ export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): 
     input.value = '';
     if (files.length > 0) onFiles(files);
   });
-  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, 'Open file…'));
+  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, text('controls.openFile')));
 }
 
 /** Accepts files dropped anywhere on the page, until aborted, and shows an overlay during the drag. */
@@ -50,8 +51,8 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
 /** Returns a common name for files that belong together. */
 export function nameOf(files: File[]): string {
   const [first, second] = files.map(({ name }) => name);
-  if (files.length === 2) return `${first} + ${second}`;
-  return files.length > 1 ? `${first} + ${files.length - 1}` : (first ?? '');
+  if (files.length === 2) return text('controls.twoFiles', { first: first ?? '', second: second ?? '' });
+  return files.length > 1 ? text('controls.moreFiles', { first: first ?? '', more: files.length - 1 }) : (first ?? '');
 }
 
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {

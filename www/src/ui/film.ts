@@ -1,6 +1,6 @@
 import { type Film, lastFrame } from '../sculpt/film';
+import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
-import { plural } from './format';
 
 /** Default and largest number of frames from one keyframe to the next. */
 export const FRAMES_BETWEEN = 24;
@@ -23,15 +23,20 @@ export interface FilmEvents {
 export class FilmControls {
   readonly element: HTMLElement;
   readonly #events: FilmEvents;
-  readonly #keys = h('div', { class: 'buttons chips', role: 'group', 'aria-label': 'Keyframes' });
-  readonly #says = h('p', { class: 'help', role: 'status' });
+  readonly #keys = h('div', { class: 'buttons chips', role: 'group', 'aria-label': text('sculptPanels.keyframes') });
+  readonly #status = h('p', { class: 'help', role: 'status' });
   readonly #between: HTMLInputElement;
   readonly #loop: HTMLInputElement;
   readonly #seek: HTMLInputElement;
   readonly #at = h('output', { 'aria-live': 'off' });
   readonly #record: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
-  readonly #progress = h('progress', { max: 1, value: 0, hidden: true, 'aria-label': 'Progress of the recording' });
+  readonly #progress = h('progress', {
+    max: 1,
+    value: 0,
+    hidden: true,
+    'aria-label': text('sculptPanels.recordingProgress'),
+  });
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   readonly #remove: HTMLButtonElement;
   #film: Film | undefined;
@@ -53,28 +58,29 @@ export class FilmControls {
     this.#loop.addEventListener('change', () => events.onLoop(this.#loop.checked));
     this.#seek = h('input', { type: 'range', id: seek, min: 0, max: 1, value: 0, step: 1 });
     this.#seek.addEventListener('input', () => events.onSeek(this.#seek.valueAsNumber));
-    this.#remove = filmButton('remove', 'Remove keyframe', () => this.#removeKey());
-    this.#record = filmButton('record', 'Record as GLB', events.onRecord);
-    this.#cancel = filmButton('cancel', 'Cancel', events.onCancelRecord);
+    this.#remove = filmButton('remove', text('sculptPanels.removeKeyframe'), () => this.#removeKey());
+    this.#record = filmButton('record', text('sculptPanels.recordGlb'), events.onRecord);
+    this.#cancel = filmButton('cancel', text('controls.cancel'), events.onCancelRecord);
     this.#cancel.hidden = true;
     this.element = h(
       'div',
       { class: 'film' },
-      h(
-        'p',
-        { class: 'help' },
-        'Place the ellipsoids, add a keyframe, place them anew, add another: Play goes from one to the next.',
-      ),
+      h('p', { class: 'help' }, text('sculptPanels.filmHelp')),
       this.#keys,
-      h('div', { class: 'buttons' }, filmButton('add', 'Add keyframe', events.onAddKey), this.#remove),
-      h('div', { class: 'row' }, h('label', { for: seek }, 'Frame'), this.#at),
+      h(
+        'div',
+        { class: 'buttons' },
+        filmButton('add', text('sculptPanels.addKeyframe'), events.onAddKey),
+        this.#remove,
+      ),
+      h('div', { class: 'row' }, h('label', { for: seek }, text('controls.frame')), this.#at),
       this.#seek,
-      h('div', { class: 'row' }, h('label', { for: between }, 'Frames between keyframes'), this.#between),
-      h('label', { class: 'check' }, this.#loop, 'Loop: from the last keyframe back to the first, for ever'),
+      h('div', { class: 'row' }, h('label', { for: between }, text('sculptPanels.framesBetween')), this.#between),
+      h('label', { class: 'check' }, this.#loop, text('sculptPanels.filmLoop')),
       h('div', { class: 'buttons' }, this.#record, this.#cancel),
       this.#progress,
       this.#error,
-      this.#says,
+      this.#status,
     );
     this.show(undefined, 0);
   }
@@ -91,7 +97,7 @@ export class FilmControls {
     this.#seek.valueAsNumber = frame;
     this.#seek.disabled = !film || lastFrame(film) < 1;
     this.#record.disabled = this.#seek.disabled;
-    this.#at.value = film ? `${frame} of ${last}` : '–';
+    this.#at.value = film ? text('controls.frameOf', { frame, last }) : '–';
     this.#loop.checked = film?.loop ?? false;
     this.#loop.disabled = !film;
     this.#between.disabled = film !== undefined && 'motion' in film;
@@ -118,12 +124,12 @@ export class FilmControls {
     for (const [index, button] of [...this.#keys.children].entries())
       button.setAttribute('aria-pressed', String(index === this.#present));
     this.#remove.disabled = this.#present === undefined;
-    this.#says.textContent =
+    this.#status.textContent =
       film && 'motion' in film
-        ? 'The motion is computed. A keyframe of your own takes its place.'
+        ? text('sculptPanels.motionComputed')
         : keys === 0
-          ? 'No keyframe yet.'
-          : `${plural(keys, 'keyframe')}${keys === 1 ? '; a film needs two' : ''}.`;
+          ? text('sculptPanels.noKeyframes')
+          : plural('sculptPanels.keyframeCount', keys);
   }
 
   /** Index of the keyframe at the current frame; undefined between keyframes. */
@@ -137,7 +143,7 @@ export class FilmControls {
     const go = () => {
       if (this.#film && 'keys' in this.#film) this.#events.onSeek(index * this.#film.between);
     };
-    const label = `Keyframe ${index + 1}`;
+    const label = text('sculptPanels.keyframeName', { number: index + 1 });
     return h(
       'button',
       { type: 'button', 'aria-label': label, title: label, 'data-key': index + 1, onclick: go },
@@ -151,7 +157,7 @@ export class FilmControls {
 
   #setBetween(): void {
     const valid = this.#between.checkValidity() && this.#between.value !== '';
-    this.#error.textContent = valid ? '' : `A whole number from 1 to ${MOST_BETWEEN} is needed.`;
+    this.#error.textContent = valid ? '' : text('sculptPanels.framesBetweenError', { most: MOST_BETWEEN });
     if (valid) this.#events.onBetween(this.#between.valueAsNumber);
     else this.#between.valueAsNumber = this.#film && 'keys' in this.#film ? this.#film.between : FRAMES_BETWEEN;
   }

@@ -1,4 +1,6 @@
-const COUNT = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
+import { LANGUAGE, text } from '../texts';
+
+const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
 
 export function count(value: number): string {
   return COUNT.format(value);
@@ -9,15 +11,13 @@ export function figure(value: number): string {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-3 || size >= 1e7)) return value.toExponential(2);
-  return new Intl.NumberFormat('en', { maximumSignificantDigits: 4 }).format(value);
+  return new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 }).format(value);
 }
 
 export function milliseconds(value: number): string {
-  return value < 1000 ? `${figure(Math.round(value))} ms` : `${(value / 1000).toFixed(2)} s`;
-}
-
-export function plural(value: number, one: string, many = `${one}s`): string {
-  return `${count(value)} ${value === 1 ? one : many}`;
+  return value < 1000
+    ? text('controls.milliseconds', { value: figure(Math.round(value)) })
+    : text('controls.seconds', { value: (value / 1000).toFixed(2) });
 }
 
 /** Returns the paper's symbol of the image on a pyramid level: I₀ is the volume itself. */

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h, icon, uniqueId } from './dom';
 import { count } from './format';
 
@@ -12,7 +13,7 @@ const FRAME_MS = 110;
 export class FrameBar {
   readonly element: HTMLElement;
   readonly #onFrame: (frame: number) => void;
-  readonly #beat: HTMLButtonElement;
+  readonly #play: HTMLButtonElement;
   readonly #icon = h('span', { class: 'icon-holder' });
   readonly #text = h('span');
   readonly #buttons: HTMLButtonElement[];
@@ -31,20 +32,20 @@ export class FrameBar {
     const id = uniqueId('frame');
     this.#slider = h('input', { type: 'range', id, min: 0, max: 1, step: 1, value: 0 });
     this.#slider.addEventListener('input', () => this.#byHand(this.#slider.valueAsNumber));
-    this.#beat = h(
+    this.#play = h(
       'button',
       { type: 'button', 'data-frame': 'beat', onclick: () => this.toggle() },
       this.#icon,
       this.#text,
     );
-    const previous = labelled('previous', BACK, 'Previous frame', () => this.go(-1));
-    const next = labelled('next', ON, 'Next frame', () => this.go(1));
+    const previous = labelled('previous', BACK, text('trackPanels.previousFrame'), () => this.go(-1));
+    const next = labelled('next', ON, text('trackPanels.nextFrame'), () => this.go(1));
     this.#buttons = [previous, next];
     this.element = h(
       'div',
-      { class: 'frames', role: 'group', 'aria-label': 'Frames' },
-      h('div', { class: 'buttons' }, previous, this.#beat, next),
-      h('label', { for: id }, 'Frame'),
+      { class: 'frames', role: 'group', 'aria-label': text('trackPanels.frames') },
+      h('div', { class: 'buttons' }, previous, this.#play, next),
+      h('label', { for: id }, text('controls.frame')),
       this.#slider,
       this.#at,
     );
@@ -55,7 +56,7 @@ export class FrameBar {
     return this.#frame;
   }
 
-  get beating(): boolean {
+  get playing(): boolean {
     return this.#pending !== 0;
   }
 
@@ -68,9 +69,9 @@ export class FrameBar {
     this.#slider.max = String(Math.max(1, frames - 1));
     this.#slider.valueAsNumber = this.#frame;
     this.#slider.disabled = frames < 2;
-    this.#slider.setAttribute('aria-valuetext', `frame ${this.#frame + 1} of ${frames}`);
-    this.#at.value = `${count(this.#frame + 1)} of ${count(frames)}`;
-    this.#beat.disabled = done < 2;
+    this.#slider.setAttribute('aria-valuetext', text('trackPanels.frameOfSpoken', { frame: this.#frame + 1, frames }));
+    this.#at.value = text('controls.frameOf', { frame: count(this.#frame + 1), last: count(frames) });
+    this.#play.disabled = done < 2;
     for (const button of this.#buttons) button.disabled = frames < 2;
     this.#label();
   }
@@ -81,12 +82,12 @@ export class FrameBar {
   }
 
   toggle(): void {
-    if (this.beating) this.stop();
+    if (this.playing) this.stop();
     else this.start();
   }
 
   start(): void {
-    if (this.#done < 2 || this.beating) return;
+    if (this.#done < 2 || this.playing) return;
     this.#since = performance.now();
     this.#pending = requestAnimationFrame((now) => this.#turn(now));
     this.#label();
@@ -111,11 +112,11 @@ export class FrameBar {
   }
 
   #label(): void {
-    this.#icon.replaceChildren(icon(this.beating ? PAUSE : PLAY));
-    this.#text.textContent = this.beating ? 'Hold' : 'Beat';
-    const title = this.beating ? 'Hold this frame' : 'Beat: show the frames that are done in a loop';
-    this.#beat.title = title;
-    this.#beat.setAttribute('aria-label', title);
+    this.#icon.replaceChildren(icon(this.playing ? PAUSE : PLAY));
+    this.#text.textContent = this.playing ? text('trackPanels.stopLoop') : text('trackPanels.loop');
+    const title = this.playing ? text('trackPanels.stopLoopLabel') : text('trackPanels.loopLabel');
+    this.#play.title = title;
+    this.#play.setAttribute('aria-label', title);
   }
 }
 

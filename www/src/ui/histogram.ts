@@ -1,5 +1,6 @@
 import type { VolumeView } from '../protocol';
-import { h, onSchemeChange, pen, symbol, token, uniqueId } from './dom';
+import { text } from '../texts';
+import { context2d, h, onSchemeChange, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
@@ -18,12 +19,12 @@ export class Histogram {
 
   constructor(onIso: (iso: number) => void) {
     const id = uniqueId('iso');
-    this.#slider = h('input', { type: 'range', 'aria-label': 'Iso value on the histogram', disabled: true });
+    this.#slider = h('input', { type: 'range', 'aria-label': text('extractPanels.isoSlider'), disabled: true });
     this.#number = h('input', { type: 'number', id, step: 'any', disabled: true, 'aria-describedby': `${id}-help` });
     this.#slider.addEventListener('input', () => this.#changed(this.#slider.valueAsNumber, onIso));
     this.#number.addEventListener('change', () => this.#changed(this.#number.valueAsNumber, onIso));
-    const label = h('label', { for: id }, 'Iso value ', symbol('πI'));
-    const help = 'The intensity the surface settles at. Drag the line, or type.';
+    const label = h('label', { for: id }, text('extractPanels.isoValue'), symbol('πI'));
+    const help = text('extractPanels.isoHelp');
     this.element = h(
       'div',
       { class: 'histogram', 'data-param': 'iso' },
@@ -60,7 +61,7 @@ export class Histogram {
     this.#draw();
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -71,7 +72,7 @@ export class Histogram {
 
   #draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
-    const context = pen(this.#canvas);
+    const context = context2d(this.#canvas);
     if (!this.#volume || !context || clientWidth === 0) return;
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);
@@ -90,12 +91,13 @@ export class Histogram {
   }
 
   #describe(): void {
-    if (this.#volume) this.#canvas.setAttribute('aria-label', tellHistogram(this.#volume, this.#slider.valueAsNumber));
+    if (this.#volume)
+      this.#canvas.setAttribute('aria-label', describeHistogram(this.#volume, this.#slider.valueAsNumber));
   }
 }
 
 /** Describes the histogram in words, for screen readers. */
-function tellHistogram(
+function describeHistogram(
   { histogram, range: [low, high] }: Pick<VolumeView, 'histogram' | 'range'>,
   iso: number,
 ): string {
@@ -109,7 +111,12 @@ function tellHistogram(
   }
   const middle = low + (half / histogram.length) * (high - low);
   const share = all > 0 ? (100 * above) / all : 0;
-  return `Histogram of intensities from ${figure(low)} to ${figure(high)}. Half of the voxels are below about ${figure(Math.round(middle))}; ${share.toFixed(1)} % are at the iso value or above.`;
+  return text('extractPanels.histogramTold', {
+    low: figure(low),
+    high: figure(high),
+    middle: figure(Math.round(middle)),
+    share: share.toFixed(1),
+  });
 }
 
 /** Returns a slider step that integral intensities are multiples of, and that is fine enough for any other range. */

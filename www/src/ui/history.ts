@@ -1,5 +1,6 @@
 import type { StepReport } from '../protocol';
-import { count, plural } from './format';
+import { plural, text } from '../texts';
+import { count } from './format';
 
 /** Numbers of topology changes at one iteration. */
 export interface Change {
@@ -40,7 +41,7 @@ export class History {
     return (iteration) => ({ reports, iteration });
   }
 
-  /** Restores the state at a mark. The list of reports extended since stays unchanged for holders of later marks. */
+  /** Restores the state at a mark. Builds a new list of reports, since later marks still refer to the old one. */
   rewind({ reports, iteration }: HistoryMark): void {
     this.#reports = [];
     this.phases.length = 0;
@@ -72,8 +73,8 @@ export class History {
 /** Describes the progress of a run for the status line. */
 export function underWay({ reports }: History): string {
   const last = reports.at(-1);
-  if (!last) return 'Running.';
+  if (!last) return text('measures.running');
   const { iteration, phase, vertices, components } = last;
-  const surface = vertices > 0 ? `: ${count(vertices)} vertices in ${plural(components, 'component')}` : '';
-  return `Running. Iteration ${count(iteration)}, ${phase}${surface}.`;
+  const surface = vertices > 0 ? plural('measures.runningSurface', components, { vertices: count(vertices) }) : '';
+  return text('measures.runningAt', { iteration: count(iteration), phase, surface });
 }

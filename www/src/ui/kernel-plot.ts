@@ -1,6 +1,7 @@
 import uPlot from 'uplot';
 import type { ParamValues } from '../protocol';
 import { kernelParams, phi } from '../reconstruct/kernel';
+import { text } from '../texts';
 import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
@@ -18,7 +19,7 @@ export class KernelPlot {
 
   constructor() {
     const holder = h('div', { class: 'plot kernel', 'aria-hidden': 'true' });
-    this.element = h('figure', {}, h('h3', {}, 'Kernel φ(r)'), holder, this.#caption);
+    this.element = h('figure', {}, h('h3', {}, text('pointPanels.kernelTitle')), holder, this.#caption);
     this.#plot = new uPlot(options(), [[], []], holder);
     new ResizeObserver(() => {
       if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: HEIGHT });
@@ -33,17 +34,20 @@ export class KernelPlot {
     const values = distances.map((r) => phi(kernel, r));
     const most = Math.max(...values.map(Math.abs));
     this.#plot.setData([distances, values.map((value) => value / most)]);
-    this.#caption.textContent = tell(kernel.kernel, (r) => phi(kernel, r));
+    this.#caption.textContent = describeKernel(kernel.kernel, (r) => phi(kernel, r));
   }
 }
 
-function tell(kernel: string, value: (r: number) => number): string {
-  const unit = 'The box is 2 long; heights are relative.';
-  if (kernel === 'thin-plate' || kernel === 'biharmonic')
-    return `Grows without end in size: far points matter most, and the whole must balance. ${unit}`;
+function describeKernel(kernel: string, value: (r: number) => number): string {
+  const unit = text('pointPanels.kernelUnit');
+  if (kernel === 'thin-plate' || kernel === 'biharmonic') return text('pointPanels.kernelUnbounded', { unit });
   const half = bisect((r) => value(r) - value(0) / 2);
   const left = value(0.5) / value(0);
-  return `Falls to half at r = ${figure(Number(half.toPrecision(2)))}; at 0.5, ${figure(Number((100 * left).toPrecision(2)))} % are left. ${unit}`;
+  return text('pointPanels.kernelDecay', {
+    half: figure(Number(half.toPrecision(2))),
+    left: figure(Number((100 * left).toPrecision(2))),
+    unit,
+  });
 }
 
 /** Returns the zero of a decreasing function. */

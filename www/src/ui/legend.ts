@@ -1,4 +1,5 @@
-import { h, pen } from './dom';
+import { text } from '../texts';
+import { context2d, h } from './dom';
 import { figure } from './format';
 
 const STEPS = 64;
@@ -21,7 +22,7 @@ export class Legend {
   readonly #color: (t: number) => [number, number, number];
   readonly element = h(
     'div',
-    { class: 'color-legend', role: 'group', 'aria-label': 'Meaning of the colours', hidden: true },
+    { class: 'color-legend', role: 'group', 'aria-label': text('controls.colorScale'), hidden: true },
     this.#title,
     this.#bar,
     h('span', { class: 'ends' }, ...this.#ends),
@@ -45,7 +46,7 @@ export class Legend {
 
   /** Draws the colours from `low` to 1. */
   #draw(low: number): void {
-    const context = pen(this.#bar);
+    const context = context2d(this.#bar);
     for (let i = 0; i < STEPS; i++) {
       if (!context) break;
       context.fillStyle = `rgb(${this.#color(low + ((1 - low) * i) / (STEPS - 1)).join(' ')})`;

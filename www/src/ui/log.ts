@@ -1,15 +1,16 @@
+import { plural, text } from '../texts';
 import { h } from './dom';
-import { count, plural } from './format';
+import { count } from './format';
 import type { Change, History } from './history';
 
-/** Number of entries kept on the page; the totals above them count all. */
+/** Largest number of entries listed; the totals above the list count all topology changes. */
 const MOST_ENTRIES = 300;
 
 /** Log of events, newest first: level changes, joins, cuts, components that vanished or were seeded. */
 export class EventLog {
   readonly element: HTMLElement;
   readonly #summary = h('p', { class: 'help' });
-  readonly #list = h('ol', { class: 'log', tabindex: 0, 'aria-label': 'Events, newest first' });
+  readonly #list = h('ol', { class: 'log', tabindex: 0, 'aria-label': text('measures.eventsList') });
   #phases = 0;
   #changes = 0;
 
@@ -22,13 +23,15 @@ export class EventLog {
     this.#phases = 0;
     this.#changes = 0;
     this.#list.replaceChildren();
-    this.#summary.textContent = 'Nothing has happened yet.';
+    this.#summary.textContent = text('measures.noEvents');
   }
 
   /** Appends the new entries of the history. */
   update(history: History): void {
     const fresh = [
-      ...history.phases.slice(this.#phases).map(({ iteration, phase }) => entry(iteration, 'level', `begins ${phase}`)),
+      ...history.phases
+        .slice(this.#phases)
+        .map(({ iteration, phase }) => entry(iteration, 'level', text('measures.phaseBegins', { phase }))),
       ...history.changes
         .slice(this.#changes)
         .map((change) => entry(change.iteration, kindOf(change), describe(change))),
@@ -54,28 +57,31 @@ function kindOf(change: Change): string {
 
 export function describe({ axial, annular, vanished, seeds }: Change): string {
   const parts: string[] = [];
-  if (axial > 0) parts.push(plural(axial, 'join'));
-  if (annular > 0) parts.push(plural(annular, 'cut'));
-  if (vanished > 0) parts.push(`${plural(vanished, 'part')} vanished`);
-  if (seeds > 0) parts.push(`${plural(seeds, 'part')} seeded`);
+  if (axial > 0) parts.push(plural('measures.joins', axial));
+  if (annular > 0) parts.push(plural('measures.cuts', annular));
+  if (vanished > 0) parts.push(plural('measures.vanished', vanished));
+  if (seeds > 0) parts.push(plural('measures.seeded', seeds));
   return parts.join(', ');
 }
 
 /** Describes the totals of all topology changes. */
 export function totals(changes: Change[]): string {
   const sum = (of: (change: Change) => number) => changes.reduce((total, change) => total + of(change), 0);
-  const joins = plural(
-    sum((change) => change.axial),
-    'join',
-  );
-  const cuts = plural(
-    sum((change) => change.annular),
-    'cut',
-  );
-  const vanished = plural(
-    sum((change) => change.vanished),
-    'part',
-  );
+  const values = {
+    joins: plural(
+      'measures.joins',
+      sum((change) => change.axial),
+    ),
+    cuts: plural(
+      'measures.cuts',
+      sum((change) => change.annular),
+    ),
+    vanished: plural(
+      'measures.vanished',
+      sum((change) => change.vanished),
+    ),
+  };
   const seeds = sum((change) => change.seeds);
-  return `${joins}, ${cuts}, ${vanished} vanished${seeds > 0 ? `, ${count(seeds)} seeded` : ''}.`;
+  if (seeds === 0) return text('measures.eventTotals', values);
+  return text('measures.eventTotalsSeeded', { ...values, seeded: count(seeds) });
 }

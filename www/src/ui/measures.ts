@@ -1,5 +1,6 @@
 import type { Unit } from '../examples';
 import type { Measures, StepReport } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
 
@@ -19,32 +20,32 @@ export interface MeasureValues {
 type Name = keyof MeasureValues;
 
 const ROWS: { name: Name; label: string; help: string }[] = [
-  { name: 'vertices', label: 'Vertices', help: 'Points of the mesh' },
-  { name: 'triangles', label: 'Triangles', help: 'Faces of the mesh' },
-  { name: 'components', label: 'Components', help: 'Separate closed surfaces' },
-  { name: 'genus', label: 'Genus', help: 'Handles, all components together' },
-  { name: 'chi', label: 'Euler characteristic χ', help: 'Vertices − edges + triangles = 2 × components − 2 × genus' },
-  { name: 'volume', label: 'Volume', help: 'Enclosed volume' },
-  { name: 'area', label: 'Area', help: 'Area of the surface' },
+  { name: 'vertices', label: text('measures.vertices'), help: text('measures.verticesHelp') },
+  { name: 'triangles', label: text('measures.triangles'), help: text('measures.trianglesHelp') },
+  { name: 'components', label: text('measures.components'), help: text('measures.componentsHelp') },
+  { name: 'genus', label: text('measures.genus'), help: text('measures.genusHelp') },
+  { name: 'chi', label: text('measures.euler'), help: text('measures.eulerHelp') },
+  { name: 'volume', label: text('measures.volume'), help: text('measures.volumeHelp') },
+  { name: 'area', label: text('measures.area'), help: text('measures.areaHelp') },
   {
     name: 'closed',
-    label: 'Closed',
-    help: 'No edge without its second triangle; checked when the surface stands still',
+    label: text('measures.closed'),
+    help: text('measures.closedHelp'),
   },
   {
     name: 'oriented',
-    label: 'Oriented',
-    help: 'All triangles face outwards alike; checked when the surface stands still',
+    label: text('measures.oriented'),
+    help: text('measures.orientedHelp'),
   },
   {
     name: 'crossings',
-    label: 'Crossings',
-    help: 'Pairs of triangles that cross; counted when the surface stands still',
+    label: text('measures.selfIntersections'),
+    help: text('measures.selfIntersectionsHelp'),
   },
 ];
 
 /** A measure that only one lab has. */
-export interface MoreMeasure {
+export interface ExtraMeasure {
   name: string;
   label: string;
   help: string;
@@ -59,14 +60,14 @@ export class MeasurePanel {
   readonly #cells = new Map<Name, HTMLElement>();
   #unit: Unit = 'mm';
   #values: Partial<MeasureValues> = {};
-  readonly #more: { measure: MoreMeasure; cell: HTMLElement }[];
-  #moreValues: Record<string, unknown> = {};
+  readonly #extra: { measure: ExtraMeasure; cell: HTMLElement }[];
+  #extraValues: Record<string, unknown> = {};
 
-  /** `more` is listed after the measures that every surface has. */
-  constructor(more: MoreMeasure[] = []) {
+  /** `extra` is listed after the measures that every surface has. */
+  constructor(extra: ExtraMeasure[] = []) {
     this.element = h('dl', { class: 'measures', 'data-measures': '{}' });
     for (const row of ROWS) this.#cells.set(row.name, this.#addRow(row));
-    this.#more = more.map((measure) => ({ measure, cell: this.#addRow(measure) }));
+    this.#extra = extra.map((measure) => ({ measure, cell: this.#addRow(measure) }));
   }
 
   #addRow({ name, label, help }: { name: string; label: string; help: string }): HTMLElement {
@@ -76,24 +77,24 @@ export class MeasurePanel {
   }
 
   /** Shows the lab's own values; not every value has a row. */
-  showMore(values: Record<string, unknown>): void {
-    this.#moreValues = values;
-    for (const { measure, cell } of this.#more) {
+  showExtra(values: Record<string, unknown>): void {
+    this.#extraValues = values;
+    for (const { measure, cell } of this.#extra) {
       const value = values[measure.name];
       cell.textContent = typeof value === 'number' ? measure.text(value) : '–';
       if (measure.optional && cell.parentElement) cell.parentElement.hidden = typeof value !== 'number';
     }
-    this.#tell();
+    this.#publish();
   }
 
   /** Resets all values to unknown. */
   clear(): void {
     this.#show({});
-    this.showMore({});
+    this.showExtra({});
   }
 
-  #tell(): void {
-    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#moreValues });
+  #publish(): void {
+    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#extraValues });
   }
 
   /** Unit of length, for volume and area. */
@@ -133,7 +134,7 @@ export class MeasurePanel {
 
   #show(values: Partial<MeasureValues>): void {
     this.#values = values;
-    this.#tell();
+    this.#publish();
     for (const [name, cell] of this.#cells) {
       const value = values[name];
       const text = value === undefined ? '–' : textOf(name, value, this.#unit);
@@ -144,7 +145,7 @@ export class MeasurePanel {
 }
 
 function textOf(name: Name, value: number | boolean, unit: Unit): string {
-  if (typeof value === 'boolean') return value ? 'yes' : 'no';
+  if (typeof value === 'boolean') return value ? text('controls.yes') : text('controls.no');
   if (name === 'volume') return sized(value, 3, unit);
   if (name === 'area') return sized(value, 2, unit);
   return count(value);

@@ -1,4 +1,5 @@
 import type { ParamSpec, ParamValues } from '../protocol';
+import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
@@ -18,7 +19,7 @@ const NUMBER = 'number';
 interface Control {
   element: HTMLElement;
   show(value: unknown): void;
-  complain(message: string | undefined): void;
+  showError(message: string | undefined): void;
 }
 
 /** Controls for a method's parameters, generated from their specifications. */
@@ -49,7 +50,7 @@ export class ParamControls {
   show(values: ParamValues): void {
     for (const [name, control] of this.#controls) {
       if (name in values) control.show(values[name]);
-      control.complain(undefined);
+      control.showError(undefined);
     }
   }
 
@@ -62,8 +63,8 @@ export class ParamControls {
   }
 
   /** Shows beside a control why its value was rejected. */
-  complain(name: string, message: string): void {
-    this.#controls.get(name)?.complain(message);
+  showError(name: string, message: string): void {
+    this.#controls.get(name)?.showError(message);
   }
 }
 
@@ -76,11 +77,11 @@ function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Contro
   const unit = spec.type === 'choice' ? [] : unitOf(spec);
   const value = h('span', { class: 'value' }, input.main, ...unit);
   const element = h('div', { class: 'param', 'data-param': spec.name }, label, value, ...input.extra, help, error);
-  const complain = (message: string | undefined) => {
+  const showError = (message: string | undefined) => {
     error.textContent = message ?? '';
     input.main.toggleAttribute('aria-invalid', message !== undefined);
   };
-  return { element, show: input.show, complain };
+  return { element, show: input.show, showError };
 }
 
 function unitOf({ unit }: ParamSpec): HTMLElement[] {
@@ -135,7 +136,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
   const name = [label, unit].filter(Boolean).join(', ');
   const field = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal', 'aria-label': name });
   const row = h('span', { class: 'value own', hidden: true }, field, ...unitOf(spec));
-  main.append(h('option', { value: NUMBER }, 'a number'));
+  main.append(h('option', { value: NUMBER }, text('controls.customValue')));
   main.addEventListener('change', () => {
     row.hidden = main.value !== NUMBER;
     if (!row.hidden) field.focus();
@@ -190,7 +191,11 @@ class Slider {
     this.#max = max;
     const step = spec.step ?? (spec.type === 'integer' ? 1 : (max - min) / LOG_STEPS);
     const range = this.#scale === 'linear' ? { min, max, step } : { min: 0, max: LOG_STEPS, step: 1 };
-    this.element = h('input', { type: 'range', 'aria-label': `${spec.label}, slider`, ...range });
+    this.element = h('input', {
+      type: 'range',
+      'aria-label': text('controls.sliderOf', { label: spec.label }),
+      ...range,
+    });
   }
 
   get value(): number {

@@ -1,16 +1,22 @@
 import type { StepReport } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { milliseconds } from './format';
 import type { History } from './history';
 
 /** The stages of the implicit surface method, in order. */
 const PHASES = [
-  { name: 'subsample', text: 'Clean and thin out the points' },
-  { name: 'constraints', text: 'Find points outside' },
-  { name: 'solve', text: 'Solve for the weights' },
-  { name: 'extract', text: 'Follow the surface' },
-  { name: 'colour', text: 'Take colours' },
+  { name: 'subsample', text: text('pointPanels.phaseSubsample') },
+  { name: 'constraints', text: text('pointPanels.phaseConstraints') },
+  { name: 'solve', text: text('pointPanels.phaseSolve') },
+  { name: 'extract', text: text('pointPanels.phaseExtract') },
+  { name: 'colour', text: text('pointPanels.phaseColour') },
 ] as const;
+
+/** Returns the name of a stage for messages. */
+export function phaseName(phase: string): string {
+  return PHASES.find(({ name }) => name === phase)?.text ?? phase;
+}
 
 /** List of the stages, each with its progress and duration. */
 export class PhaseList {

@@ -1,5 +1,6 @@
 import type { Photograph } from '../labs/photographs';
-import { h, pen } from './dom';
+import { text } from '../texts';
+import { context2d, h } from './dom';
 
 const THUMBNAIL = 72;
 
@@ -20,7 +21,7 @@ export class PhotoStrip {
     const close = h(
       'button',
       { type: 'button', class: 'quiet', onclick: () => this.choose(undefined) },
-      'Close photograph',
+      text('pointPanels.closePhotograph'),
     );
     this.large = h('figure', { class: 'photograph', hidden: true }, this.#canvas, h('div', {}, this.#caption, close));
   }
@@ -34,13 +35,13 @@ export class PhotoStrip {
     this.element.hidden = pictured.length === 0;
     this.#buttons = photographs.map((photograph, i) => this.#button(photograph, i));
     this.element.replaceChildren(
-      h('p', { class: 'help' }, 'Photographs: choose one to look through its camera; arrow keys go along them.'),
+      h('p', { class: 'help' }, text('pointPanels.photographsHelp')),
       h(
         'div',
         {
           class: 'strip',
           role: 'toolbar',
-          'aria-label': 'Photographs',
+          'aria-label': text('pointPanels.photographs'),
           onkeydown: (event) => this.#goAlong(event),
           onfocusin: ({ target }) => this.#makeStop(this.#buttons.indexOf(target as HTMLButtonElement)),
         },
@@ -63,8 +64,14 @@ export class PhotoStrip {
     this.large.hidden = !photograph?.picture;
     if (photograph?.picture) {
       draw(this.#canvas, photograph.picture, photograph.picture.width);
-      this.#canvas.setAttribute('aria-label', `Photograph ${(index ?? 0) + 1}, ${photograph.name}`);
-      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; beside it the surface through the same camera.`;
+      this.#canvas.setAttribute(
+        'aria-label',
+        text('pointPanels.photographNamed', { number: (index ?? 0) + 1, name: photograph.name }),
+      );
+      this.#caption.textContent = text('pointPanels.photographCaption', {
+        number: (index ?? 0) + 1,
+        count: this.#photographs.length,
+      });
     }
     if (this.#chosen !== undefined) this.#makeStop(this.#chosen);
     if (changed) this.#onChoose(this.#chosen);
@@ -87,7 +94,7 @@ export class PhotoStrip {
   #button({ name, picture }: Photograph, index: number): HTMLButtonElement {
     const canvas = h('canvas', { 'aria-hidden': 'true' });
     if (picture) draw(canvas, picture, THUMBNAIL);
-    const label = `Photograph ${index + 1}: look through its camera`;
+    const label = text('pointPanels.photographCamera', { number: index + 1 });
     const act = () => this.choose(this.#chosen === index ? undefined : index);
     return h(
       'button',
@@ -101,5 +108,5 @@ export class PhotoStrip {
 function draw(canvas: HTMLCanvasElement, picture: ImageBitmap, width: number): void {
   canvas.width = width;
   canvas.height = Math.round((width * picture.height) / picture.width);
-  pen(canvas)?.drawImage(picture, 0, 0, canvas.width, canvas.height);
+  context2d(canvas)?.drawImage(picture, 0, 0, canvas.width, canvas.height);
 }

@@ -1,4 +1,5 @@
 import type { StepReport } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
 import type { Curve } from './plots';
@@ -20,15 +21,17 @@ export class PlotTable {
     this.#curves = curves;
     const row = () => [h('th', { scope: 'row' }), ...curves.map(() => h('td'))];
     this.#cells = Array.from({ length: ROWS }, row);
-    const heads = ['iteration', ...curves.map(({ label }) => label)].map((text) => h('th', { scope: 'col' }, text));
+    const heads = [text('measures.columnIteration'), ...curves.map(({ label }) => label)].map((text) =>
+      h('th', { scope: 'col' }, text),
+    );
     const body = h('tbody', {}, ...this.#cells.map((cells) => h('tr', {}, ...cells)));
     const table = h('table', { class: 'times', 'data-plot-table': '' }, h('thead', {}, h('tr', {}, ...heads)), body);
     const holder = h(
       'div',
-      { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'The plots as a table' },
+      { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': text('measures.plotTable') },
       table,
     );
-    this.element = h('details', {}, h('summary', {}, 'As a table'), holder);
+    this.element = h('details', {}, h('summary', {}, text('measures.plotTableSummary')), holder);
     this.element.addEventListener('toggle', () => this.#fill());
   }
 

@@ -1,4 +1,5 @@
 import uPlot from 'uplot';
+import { type TextKey, text } from '../texts';
 import 'uplot/dist/uPlot.min.css';
 import type { StepReport } from '../protocol';
 import { h, onSchemeChange, token } from './dom';
@@ -9,7 +10,7 @@ import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
 /** Space above a plot for the names of the levels. */
-const MARK_ROOM = 16;
+const MARK_HEIGHT = 16;
 /** Height of the tick marks of one kind of event. */
 const MARK_LANE = 6;
 
@@ -25,31 +26,32 @@ export interface PlotKind {
   log: boolean;
   curves: Curve[];
   /** Describes the plot in words, for screen readers. */
-  tell: (history: History) => string;
+  describe: (history: History) => string;
 }
 
 /** Plots of the deformable model. */
 export const ENERGY_PLOTS: PlotKind[] = [
   {
-    title: 'Kinetic energy',
+    title: text('measures.kineticEnergy'),
     log: true,
     curves: [
-      { label: 'energy', color: '--curve', of: (report) => report.residual },
-      { label: 'tolerance ε', color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
+      { label: text('measures.curveEnergy'), color: '--curve', of: (report) => report.residual },
+      { label: text('measures.curveTolerance'), color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
     ],
-    tell: tellEnergy,
+    describe: describeEnergy,
   },
   {
-    title: 'Vertices',
+    title: text('measures.vertices'),
     log: false,
-    curves: [{ label: 'vertices', color: '--curve', of: (report) => report.vertices }],
-    tell: (history) => `${tellChange(history, 'vertices', (report) => report.vertices)} ${tellByLevel(history)}`.trim(),
+    curves: [{ label: text('measures.curveVertices'), color: '--curve', of: (report) => report.vertices }],
+    describe: (history) =>
+      `${describeChange(history, 'measures.verticesChange', (report) => report.vertices)} ${describeByLevel(history)}`.trim(),
   },
   {
-    title: 'Euler characteristic χ',
+    title: text('measures.euler'),
     log: false,
     curves: [{ label: 'χ', color: '--curve', of: (report) => report.euler }],
-    tell: (history) => tellChange(history, 'Euler characteristic', (report) => report.euler),
+    describe: (history) => describeChange(history, 'measures.eulerChange', (report) => report.euler),
   },
 ];
 
@@ -80,11 +82,11 @@ export class Plots {
     return h(
       'p',
       { class: 'legend' },
-      key('level', 'level change'),
-      key('axial', 'axial: parts join'),
-      key('annular', 'annular: a neck is cut'),
-      key('vanished', 'a part vanishes'),
-      key('seeds', 'a part is seeded'),
+      key('level', text('measures.levelChange')),
+      key('axial', text('measures.axialEvent')),
+      key('annular', text('measures.annularEvent')),
+      key('vanished', text('measures.vanishedEvent')),
+      key('seeds', text('measures.seededEvent')),
     );
   }
 
@@ -105,7 +107,7 @@ export class Plots {
       this.#pending = requestAnimationFrame(() => this.#redrawOne());
       return;
     }
-    this.#events.textContent = tellEvents(this.#history);
+    this.#events.textContent = describeEvents(this.#history);
     this.#table.update(this.#history.reports);
   }
 }
@@ -134,7 +136,7 @@ class Plot {
     const { reports } = history;
     this.#extend(reports);
     this.#plot.setData(this.#columns as uPlot.AlignedData);
-    this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : 'No step yet.';
+    this.#caption.textContent = reports.length > 0 ? this.#kind.describe(history) : text('measures.noSteps');
   }
 
   /** Appends only new reports: runs have thousands of steps. */
@@ -171,7 +173,7 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
     height: PLOT_HEIGHT,
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_ROOM, 8, 0, 0],
+    padding: [MARK_HEIGHT, 8, 0, 0],
     scales: {
       x: { time: false, range: iterationRange },
       y: kind.log ? { distr: 3, range: logRange } : { range: valueRange },
@@ -201,8 +203,8 @@ function iterationRange(_: uPlot, __: number | null, last: number | null): uPlot
 
 function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (low === null || high === null) return [0, 1];
-  const room = Math.max(1, 0.08 * (high - low));
-  return [low - room, high + room];
+  const margin = Math.max(1, 0.08 * (high - low));
+  return [low - margin, high + margin];
 }
 
 /** Rounds a range outwards to whole powers of ten. */
@@ -271,25 +273,31 @@ function upright(ctx: CanvasRenderingContext2D, x: number, top: number, bottom: 
   ctx.stroke();
 }
 
-function tellEnergy({ reports }: History): string {
+function describeEnergy({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return '';
-  const relation = last.residual < last.tolerance ? 'below' : 'above';
-  return `After ${count(last.iteration)} iterations the energy is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+  const key = last.residual < last.tolerance ? 'measures.energyBelow' : 'measures.energyAbove';
+  return text(key, {
+    iterations: count(last.iteration),
+    energy: figure(last.residual),
+    tolerance: figure(last.tolerance),
+  });
 }
 
 /** Describes where each level began, and all topology changes. */
-function tellEvents({ phases, changes, reports }: History): string {
+function describeEvents({ phases, changes, reports }: History): string {
   if (reports.length === 0) return '';
-  const levels = phases.map(({ phase, iteration }) => `${phase} from iteration ${count(iteration)}`).join(', ');
+  const levels = phases
+    .map(({ phase, iteration }) => text('measures.phaseFrom', { phase, iteration: count(iteration) }))
+    .join(', ');
   return `${levels[0]?.toUpperCase()}${levels.slice(1)}. ${totals(changes)}`;
 }
 
 /** Describes the number of vertices at the end of each level. */
-function tellByLevel({ phases, reports }: History): string {
+function describeByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
     const last = lastBefore(reports, iteration);
-    return last && `${count(last.vertices)} at the end of ${phases[i]?.phase}`;
+    return last && text('measures.verticesAtEnd', { vertices: count(last.vertices), phase: phases[i]?.phase ?? '' });
   });
   const known = left.filter(Boolean);
   return known.length > 0 ? `${known.join(', ')}.` : '';
@@ -300,7 +308,7 @@ function lastBefore(reports: readonly StepReport[], iteration: number): StepRepo
   return undefined;
 }
 
-function tellChange({ reports }: History, name: string, of: (report: StepReport) => number): string {
+function describeChange({ reports }: History, key: TextKey, of: (report: StepReport) => number): string {
   const last = reports.at(-1);
   if (!last) return '';
   let [low, high] = [of(last), of(last)];
@@ -308,5 +316,5 @@ function tellChange({ reports }: History, name: string, of: (report: StepReport)
     low = Math.min(low, of(report));
     high = Math.max(high, of(report));
   }
-  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${count(low)} and ${count(high)} so far.`;
+  return text(key, { now: count(of(last)), low: count(low), high: count(high) });
 }

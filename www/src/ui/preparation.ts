@@ -1,13 +1,14 @@
+import { text } from '../texts';
 import type { Enrichment, Preparation } from '../track/protocol';
 import { h, uniqueId } from './dom';
 
 const KINDS: { value: Enrichment; label: string }[] = [
-  { value: 'none', label: 'none' },
-  { value: 'linear', label: 'linear' },
-  { value: 'flow', label: 'by optical flow' },
+  { value: 'none', label: text('trackPanels.enrichNone') },
+  { value: 'linear', label: text('trackPanels.enrichLinear') },
+  { value: 'flow', label: text('trackPanels.enrichFlow') },
 ];
 /** Largest factor for in-between slices that the library supports. */
-const MOST = 16;
+const MAX_FACTOR = 16;
 
 /** Controls for the preprocessing of the image before tracking: binning and in-between slices. */
 export class PreparationControls {
@@ -27,45 +28,38 @@ export class PreparationControls {
       h('option', { value: '2' }, '×2'),
     );
     this.#binning.addEventListener('change', () =>
-      onChange({ ...this.#value, binning: this.#binning.value === '2' ? 2 : 1 }, 'binning'),
+      onChange({ ...this.#value, binning: this.#binning.value === '2' ? 2 : 1 }, text('trackPanels.binningChange')),
     );
     const options = KINDS.map(({ value, label }) => h('option', { value }, label));
     this.#kind = h('select', { id: kind, 'data-prepare': 'enrichment' }, ...options);
     this.#kind.addEventListener('change', () =>
-      onChange({ ...this.#value, enrichment: this.#kind.value as Enrichment }, 'in-between slices'),
+      onChange(
+        { ...this.#value, enrichment: this.#kind.value as Enrichment },
+        text('trackPanels.inBetweenSlicesChange'),
+      ),
     );
     this.#factor = h('input', {
       type: 'number',
       id: factor,
       min: 0,
-      max: MOST,
+      max: MAX_FACTOR,
       step: 1,
-      placeholder: 'auto',
+      placeholder: text('controls.auto'),
       inputmode: 'numeric',
       'data-prepare': 'factor',
     });
     this.#factor.addEventListener('change', () => {
       const given = this.#factor.value === '' && !this.#factor.validity.badInput ? 0 : this.#factor.valueAsNumber;
-      const valid = Number.isInteger(given) && given >= 0 && given <= MOST;
-      this.#error.textContent = valid ? '' : `A whole number from 1 to ${MOST}, or none for as many as make cubes.`;
-      if (valid) onChange({ ...this.#value, factor: given }, 'number of slices');
+      const valid = Number.isInteger(given) && given >= 0 && given <= MAX_FACTOR;
+      this.#error.textContent = valid ? '' : text('trackPanels.inBetweenFactorError', { most: MAX_FACTOR });
+      if (valid) onChange({ ...this.#value, factor: given }, text('trackPanels.inBetweenFactorChange'));
     });
     this.element = h(
       'div',
       { class: 'preparation' },
-      row(
-        'Pixels of a slice',
-        binning,
-        this.#binning,
-        '×2 makes one of two by two: for images that were interpolated to finer pixels than were measured.',
-      ),
-      row(
-        'In-between slices',
-        kind,
-        this.#kind,
-        'Where slices are thick. By flow, walls that go aside from slice to slice stay sharp.',
-      ),
-      row('Slices for one', factor, this.#factor, 'Empty: as many as bring the voxels nearest to cubes.'),
+      row(text('trackPanels.binning'), binning, this.#binning, text('trackPanels.binningHelp')),
+      row(text('trackPanels.inBetweenSlices'), kind, this.#kind, text('trackPanels.inBetweenSlicesHelp')),
+      row(text('trackPanels.inBetweenFactor'), factor, this.#factor, text('trackPanels.inBetweenFactorHelp')),
       this.#error,
     );
   }

@@ -1,23 +1,20 @@
 import type { LevelView } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { levelSymbol } from './format';
 
-const VOLUME = 'level 0, the volume itself';
+const VOLUME = text('extractPanels.levelVolume');
 
 /** The levels of the image pyramid as thumbnails of the current slice, with the level of the model marked. */
 export class PyramidPanel {
-  readonly #list = h('div', { class: 'pyramid', role: 'group', 'aria-label': 'Levels of the pyramid, axial slice' });
+  readonly #list = h('div', { class: 'pyramid', role: 'group', 'aria-label': text('extractPanels.pyramidLevels') });
   readonly #follow = h('input', { type: 'checkbox', 'data-pyramid': 'follow' });
   readonly element = h(
     'div',
     {},
     this.#list,
-    h('label', { class: 'check' }, this.#follow, 'Slices follow the model'),
-    h(
-      'p',
-      { class: 'help' },
-      'The model works from coarse to fine; a dot marks the level it is on, I₀ is the volume. Choose a level to see it in the slices.',
-    ),
+    h('label', { class: 'check' }, this.#follow, text('extractPanels.slicesFollow')),
+    h('p', { class: 'help' }, text('extractPanels.pyramidHelp')),
   );
   readonly #onShow: (level: LevelView | undefined) => void;
   readonly #picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined;
@@ -93,11 +90,16 @@ export class PyramidPanel {
       const inUse = level === this.#inUse;
       button.setAttribute('aria-pressed', String(level === this.#shown));
       button.classList.toggle('in-use', inUse);
-      const name = level === 0 ? VOLUME : `level ${level}`;
+      const name = level === 0 ? VOLUME : text('extractPanels.levelName', { level });
       // Includes the visible symbol, which users of voice control say.
-      const label = `${levelSymbol(level)}: ${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
+      const label = text('extractPanels.levelLabel', {
+        symbol: levelSymbol(level),
+        name,
+        dims: this.#dims[level] ?? '',
+        present: inUse ? text('extractPanels.levelPresent') : '',
+      });
       button.setAttribute('aria-label', label);
-      button.title = level === 0 ? label : `${label}. On it the surface rests a little outside πI.`;
+      button.title = level === 0 ? label : text('extractPanels.levelTitle', { label });
     }
   }
 }

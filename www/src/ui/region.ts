@@ -1,5 +1,7 @@
 import type { Vec3 } from '../protocol';
+import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
+import { SLICE_NAMES, type SliceOrientation } from '../view/anatomy';
 import { h } from './dom';
 
 export interface RegionEvents {
@@ -25,45 +27,55 @@ export class RegionControls {
   constructor({ onRegion, onComponent }: RegionEvents) {
     this.#onRegion = onRegion;
     const rows = [0, 1, 2].map((axis) => this.#row(axis));
-    this.#whole = button('box', 'whole', 'Whole image', () => onRegion(undefined));
-    this.#largest = button('component', 'largest', 'Largest', () => onComponent('largest'));
-    this.#here = button('component', 'here', 'Nearest to the crosshair', () => onComponent('here'));
+    this.#whole = button('box', 'whole', text('trackPanels.wholeImage'), () => onRegion(undefined));
+    this.#largest = button('component', 'largest', text('trackPanels.largestComponent'), () => onComponent('largest'));
+    this.#here = button('component', 'here', text('trackPanels.nearestComponent'), () => onComponent('here'));
     this.element = h(
       'div',
       { class: 'region' },
-      h('p', { class: 'help' }, 'Drag the sides of the dashed box on the slices, or type its first and last slice.'),
+      h('p', { class: 'help' }, text('trackPanels.regionHelp')),
       ...rows,
       this.#error,
       h('div', { class: 'buttons' }, this.#whole),
-      h('p', {}, 'Surface that is followed'),
+      h('p', {}, text('trackPanels.trackedSurface')),
       h('div', { class: 'buttons' }, this.#largest, this.#here),
       this.#followed,
     );
   }
 
   /** `names` are the names of the slices across each axis. */
-  show(region: VoxelBox, dims: Vec3, names: string[], nearest: Vec3 | undefined, whole: boolean): void {
+  show(
+    region: VoxelBox,
+    dims: Vec3,
+    names: SliceOrientation['name'][],
+    nearest: Vec3 | undefined,
+    whole: boolean,
+  ): void {
     this.#dims = dims;
     this.#region = region;
     for (const axis of [0, 1, 2]) {
-      const name = names[axis] ?? '';
+      const orientation = names[axis];
+      const name = orientation ? SLICE_NAMES[orientation] : '';
       this.#names[axis]?.replaceChildren(name);
       for (const [side, input] of this.#inputs.slice(2 * axis, 2 * axis + 2).entries()) {
         input.max = String((dims[axis] ?? 1) - 1);
         input.value = String((side === 0 ? region.low : region.high)[axis] ?? 0);
-        input.setAttribute('aria-label', `${name}, ${side === 0 ? 'first' : 'last'} slice of the box`);
+        input.setAttribute(
+          'aria-label',
+          text(side === 0 ? 'trackPanels.firstSlice' : 'trackPanels.lastSlice', { name }),
+        );
       }
     }
     this.#whole.disabled = whole;
     this.#largest.setAttribute('aria-pressed', String(nearest === undefined));
     this.#here.setAttribute('aria-pressed', String(nearest !== undefined));
     this.#followed.textContent = nearest
-      ? `The one nearest to (${nearest.map((x) => x.toFixed(1)).join(', ')}).`
-      : 'The largest of the first frame.';
+      ? text('trackPanels.trackedNearest', { point: nearest.map((x) => x.toFixed(1)).join(', ') })
+      : text('trackPanels.trackedLargest');
     this.#error.textContent = '';
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -76,7 +88,7 @@ export class RegionControls {
         inputmode: 'numeric',
         'data-box': `${axis}-${side}`,
       });
-      input.addEventListener('change', () => this.#typed());
+      input.addEventListener('change', () => this.#onInput());
       this.#inputs.push(input);
       return input;
     });
@@ -91,7 +103,7 @@ export class RegionControls {
     );
   }
 
-  #typed(): void {
+  #onInput(): void {
     const values = this.#inputs.map((input) => input.valueAsNumber);
     const ends = (side: number) => [0, 1, 2].map((axis) => values[2 * axis + side] ?? Number.NaN) as Vec3;
     const [low, high] = [ends(0), ends(1)];
@@ -101,7 +113,7 @@ export class RegionControls {
         !Number.isInteger(from) || !Number.isInteger(to) || from < 0 || to >= (this.#dims[axis] ?? 1) || from >= to
       );
     });
-    if (wrong) this.#error.textContent = 'Whole numbers within the image are needed, the first below the last.';
+    if (wrong) this.#error.textContent = text('trackPanels.regionError');
     else if (low.some((x, k) => x !== this.#region.low[k]) || high.some((x, k) => x !== this.#region.high[k]))
       this.#onRegion({ low, high });
   }

@@ -1,30 +1,31 @@
 import type { Layout } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { SculptViewOptions } from '../view/sculpture';
 import type { SurfaceColor } from '../view/surface';
 import { h } from './dom';
 import { choice } from './view-options';
 
 const SWITCHES = [
-  { name: 'edges', label: 'Wireframe' },
-  { name: 'ellipsoids', label: 'Ellipsoids' },
+  { name: 'edges', label: text('controls.viewWireframe') },
+  { name: 'ellipsoids', label: text('sculptPanels.ellipsoids') },
 ] as const;
 
 export const LAYOUTS: { value: Layout; label: string }[] = [
-  { value: 'result', label: 'result' },
-  { value: 'base', label: 'deformed base' },
-  { value: 'pair', label: 'base and result' },
-  { value: 'row', label: 'all five, as in figure 1' },
-  { value: 'levels', label: 'levels of the solver' },
-  { value: 'stages', label: 'stages of restructuring' },
+  { value: 'result', label: text('sculptPanels.layoutResult') },
+  { value: 'base', label: text('sculptPanels.layoutBase') },
+  { value: 'pair', label: text('sculptPanels.layoutPair') },
+  { value: 'row', label: text('sculptPanels.layoutRow') },
+  { value: 'levels', label: text('sculptPanels.layoutLevels') },
+  { value: 'stages', label: text('sculptPanels.layoutStages') },
 ];
 
 export const SCULPT_COLORS: { value: SurfaceColor; label: string }[] = [
-  { value: 'plain', label: 'plain' },
-  { value: 'texture', label: 'texture' },
-  { value: 'component', label: 'component' },
-  { value: 'area distortion', label: 'distortion of area' },
-  { value: 'angle distortion', label: 'distortion of angles' },
-  { value: 'mean curvature', label: 'mean curvature' },
+  { value: 'plain', label: text('controls.colorPlain') },
+  { value: 'texture', label: text('sculptPanels.colorTexture') },
+  { value: 'component', label: text('controls.colorComponent') },
+  { value: 'area distortion', label: text('sculptPanels.colorAreaDistortion') },
+  { value: 'angle distortion', label: text('sculptPanels.colorAngleDistortion') },
+  { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
 ];
 
 /** View options of the Sculpt lab. */
@@ -45,13 +46,15 @@ export class SculptOptionControls {
       this.#boxes.set(name, box);
       return h('label', {}, box, label);
     });
-    const layout = choice('Show', 'layout', LAYOUTS, initial.layout, (layout) => this.set({ layout }));
-    const color = choice('Colour', 'color', SCULPT_COLORS, initial.color, (color) => this.set({ color }));
+    const layout = choice(text('sculptPanels.show'), 'layout', LAYOUTS, initial.layout, (layout) =>
+      this.set({ layout }),
+    );
+    const color = choice(text('controls.color'), 'color', SCULPT_COLORS, initial.color, (color) => this.set({ color }));
     this.#layout = layout.select;
     this.#color = color.select;
     this.element = h(
       'div',
-      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
       ...switches,
       layout.element,
       color.element,

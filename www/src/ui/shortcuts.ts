@@ -1,4 +1,5 @@
 import { DOCUMENTATION } from '../guides';
+import { text } from '../texts';
 import { h } from './dom';
 
 export interface Shortcut {
@@ -11,10 +12,10 @@ export interface Shortcut {
 }
 
 const VIEW_KEYS: [string, string][] = [
-  ['← → ↑ ↓', 'turn the 3D view (when it has the focus)'],
-  ['+ −', 'zoom the 3D view'],
-  ['Home', 'the 3D view as it was at first'],
-  ['Tab', 'to the next control; arrow keys move sliders'],
+  ['← → ↑ ↓', text('controls.keyTurn')],
+  ['+ −', text('controls.keyZoom')],
+  [text('controls.keyHomeName'), text('controls.keyHome')],
+  [text('controls.keyTabName'), text('controls.keyTab')],
 ];
 
 /**
@@ -22,7 +23,7 @@ const VIEW_KEYS: [string, string][] = [
  * removed when aborted.
  */
 export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide: string, signal: AbortSignal): void {
-  const list: Shortcut = { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() };
+  const list: Shortcut = { key: '?', shown: '?', text: text('controls.keyList'), act: () => dialog.showModal() };
   const dialog = shortcutDialog([...shortcuts, list], opener, guide, signal);
   document.body.append(dialog);
   listenForShortcuts([...shortcuts, list], signal);
@@ -92,11 +93,11 @@ function shortcutDialog(
     { class: 'keys' },
     ...rows.map(([key = '', text = '']) => h('div', {}, h('dt', {}, h('kbd', {}, key)), h('dd', {}, text))),
   );
-  const form = h('form', { method: 'dialog' }, h('button', { class: 'primary' }, 'Close'));
+  const form = h('form', { method: 'dialog' }, h('button', { class: 'primary' }, text('controls.close')));
   const dialog = h(
     'dialog',
     { 'aria-labelledby': 'keys-title' },
-    h('h2', { id: 'keys-title' }, 'Keyboard'),
+    h('h2', { id: 'keys-title' }, text('controls.keyboardShortcuts')),
     list,
     furtherHelp(guide),
     form,
@@ -112,15 +113,15 @@ function furtherHelp(guide: string): HTMLElement {
   return h(
     'nav',
     { 'aria-labelledby': 'further-title' },
-    h('h3', { id: 'further-title' }, 'More, in new tabs'),
+    h('h3', { id: 'further-title' }, text('controls.furtherHelp')),
     h(
       'ul',
       { class: 'further-help' },
-      link(guide, 'How this lab works'),
-      link(DOCUMENTATION, 'Documentation: all labs, and the package'),
-      link('./bench.html', 'Measurements: how fast it is'),
-      link('./embed/index.html', 'In other software: three.js, NiiVue, vtk.js, itk-wasm'),
-      link('./licences.txt', 'Other people’s work in it, and its licences'),
+      link(guide, text('controls.howLabWorks')),
+      link(DOCUMENTATION, text('controls.documentation')),
+      link('./bench.html', text('controls.benchmarks')),
+      link('./embed/index.html', text('controls.integrations')),
+      link('./licences.txt', text('controls.licences')),
     ),
   );
 }

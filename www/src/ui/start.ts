@@ -1,4 +1,5 @@
 import type { StartShape } from '../protocol';
+import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 
 type Kind = StartShape['kind'];
@@ -10,20 +11,20 @@ export function isStartKind(text: string | undefined): text is Kind {
 const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
     kind: 'contour',
-    label: 'Contour',
-    help: 'The iso-surface of the coarsest level with its hollows: for real data.',
+    label: text('extractPanels.startContour'),
+    help: text('extractPanels.startContourHelp'),
   },
   {
     kind: 'enclosing',
-    label: 'Enclosing surface',
-    help: 'One surface around all that is brighter than the iso value, shrinking onto it.',
+    label: text('extractPanels.startEnclosing'),
+    help: text('extractPanels.startEnclosingHelp'),
   },
-  { kind: 'bubbles', label: 'Grid of bubbles', help: 'Many small spheres that grow, meet and join.' },
-  { kind: 'sphere', label: 'Sphere at the crosshair', help: 'One sphere where the three slices meet.' },
+  { kind: 'bubbles', label: text('extractPanels.startBubbles'), help: text('extractPanels.startBubblesHelp') },
+  { kind: 'sphere', label: text('extractPanels.startSphere'), help: text('extractPanels.startSphereHelp') },
   {
     kind: 'isosurface',
-    label: 'Iso-surface',
-    help: 'Marching cubes at the iso value, then smoothed and cleaned by the model.',
+    label: text('extractPanels.startIsosurface'),
+    help: text('extractPanels.startIsosurfaceHelp'),
   },
 ];
 const DEFAULT_LEVELS = 1;
@@ -44,24 +45,24 @@ export interface StartChoice {
  */
 export class StartControls {
   readonly element: HTMLElement;
-  readonly #shape = new Field('Shape', h('select', {}, ...SHAPES.map(optionFor)), '', '');
+  readonly #shape = new Field(text('extractPanels.startShape'), h('select', {}, ...SHAPES.map(optionFor)), '', '');
   readonly #bubbles = new Field(
-    'Bubbles along each side',
+    text('extractPanels.bubblesPerAxis'),
     integer(2, MOST_BUBBLES, DEFAULT_BUBBLES),
-    'More of them find smaller parts.',
-    `A whole number from 2 to ${MOST_BUBBLES} is needed.`,
+    text('extractPanels.bubblesPerAxisHelp'),
+    text('extractPanels.bubblesPerAxisError', { most: MOST_BUBBLES }),
   );
   readonly #levels = new Field(
-    ['Pyramid levels ', symbol('m')],
+    [text('extractPanels.pyramidLevelCount'), symbol('m')],
     integer(0, MOST_LEVELS, DEFAULT_LEVELS),
-    'Coarser copies of the volume to pass through first; 0 works on the volume itself at once.',
-    `A whole number from 0 to ${MOST_LEVELS} is needed.`,
+    text('extractPanels.pyramidLevelCountHelp'),
+    text('extractPanels.pyramidLevelCountError', { most: MOST_LEVELS }),
   );
   readonly #edge = new Field(
-    'Mean edge',
-    h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: 'auto' }),
-    'Of the triangles at the end, in the units of the volume; left empty, it follows the voxels.',
-    'A number above 0 is needed, or nothing.',
+    text('extractPanels.meanEdgeLength'),
+    h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: text('controls.auto') }),
+    text('extractPanels.meanEdgeLengthHelp'),
+    text('extractPanels.meanEdgeLengthError'),
   );
   readonly #fields = [this.#shape, this.#bubbles, this.#levels, this.#edge];
   /** The field changed last, which shows the error if the model cannot be created. */
@@ -97,22 +98,22 @@ export class StartControls {
     this.#bubbles.control.valueAsNumber = choice.bubbles;
     this.#levels.control.valueAsNumber = choice.levels;
     this.#edge.control.value = choice.edge === undefined ? '' : String(choice.edge);
-    for (const field of this.#fields) field.complain(undefined);
+    for (const field of this.#fields) field.showError(undefined);
     this.#explain();
   }
 
   /** Shows an error beside the field changed last, and restores the current values. */
-  refuse(message: string): void {
+  reject(message: string): void {
     this.show(this.#inForce);
-    this.#changed.complain(message);
+    this.#changed.showError(message);
   }
 
   #onChange(field: Field, onChange: () => void): void {
     this.#changed = field;
-    for (const each of this.#fields) each.complain(undefined);
+    for (const each of this.#fields) each.showError(undefined);
     this.#explain();
     if (field.control.checkValidity()) onChange();
-    else this.refuse(field.need);
+    else this.reject(field.need);
   }
 
   #explain(): void {
@@ -152,7 +153,7 @@ class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElem
     this.#help.textContent = text;
   }
 
-  complain(message: string | undefined): void {
+  showError(message: string | undefined): void {
     this.#error.textContent = message ?? '';
     this.control.toggleAttribute('aria-invalid', message !== undefined);
   }

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h } from './dom';
 
 /** Milliseconds between two progress reports: rarely enough for screen readers, and for the rest of the page. */
@@ -29,7 +30,7 @@ export class ErrorBanner {
   readonly #message = h('span', { 'data-error': '' });
 
   constructor(onDismiss: () => void) {
-    const close = h('button', { type: 'button', class: 'quiet', onclick: onDismiss }, 'Dismiss');
+    const close = h('button', { type: 'button', class: 'quiet', onclick: onDismiss }, text('controls.dismiss'));
     this.element = h(
       'div',
       { class: 'banner', role: 'alert', hidden: true },

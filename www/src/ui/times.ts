@@ -1,15 +1,20 @@
+import { text } from '../texts';
 import { h } from './dom';
 import type { History } from './history';
 
 /** Rows of the paper's tables 1 and 2: the paper's letter, the name here, and the parts of a step that are summed. */
 export const TIME_ROWS = [
-  { letter: 'T', name: 'topology', parts: ['topology', 'embedding'] },
-  { letter: 'N', name: 'normals', parts: ['normals'] },
-  { letter: 'F', name: 'dynamics', parts: ['forces', 'motion'] },
+  { letter: 'T', name: text('extractPanels.timeTopology'), parts: ['topology', 'embedding'] },
+  { letter: 'N', name: text('extractPanels.timeNormals'), parts: ['normals'] },
+  { letter: 'F', name: text('extractPanels.timeDynamics'), parts: ['forces', 'motion'] },
 ] as const;
-const DETAILS = ['topology', 'embedding', 'forces', 'motion'];
-export const TIME_NOTE =
-  'Seconds. T: finding and resolving topology, and looking for triangles that would cross (embedding); N: normals; F: dynamics, that is forces and motion.';
+const DETAILS = [
+  { part: 'topology', name: text('extractPanels.timeTopology') },
+  { part: 'embedding', name: text('extractPanels.timeEmbedding') },
+  { part: 'forces', name: text('extractPanels.timeForces') },
+  { part: 'motion', name: text('extractPanels.timeMotion') },
+];
+export const TIME_NOTE = text('extractPanels.timeNote');
 
 /** Milliseconds by part of a step. */
 export type PartTimes = ReadonlyMap<string, number>;
@@ -35,7 +40,7 @@ export class TimeTable {
   readonly #table = h('table', { class: 'times' });
 
   constructor() {
-    const label = 'Time per part and level';
+    const label = text('extractPanels.timeTable');
     this.element = h(
       'div',
       {},
@@ -45,26 +50,26 @@ export class TimeTable {
   }
 
   update({ times }: History): void {
-    const columns = [...times, ['total', addTimes([...times.values()])] as const];
+    const columns = [...times, [text('extractPanels.timeTotal'), addTimes([...times.values()])] as const];
     const row = (head: (Node | string)[], value: (parts: PartTimes) => number, className?: string) => {
       const cells = columns.map(([, parts]) => h('td', {}, seconds(value(parts))));
       return h('tr', { class: className }, h('th', { scope: 'row' }, ...head), ...cells);
     };
     const titles = columns.map(([title]) => h('th', { scope: 'col' }, title));
     this.#table.replaceChildren(
-      h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, 'Part'), ...titles)),
+      h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, text('extractPanels.timePart')), ...titles)),
       h(
         'tbody',
         {},
         ...TIME_ROWS.map(({ letter, name, parts }) =>
           row([h('i', {}, letter), ` ${name}`], (all) => timeOf(all, parts)),
         ),
-        ...DETAILS.map((part) => row([part], (all) => timeOf(all, [part]), 'detail')),
+        ...DETAILS.map(({ part, name }) => row([name], (all) => timeOf(all, [part]), 'detail')),
       ),
       h(
         'tfoot',
         {},
-        row(['together'], (all) => timeOf(all)),
+        row([text('extractPanels.timeTotal')], (all) => timeOf(all)),
       ),
     );
   }

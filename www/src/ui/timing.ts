@@ -1,6 +1,7 @@
 import uPlot from 'uplot';
 import type { ReconstructClient } from '../reconstruct/client';
 import type { Timing } from '../reconstruct/protocol';
+import { text } from '../texts';
 import { h, onSchemeChange, token } from './dom';
 import { count, figure, milliseconds } from './format';
 
@@ -23,7 +24,7 @@ export class TimingPanel {
     max: SIZES.length * KERNELS.length,
     value: 0,
     hidden: true,
-    'aria-label': 'Progress of the measurement',
+    'aria-label': text('controls.measurementProgress'),
   });
   readonly #plot: uPlot;
   readonly #figure: HTMLElement;
@@ -33,7 +34,11 @@ export class TimingPanel {
   constructor(client: ReconstructClient, onError: (title: string, error: unknown) => void) {
     this.#client = client;
     this.#onError = onError;
-    this.#start = h('button', { type: 'button', onclick: () => void this.#run(), 'data-timing': 'start' }, 'Measure');
+    this.#start = h(
+      'button',
+      { type: 'button', onclick: () => void this.#run(), 'data-timing': 'start' },
+      text('pointPanels.measure'),
+    );
     this.#cancel = h(
       'button',
       {
@@ -42,7 +47,7 @@ export class TimingPanel {
         'data-timing': 'cancel',
         onclick: () => void client.request('cancelTiming', undefined),
       },
-      'Cancel',
+      text('controls.cancel'),
     );
     const holder = h('div', { class: 'plot timing', 'aria-hidden': 'true' });
     const key = (name: string, text: string) =>
@@ -51,7 +56,7 @@ export class TimingPanel {
     this.#figure = h(
       'figure',
       { hidden: true },
-      h('h3', {}, 'Seconds of the solve by constraints'),
+      h('h3', {}, text('pointPanels.timingFigure')),
       holder,
       legend,
       this.#table,
@@ -64,11 +69,7 @@ export class TimingPanel {
     this.element = h(
       'div',
       { class: 'compare', 'data-timings': '[]' },
-      h(
-        'p',
-        { class: 'help' },
-        'Solves subsamples of the present points, from 250 to 6,000, with both kernels and the parameters as they are. The surface shown stays.',
-      ),
+      h('p', { class: 'help' }, text('pointPanels.timingHelp')),
       h('div', { class: 'buttons' }, this.#start, this.#cancel),
       this.#progress,
       this.#status,
@@ -86,7 +87,7 @@ export class TimingPanel {
     this.#draw();
   }
 
-  tell(timing: Timing): void {
+  add(timing: Timing): void {
     this.#timings.push(timing);
     this.#progress.value = this.#timings.length;
     this.#draw();
@@ -98,10 +99,10 @@ export class TimingPanel {
     try {
       const kernels = [...KERNELS];
       const timings = await this.#client.request('timing', { sizes: SIZES, kernels });
-      this.#status.textContent = timings ? tellGrowth(timings) : 'Cancelled.';
+      this.#status.textContent = timings ? describeGrowth(timings) : text('controls.cancelled');
     } catch (error) {
-      this.#status.textContent = 'The measurement stopped.';
-      this.#onError('The measurement stopped.', error);
+      this.#status.textContent = text('pointPanels.measurementFailed');
+      this.#onError(text('pointPanels.measurementFailed'), error);
     }
     this.#showBusy(false);
   }
@@ -112,7 +113,7 @@ export class TimingPanel {
     this.#progress.hidden = !busy;
     this.#progress.value = 0;
     (busy ? this.#cancel : this.#start).focus();
-    if (busy) this.#status.textContent = 'Measuring.';
+    if (busy) this.#status.textContent = text('controls.measuring');
   }
 
   #draw(): void {
@@ -123,7 +124,7 @@ export class TimingPanel {
       sizes.map((size) => this.#timings.find((one) => one.kernel === kernel && one.constraints === size));
     const seconds = (kernel: string) => of(kernel).map((one) => (one ? one.milliseconds / 1000 : null));
     this.#plot.setData([sizes, ...KERNELS.map(seconds)] as uPlot.AlignedData);
-    const head = ['constraints', ...KERNELS].map((title) => h('th', { scope: 'col' }, title));
+    const head = [text('pointPanels.columnConstraints'), ...KERNELS].map((title) => h('th', { scope: 'col' }, title));
     const rows = sizes.map((size, i) => {
       const cells = KERNELS.map((kernel) => {
         const one = of(kernel)[i];
@@ -136,13 +137,17 @@ export class TimingPanel {
 }
 
 /** Describes how the duration grows from the smallest to the largest number of constraints. */
-function tellGrowth(timings: Timing[]): string {
+function describeGrowth(timings: Timing[]): string {
   const parts = KERNELS.map((kernel) => {
     const [first, ...rest] = timings.filter((one) => one.kernel === kernel);
     const last = rest.at(-1);
     if (!first || !last) return '';
     const [more, longer] = [last.constraints / first.constraints, last.milliseconds / first.milliseconds];
-    return `${kernel}: ${figure(Number(more.toPrecision(2)))} times the constraints took ${figure(Number(longer.toPrecision(2)))} times the time`;
+    return text('pointPanels.timingGrowth', {
+      kernel,
+      more: figure(Number(more.toPrecision(2))),
+      longer: figure(Number(longer.toPrecision(2))),
+    });
   });
   return `${parts.filter(Boolean).join('; ')}.`.replace(/^./, (letter) => letter.toUpperCase());
 }

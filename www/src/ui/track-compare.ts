@@ -1,30 +1,28 @@
+import { text } from '../texts';
 import { beatOf } from '../track/curve';
-import type { ComparedTrack, FrameStatistics, Preparation, SurfaceError } from '../track/protocol';
+import type { Alternative, ComparedTrack, FrameStatistics, Preparation, SurfaceError } from '../track/protocol';
 import { h, uniqueId } from './dom';
 import { count, figure, milliseconds } from './format';
 
-/** The alternative with which the current run is compared. */
-export type Other = 'prediction' | 'none' | 'linear' | 'flow';
-
-const OTHERS: { value: Other; label: string }[] = [
-  { value: 'prediction', label: 'prediction' },
-  { value: 'none', label: 'no in-between slices' },
-  { value: 'linear', label: 'in-between slices, linear' },
-  { value: 'flow', label: 'in-between slices by flow' },
+const ALTERNATIVES: { value: Alternative; label: string }[] = [
+  { value: 'prediction', label: text('trackPanels.otherPrediction') },
+  { value: 'none', label: text('trackPanels.otherNone') },
+  { value: 'linear', label: text('trackPanels.otherLinear') },
+  { value: 'flow', label: text('trackPanels.otherFlow') },
 ];
 
 /** One of the two runs of a comparison. */
-export interface ComparedRun {
+export interface TrackingRun {
   name: string;
   facts: readonly FrameStatistics[];
   closing: number | undefined;
   error: SurfaceError | undefined;
   /** Duration in milliseconds, if known. */
-  took: number | undefined;
+  duration: number | undefined;
 }
 
 export interface TrackCompareEvents {
-  onStart: (other: Other) => void;
+  onStart: (other: Alternative) => void;
   onCancel: () => void;
 }
 
@@ -34,7 +32,12 @@ export class TrackComparePanel {
   readonly #select: HTMLSelectElement;
   readonly #start: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
-  readonly #progress = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the comparison', hidden: true });
+  readonly #progress = h('progress', {
+    max: 1,
+    value: 0,
+    'aria-label': text('controls.comparisonProgress'),
+    hidden: true,
+  });
   readonly #status = h('p', { class: 'help', role: 'status' });
   readonly #table = h('div', { 'data-comparison': '{}' });
 
@@ -43,19 +46,28 @@ export class TrackComparePanel {
     this.#select = h(
       'select',
       { id, 'data-compare': 'with' },
-      ...OTHERS.map(({ value, label }) => h('option', { value }, label)),
+      ...ALTERNATIVES.map(({ value, label }) => h('option', { value }, label)),
     );
     this.#start = h(
       'button',
-      { type: 'button', disabled: true, 'data-compare': 'start', onclick: () => onStart(this.#select.value as Other) },
-      'Compare',
+      {
+        type: 'button',
+        disabled: true,
+        'data-compare': 'start',
+        onclick: () => onStart(this.#select.value as Alternative),
+      },
+      text('controls.compare'),
     );
-    this.#cancel = h('button', { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true }, 'Cancel');
+    this.#cancel = h(
+      'button',
+      { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true },
+      text('controls.cancel'),
+    );
     this.element = h(
       'div',
       { class: 'compare' },
-      h('p', { class: 'help' }, 'Tracks all frames once more with the other choice. The surfaces shown stay.'),
-      h('div', { class: 'row stacked' }, h('label', { for: id }, 'With and without'), this.#select),
+      h('p', { class: 'help' }, text('trackPanels.compareHelp')),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, text('trackPanels.changedSetting')), this.#select),
       h('div', { class: 'buttons' }, this.#start, this.#cancel),
       this.#progress,
       this.#status,
@@ -71,7 +83,8 @@ export class TrackComparePanel {
   /** Updates the alternatives; the current setting is not offered. */
   show(prediction: boolean, { enrichment }: Preparation): void {
     for (const option of this.#select.options) {
-      if (option.value === 'prediction') option.textContent = prediction ? 'without prediction' : 'with prediction';
+      if (option.value === 'prediction')
+        option.textContent = prediction ? text('trackPanels.withoutPrediction') : text('trackPanels.withPrediction');
       else option.disabled = option.value === enrichment;
     }
     if (this.#select.selectedOptions[0]?.disabled) this.#select.value = 'prediction';
@@ -90,38 +103,38 @@ export class TrackComparePanel {
     this.#cancel.focus();
     this.#progress.hidden = false;
     this.#progress.value = 0;
-    this.#status.textContent = 'Comparing.';
+    this.#status.textContent = text('controls.comparing');
   }
 
   /** Shows the progress, without announcing it to screen readers. */
-  tell(part: number, phase: string): void {
+  showProgress(part: number, phase: string): void {
     this.#progress.value = Number.isFinite(part) ? part : 0;
-    this.#cancel.textContent = `Cancel (${phase})`;
+    this.#cancel.textContent = text('trackPanels.cancelPhase', { phase });
   }
 
-  refuse(message: string): void {
+  reject(message: string): void {
     this.#end(message);
   }
 
-  finish(runs: [ComparedRun, ComparedRun]): void {
-    this.#end(said(runs));
+  finish(runs: [TrackingRun, TrackingRun]): void {
+    this.#end(describeResult(runs));
     this.#table.dataset.comparison = JSON.stringify(runs.map(summary));
     this.#table.replaceChildren(tableOf(runs));
   }
 
-  #end(text: string): void {
+  #end(message: string): void {
     const hadFocus = document.activeElement === this.#cancel;
     this.#start.hidden = false;
     this.#cancel.hidden = true;
-    this.#cancel.textContent = 'Cancel';
+    this.#cancel.textContent = text('controls.cancel');
     this.#progress.hidden = true;
-    this.#status.textContent = text;
+    this.#status.textContent = message;
     if (hadFocus) this.#start.focus();
   }
 }
 
 /** Returns the figures of the table, also for other programs. */
-function summary({ name, facts, closing, error, took }: ComparedRun) {
+function summary({ name, facts, closing, error, duration }: TrackingRun) {
   const mean = (of: (one: FrameStatistics) => number) =>
     facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
@@ -139,49 +152,66 @@ function summary({ name, facts, closing, error, took }: ComparedRun) {
     area: mean(({ area }) => area),
     closing,
     error: error?.mean,
-    most: error?.most,
-    took,
+    most: error?.p95,
+    took: duration,
   };
 }
 
 export type Summary = ReturnType<typeof summary>;
 
-function said(runs: [ComparedRun, ComparedRun]): string {
+function describeResult(runs: [TrackingRun, TrackingRun]): string {
   const [here, there] = runs.map(summary) as [Summary, Summary];
-  const percent = (share: number | undefined) => (share === undefined ? '–' : `${(100 * share).toFixed(1)} %`);
-  return `Ejection fraction ${percent(here.ejection)} ${here.name}, ${percent(there.ejection)} ${there.name}; projections took ${figure(round(here.steps))} and ${figure(round(there.steps))} steps in the mean.`;
+  const percent = (share: number | undefined) =>
+    share === undefined ? '–' : text('controls.percent', { value: (100 * share).toFixed(1) });
+  return text('trackPanels.compareTold', {
+    first: percent(here.ejection),
+    firstName: here.name,
+    second: percent(there.ejection),
+    secondName: there.name,
+    firstSteps: figure(round(here.steps)),
+    secondSteps: figure(round(there.steps)),
+  });
 }
 
 const round = (value: number) => Number(value.toPrecision(3));
 
-function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
+function tableOf(runs: [TrackingRun, TrackingRun]): HTMLElement {
   const both = runs.map(summary);
   const size = (value: number | undefined) => (value === undefined ? '–' : figure(round(value)));
   const row = (label: string, text: (one: Summary) => string) =>
     h('tr', {}, h('th', { scope: 'row' }, label), ...both.map((one) => h('td', {}, text(one))));
   const rows = [
-    row('Largest volume', ({ diastole }) => size(diastole)),
-    row('Smallest volume', ({ systole }) => size(systole)),
-    row('Ejection fraction', ({ ejection }) => (ejection === undefined ? '–' : `${(100 * ejection).toFixed(1)} %`)),
-    row('Steps of projections', ({ steps }) => size(steps)),
-    row('Rest of the last', ({ rest }) => size(rest)),
-    row('Folded', ({ folded }) => `${(100 * folded).toFixed(2)} %`),
-    row('Area', ({ area }) => size(area)),
+    row(text('trackPanels.largestVolume'), ({ diastole }) => size(diastole)),
+    row(text('trackPanels.smallestVolume'), ({ systole }) => size(systole)),
+    row(text('trackPanels.ejectionFraction'), ({ ejection }) =>
+      ejection === undefined ? '–' : text('controls.percent', { value: (100 * ejection).toFixed(1) }),
+    ),
+    row(text('trackPanels.meanSteps'), ({ steps }) => size(steps)),
+    row(text('trackPanels.meanFinalCorrection'), ({ rest }) => size(rest)),
+    row(text('trackPanels.foldedShare'), ({ folded }) =>
+      text('controls.percent', { value: (100 * folded).toFixed(2) }),
+    ),
+    row(text('measures.area'), ({ area }) => size(area)),
     ...(both.some(({ closing }) => closing !== undefined)
-      ? [row('Closes within', ({ closing }) => size(closing))]
+      ? [row(text('trackPanels.cycleClosureError'), ({ closing }) => size(closing))]
       : []),
     ...(both.some(({ error }) => error !== undefined)
-      ? [row('Error, mean', ({ error }) => size(error)), row('Error, 95 %', ({ most }) => size(most))]
+      ? [
+          row(text('trackPanels.meanError'), ({ error }) => size(error)),
+          row(text('trackPanels.error95'), ({ most }) => size(most)),
+        ]
       : []),
-    row('Time', ({ took }) => (took === undefined ? '–' : milliseconds(took))),
+    row(text('controls.time'), ({ took }) => (took === undefined ? '–' : milliseconds(took))),
   ];
-  const head = ['Measure', ...runs.map(({ name }) => name)].map((title) => h('th', { scope: 'col' }, title));
+  const head = [text('controls.measure'), ...runs.map(({ name }) => name)].map((title) =>
+    h('th', { scope: 'col' }, title),
+  );
   const table = h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...rows));
-  const label = `What came of both ways, ${count(runs[0].facts.length)} frames`;
+  const label = text('trackPanels.compareTable', { frames: count(runs[0].facts.length) });
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
 /** Converts a tracked run to an entry of a comparison. */
-export function comparedRun(name: string, { facts, closing, error, took }: ComparedTrack): ComparedRun {
-  return { name, facts, closing, error, took };
+export function comparedRun(name: string, { facts, closing, error, duration }: ComparedTrack): TrackingRun {
+  return { name, facts, closing, error, duration };
 }

@@ -1,24 +1,25 @@
-import type { Below, ShownVotes, TrackViewOptions } from '../view/beating';
+import { text } from '../texts';
+import type { ContentBelow, TrackViewOptions, VisibleVotes } from '../view/track';
 import { h } from './dom';
 import { choice, PLACEMENTS } from './view-options';
 
 const SWITCHES = [
-  { name: 'surface', label: 'Surface' },
-  { name: 'edges', label: 'Wireframe' },
-  { name: 'region', label: 'Box' },
+  { name: 'surface', label: text('controls.viewSurface') },
+  { name: 'edges', label: text('controls.viewWireframe') },
+  { name: 'region', label: text('trackPanels.viewBox') },
 ] as const;
 
-const VOTES: { value: ShownVotes; label: string }[] = [
-  { value: 'none', label: 'hidden' },
-  { value: 'near', label: 'near it' },
-  { value: 'all', label: 'all' },
+const VOTES: { value: VisibleVotes; label: string }[] = [
+  { value: 'none', label: text('trackPanels.votesHidden') },
+  { value: 'near', label: text('trackPanels.votesNear') },
+  { value: 'all', label: text('trackPanels.votesAll') },
 ];
 
-const BELOW: { value: Below; label: string }[] = [
-  { value: 'slices', label: 'slices' },
-  { value: 'boundary', label: 'boundary, Canny' },
-  { value: 'time', label: 'line in time' },
-  { value: 'between', label: 'in-between slices' },
+const BELOW: { value: ContentBelow; label: string }[] = [
+  { value: 'slices', label: text('trackPanels.belowSlices') },
+  { value: 'boundary', label: text('trackPanels.belowBoundary') },
+  { value: 'time', label: text('trackPanels.belowTime') },
+  { value: 'between', label: text('trackPanels.belowBetween') },
 ];
 
 /** View options of the Track lab, and the content below the view. */
@@ -40,15 +41,21 @@ export class TrackOptionControls {
       this.#boxes.set(name, box);
       return h('label', {}, box, label);
     });
-    const votes = choice('Boundary', 'votes', VOTES, initial.votes, (value) => this.set({ votes: value }));
-    const slices = choice('Slices', 'slices', PLACEMENTS, initial.slices, (value) => this.set({ slices: value }));
-    const below = choice('Below', 'below', BELOW, initial.below, (value) => this.set({ below: value }));
+    const votes = choice(text('trackPanels.boundary'), 'votes', VOTES, initial.votes, (value) =>
+      this.set({ votes: value }),
+    );
+    const slices = choice(text('controls.slices'), 'slices', PLACEMENTS, initial.slices, (value) =>
+      this.set({ slices: value }),
+    );
+    const below = choice(text('trackPanels.below'), 'below', BELOW, initial.below, (value) =>
+      this.set({ below: value }),
+    );
     this.#votes = votes.select;
     this.#slices = slices.select;
     this.#below = below.select;
     this.element = h(
       'div',
-      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
       ...switches,
       votes.element,
       slices.element,

@@ -1,6 +1,7 @@
 import type { StepReport } from '../protocol';
 import type { LabState } from '../state';
-import { h, icon, wantsStillness } from './dom';
+import { text } from '../texts';
+import { h, icon, prefersReducedMotion } from './dom';
 import { count } from './format';
 
 const PLAY = 'M7 4.5v15l12-7.5z';
@@ -32,7 +33,7 @@ export class Transport {
   readonly #redo: HTMLButtonElement;
   readonly #iteration = h('span', { class: 'iteration' });
   readonly #phase = h('span', { class: 'phase' });
-  readonly #progress = h('progress', { max: 1, 'aria-label': 'Progress' });
+  readonly #progress = h('progress', { max: 1, 'aria-label': text('controls.progress') });
 
   constructor({ onToggle, onStep, onReset, onUndo, onRedo }: TransportEvents) {
     this.#play = h(
@@ -41,15 +42,31 @@ export class Transport {
       this.#playIcon,
       this.#playText,
     );
-    this.#step = labelled(STEP, 'Step', () => onStep(1));
-    this.#steps = labelled(STEPS, 'Step ×10', () => onStep(10));
-    this.#reset = labelled(RESET, 'Reset', onReset);
-    this.#undo = h('button', { type: 'button', 'data-transport': 'undo', onclick: onUndo }, icon(UNDO), word('Undo'));
-    this.#redo = h('button', { type: 'button', 'data-transport': 'redo', onclick: onRedo }, icon(REDO), word('Redo'));
+    this.#step = labelled(STEP, text('controls.step'), () => onStep(1));
+    this.#steps = labelled(STEPS, text('controls.tenSteps'), () => onStep(10));
+    this.#reset = labelled(RESET, text('controls.reset'), onReset);
+    this.#undo = h(
+      'button',
+      { type: 'button', 'data-transport': 'undo', onclick: onUndo },
+      icon(UNDO),
+      word(text('controls.undo')),
+    );
+    this.#redo = h(
+      'button',
+      { type: 'button', 'data-transport': 'redo', onclick: onRedo },
+      icon(REDO),
+      word(text('controls.redo')),
+    );
     const all = [this.#play, this.#step, this.#steps, this.#reset, this.#undo, this.#redo];
     const buttons = h('div', { class: 'buttons' }, ...all);
     const where = h('div', { class: 'where' }, this.#iteration, this.#phase);
-    this.element = h('div', { class: 'transport', role: 'group', 'aria-label': 'Run' }, buttons, where, this.#progress);
+    this.element = h(
+      'div',
+      { class: 'transport', role: 'group', 'aria-label': text('controls.runControls') },
+      buttons,
+      where,
+      this.#progress,
+    );
     this.showReport(undefined);
     this.showState('loading', false);
     this.showUndo(undefined, undefined);
@@ -58,11 +75,12 @@ export class Transport {
   /** Sets the descriptions of the actions that can be undone and redone. */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
     for (const [button, verb, what] of [
-      [this.#undo, 'Undo', undoable],
-      [this.#redo, 'Redo', redoable],
+      [this.#undo, text('controls.undo'), undoable],
+      [this.#redo, text('controls.redo'), redoable],
     ] as const) {
       button.disabled = what === undefined;
-      const title = what === undefined ? `${verb}: nothing` : `${verb}: ${what}`;
+      const title =
+        what === undefined ? text('controls.nothingTo', { verb }) : text('controls.doAction', { verb, action: what });
       button.title = title;
       button.setAttribute('aria-label', title);
     }
@@ -72,7 +90,7 @@ export class Transport {
   showState(state: LabState, ready: boolean): void {
     const running = state === 'running';
     this.#playIcon.replaceChildren(icon(running ? PAUSE : PLAY));
-    this.#playText.textContent = running ? 'Pause' : 'Play';
+    this.#playText.textContent = running ? text('controls.pause') : text('controls.play');
     const idle = ready && state !== 'loading';
     this.#play.disabled = !idle || state === 'done';
     this.#step.disabled = !idle || running || state === 'done';
@@ -82,7 +100,7 @@ export class Transport {
   }
 
   showReport(report: StepReport | undefined): void {
-    this.#iteration.textContent = `Iteration ${count(report?.iteration ?? 0)}`;
+    this.#iteration.textContent = text('controls.iteration', { number: count(report?.iteration ?? 0) });
     this.#phase.textContent = report?.phase ?? '';
     if (report && Number.isFinite(report.progress)) this.#progress.value = report.progress;
     else this.#progress.value = 0;
@@ -90,7 +108,7 @@ export class Transport {
 
   #showBusy(state: LabState): void {
     // A progress bar without a value is animated: the duration is unknown.
-    if (state === 'loading' && !wantsStillness()) this.#progress.removeAttribute('value');
+    if (state === 'loading' && !prefersReducedMotion()) this.#progress.removeAttribute('value');
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }

@@ -1,11 +1,12 @@
-import type { Shade } from '../protocol';
+import type { VertexQuantity } from '../protocol';
+import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
 /** Placement of the slices in the 3D view: on the walls behind the surface, in place, or hidden. */
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
 /** Colouring of the surface in the Extract lab. */
-export type ColorMode = 'plain' | 'component' | Shade;
+export type ColorMode = 'plain' | 'component' | VertexQuantity;
 
 export interface ViewOptions {
   surface: boolean;
@@ -15,21 +16,21 @@ export interface ViewOptions {
 }
 
 const SWITCHES = [
-  { name: 'surface', label: 'Surface' },
-  { name: 'edges', label: 'Wireframe' },
+  { name: 'surface', label: text('controls.viewSurface') },
+  { name: 'edges', label: text('controls.viewWireframe') },
 ] as const;
 export const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
-  { value: 'walls', label: 'on the walls' },
-  { value: 'in place', label: 'in place' },
-  { value: 'hidden', label: 'hidden' },
+  { value: 'walls', label: text('controls.placementWalls') },
+  { value: 'in place', label: text('controls.placementInPlace') },
+  { value: 'hidden', label: text('controls.placementHidden') },
 ];
 
 export const COLOR_MODES: { value: ColorMode; label: string }[] = [
-  { value: 'plain', label: 'plain' },
-  { value: 'component', label: 'component' },
-  { value: 'speed', label: 'speed' },
-  { value: 'mean curvature', label: 'mean curvature' },
-  { value: 'gaussian curvature', label: 'Gaussian curvature' },
+  { value: 'plain', label: text('controls.colorPlain') },
+  { value: 'component', label: text('controls.colorComponent') },
+  { value: 'speed', label: text('controls.colorSpeed') },
+  { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
+  { value: 'gaussian curvature', label: text('controls.colorGaussianCurvature') },
 ];
 
 /** View options of the Extract lab. */
@@ -47,12 +48,16 @@ export class ViewOptionControls {
       box.addEventListener('change', () => this.#change({ [name]: box.checked }));
       return h('label', {}, box, label);
     });
-    const color = choice('Colour', 'color', COLOR_MODES, initial.color, (color) => this.#change({ color }));
-    const slices = choice('Slices', 'slices', PLACEMENTS, initial.slices, (slices) => this.#change({ slices }));
+    const color = choice(text('controls.color'), 'color', COLOR_MODES, initial.color, (color) =>
+      this.#change({ color }),
+    );
+    const slices = choice(text('controls.slices'), 'slices', PLACEMENTS, initial.slices, (slices) =>
+      this.#change({ slices }),
+    );
     this.#color = color.select;
     this.element = h(
       'div',
-      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
       ...switches,
       color.element,
       slices.element,

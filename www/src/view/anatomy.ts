@@ -1,10 +1,11 @@
 import type { Plane, Vec3, VolumeView } from '../protocol';
+import { text } from '../texts';
 
 export type Axis = 0 | 1 | 2;
 export type Grid = Pick<VolumeView, 'dims' | 'spacing' | 'affine' | 'space'>;
 
 /** One side of a slice image: the voxel axis along it, and whether its index decreases instead of increasing. */
-export interface Side {
+export interface ImageAxis {
   axis: Axis;
   flip: boolean;
 }
@@ -13,13 +14,13 @@ export interface Side {
  * Display of the slices across one voxel axis in radiological convention: the patient's right on the left, head or face
  * up.
  */
-export interface SliceFrame {
+export interface SliceOrientation {
   axis: Axis;
   name: 'Sagittal' | 'Coronal' | 'Axial';
   /** The side that runs from left to right. */
-  horizontal: Side;
+  horizontal: ImageAxis;
   /** The side that runs from top to bottom. */
-  vertical: Side;
+  vertical: ImageAxis;
   labels: { left: string; right: string; top: string; bottom: string };
 }
 
@@ -30,6 +31,13 @@ const ENDS = [
   ['S', 'I'],
 ] as const;
 const NAMES = ['Sagittal', 'Coronal', 'Axial'] as const;
+
+/** Names of the slices as shown. */
+export const SLICE_NAMES: Record<SliceOrientation['name'], string> = {
+  Sagittal: text('view.sagittal'),
+  Coronal: text('view.coronal'),
+  Axial: text('view.axial'),
+};
 const ORDERS: [Axis, Axis, Axis][] = [
   [0, 1, 2],
   [0, 2, 1],
@@ -59,7 +67,7 @@ export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[]
 }
 
 /** Returns the display of slices for each of the three voxel axes of a volume. */
-export function sliceFrames(grid: Grid): SliceFrame[] {
+export function sliceOrientations(grid: Grid): SliceOrientation[] {
   const anatomy = anatomyOf(grid);
   const at = (axis: Axis) => anatomy[axis] ?? { anatomical: axis, positive: true };
   return ([0, 1, 2] as Axis[]).map((axis) => {

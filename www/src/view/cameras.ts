@@ -1,6 +1,6 @@
 import { Vector3 } from 'three';
-import { type PinholeCamera, poseOf } from './eye';
 import { Lines } from './lines';
+import { type PinholeCamera, poseOf } from './pinhole';
 
 /**
  * Cameras in the 3D view as small pyramids: the apex is the camera centre, the base its image, with a mark at the upper
@@ -52,13 +52,13 @@ export class CameraMarks {
 
 /** Returns the edges of a camera's pyramid as pairs of points, packed. */
 function pyramid(camera: PinholeCamera, depth: number): number[] {
-  const { centre, right, down, forward, focal, middle } = poseOf(camera);
+  const { centre, right, down, forward, focal, principalPoint } = poseOf(camera);
   const at = (x: number, y: number) =>
     new Vector3()
       .copy(centre)
       .addScaledVector(forward, depth)
-      .addScaledVector(right, (depth * (x - middle[0])) / focal[0])
-      .addScaledVector(down, (depth * (y - middle[1])) / focal[1]);
+      .addScaledVector(right, (depth * (x - principalPoint[0])) / focal[0])
+      .addScaledVector(down, (depth * (y - principalPoint[1])) / focal[1]);
   const { width, height } = camera;
   const corners = [at(0, 0), at(width, 0), at(width, height), at(0, height)];
   const mark = [at(0.35 * width, 0), at(0.5 * width, -0.2 * height), at(0.65 * width, 0)];

@@ -20,9 +20,9 @@ export type HandleMode = 'move' | 'turn' | 'size';
 
 const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
 /** Opacities: high enough to find the ellipsoids, low enough to see the surface through them. */
-const GHOST = 0.05;
-const CHOSEN = 0.16;
-const NET = 0.13;
+const ELLIPSOID_OPACITY = 0.05;
+const SELECTED_OPACITY = 0.16;
+const WIRE_OPACITY = 0.13;
 
 /**
  * Control ellipsoids in the 3D view, transparent and visible through the surface, with transform handles on the
@@ -33,15 +33,15 @@ export class EllipsoidHandles {
   /** Called while a handle is dragged, and once more when it is released. */
   onDrag: (ellipsoid: ControlEllipsoid, dragging: boolean) => void = () => undefined;
   /** Called before the first move of a drag. */
-  onGrab: () => void = () => undefined;
+  onDragStart: () => void = () => undefined;
   /** Called when the pointer enters or leaves a handle. */
   onHover: (hovered: boolean) => void = () => undefined;
   readonly #handles: TransformControls;
   readonly #ball = new SphereGeometry(1, 32, 20);
-  readonly #net = new WireframeGeometry(new SphereGeometry(1, 16, 8));
-  readonly #ghost = ghostMaterial(GHOST);
-  readonly #bright = ghostMaterial(CHOSEN);
-  readonly #lines = new LineBasicMaterial({ transparent: true, opacity: NET, depthTest: false });
+  readonly #wireframe = new WireframeGeometry(new SphereGeometry(1, 16, 8));
+  readonly #material = transparentMaterial(ELLIPSOID_OPACITY);
+  readonly #selectedMaterial = transparentMaterial(SELECTED_OPACITY);
+  readonly #lines = new LineBasicMaterial({ transparent: true, opacity: WIRE_OPACITY, depthTest: false });
   /** The object the handles are attached to: it receives position, rotation and scale of the selected ellipsoid. */
   readonly #proxy = new Object3D();
   readonly #marks = new Group();
@@ -54,7 +54,7 @@ export class EllipsoidHandles {
     handles.setSpace('local');
     handles.addEventListener('axis-changed', () => this.onHover(handles.axis !== null));
     handles.addEventListener('objectChange', () => this.#moved(true));
-    handles.addEventListener('mouseDown', () => this.onGrab());
+    handles.addEventListener('mouseDown', () => this.onDragStart());
     handles.addEventListener('mouseUp', () => this.#moved(false));
     this.#placeHandles();
   }
@@ -66,7 +66,7 @@ export class EllipsoidHandles {
   }
 
   set color(color: string) {
-    for (const material of [this.#ghost, this.#bright, this.#lines]) material.color.set(color);
+    for (const material of [this.#material, this.#selectedMaterial, this.#lines]) material.color.set(color);
   }
 
   /** Whether a handle is being dragged. */
@@ -96,7 +96,7 @@ export class EllipsoidHandles {
       if (!mark || !solid) return;
       mark.matrix.copy(matrixOf(ellipsoid));
       mark.matrixWorldNeedsUpdate = true;
-      solid.material = index === this.#chosen ? this.#bright : this.#ghost;
+      solid.material = index === this.#chosen ? this.#selectedMaterial : this.#material;
     });
     if (!this.dragging) this.#placeHandles();
   }
@@ -113,14 +113,15 @@ export class EllipsoidHandles {
   dispose(): void {
     this.#handles.detach();
     this.#handles.dispose();
-    for (const part of [this.#ball, this.#net, this.#ghost, this.#bright, this.#lines]) part.dispose();
+    for (const part of [this.#ball, this.#wireframe, this.#material, this.#selectedMaterial, this.#lines])
+      part.dispose();
   }
 
   #mark(): Group {
     const mark = new Group();
     mark.matrixAutoUpdate = false;
-    const solid = new Mesh(this.#ball, this.#ghost);
-    const net = new LineSegments(this.#net, this.#lines);
+    const solid = new Mesh(this.#ball, this.#material);
+    const net = new LineSegments(this.#wireframe, this.#lines);
     // Rendered after the surface, which does not hide them.
     solid.renderOrder = 1;
     net.renderOrder = 2;
@@ -149,7 +150,7 @@ export class EllipsoidHandles {
 
 const TINY = new Vector3(1, 1, 1).multiplyScalar(1e-6);
 
-function ghostMaterial(opacity: number): MeshBasicMaterial {
+function transparentMaterial(opacity: number): MeshBasicMaterial {
   return new MeshBasicMaterial({ transparent: true, opacity, depthTest: false, depthWrite: false });
 }
 

@@ -16,8 +16,8 @@ const POINT = 0.12;
 const MARK_RADII = [0.008, 0.04] as const;
 
 /**
- * Marks of uncovered regions in the 3D view, drawn over everything: a ball where matter is missing, a wireframe at a
- * cavity.
+ * Marks of uncovered regions in the 3D view, drawn over everything: a ball where object lies outside the surface, a
+ * wireframe where background lies inside it.
  */
 export class UncoveredMarks {
   readonly object = new Group();

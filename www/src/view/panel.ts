@@ -1,7 +1,8 @@
 import type { Attractor, LevelView, UncoveredRegion, Vec3, VolumeView } from '../protocol';
-import { h, pen, token, uniqueId } from '../ui/dom';
-import type { SliceFrame } from './anatomy';
-import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
+import { text } from '../texts';
+import { context2d, h, token, uniqueId } from '../ui/dom';
+import { SLICE_NAMES, type SliceOrientation } from './anatomy';
+import { ballSection, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
 /** Style tokens of the colours of the three slice directions, by voxel axis. */
 export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
@@ -38,7 +39,7 @@ export class SlicePanel {
   readonly element: HTMLElement;
   /** The slice image alone, one pixel a voxel; also the texture of the plane in the 3D view. */
   readonly picture = document.createElement('canvas');
-  readonly frame: SliceFrame;
+  readonly orientation: SliceOrientation;
   /** Draws additional content over the slice. */
   overlay: Overlay = () => undefined;
   readonly #volume: VolumeView;
@@ -56,16 +57,16 @@ export class SlicePanel {
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
 
-  constructor(volume: VolumeView, frame: SliceFrame, inverse: Float64Array, events: PanelEvents) {
+  constructor(volume: VolumeView, orientation: SliceOrientation, inverse: Float64Array, events: PanelEvents) {
     this.#volume = volume;
-    this.frame = frame;
+    this.orientation = orientation;
     this.#inverse = inverse;
-    const { width, height } = pictureSize(volume, frame);
+    const { width, height } = pictureSize(volume, orientation);
     this.picture.width = width;
     this.picture.height = height;
     this.#pixels = new ImageData(width, height);
     const id = uniqueId('slice');
-    const last = volume.dims[frame.axis] - 1;
+    const last = volume.dims[orientation.axis] - 1;
     this.#canvas = h('canvas', { role: 'img' });
     this.#slider = h('input', { type: 'range', id, min: 0, max: last, step: 1, value: last >> 1 });
     this.#slider.addEventListener('input', () => events.onIndex(this.#slider.valueAsNumber));
@@ -78,7 +79,7 @@ export class SlicePanel {
 
   /** Moves the crosshair, and repaints the image if it moves to another slice. */
   setCrosshair(index: Vec3): void {
-    const { axis } = this.frame;
+    const { axis } = this.orientation;
     const moved = this.#crosshair[axis] !== index[axis] || this.#output.value === '';
     this.#crosshair = [...index];
     if (moved) this.#paint(index[axis]);
@@ -87,7 +88,7 @@ export class SlicePanel {
 
   /** Sets the cross-section of the surface with this slice, as pairs of world points. */
   setOutline(segments: Float32Array): void {
-    this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.frame);
+    this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.orientation);
     this.draw();
     this.#describe();
   }
@@ -95,7 +96,7 @@ export class SlicePanel {
   /** Shows a coarser level voxel by voxel, or the volume itself. */
   setLevel(level: LevelView | undefined): void {
     this.#level = level;
-    this.#paint(this.#crosshair[this.frame.axis]);
+    this.#paint(this.#crosshair[this.orientation.axis]);
     this.draw();
   }
 
@@ -112,7 +113,7 @@ export class SlicePanel {
   /** Draws the image and all overlays on the visible canvas, in its own resolution. */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
-    const context = pen(this.#canvas);
+    const context = context2d(this.#canvas);
     if (!context || clientWidth === 0) return;
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);
@@ -138,12 +139,12 @@ export class SlicePanel {
   }
 
   #build(id: string): HTMLElement {
-    const { labels, name, axis } = this.frame;
+    const { labels, name, axis } = this.orientation;
     const letters = Object.entries(labels).map(([side, letter]) =>
       h('span', { class: `direction ${side}`, 'aria-hidden': 'true' }, letter),
     );
     const swatch = h('span', { class: `swatch axis-${axis}`, 'aria-hidden': 'true' });
-    const label = h('label', { for: id }, swatch, name);
+    const label = h('label', { for: id }, swatch, SLICE_NAMES[name]);
     return h(
       'div',
       { class: 'slice' },
@@ -154,10 +155,10 @@ export class SlicePanel {
 
   #paint(index: number): void {
     if (this.#level) {
-      paintLevel(this.#volume, this.#level, this.frame, index, this.picture);
+      paintLevel(this.#volume, this.#level, this.orientation, index, this.picture);
     } else {
-      paintSlice(this.#volume, this.frame, index, this.#pixels.data);
-      pen(this.picture)?.putImageData(this.#pixels, 0, 0);
+      paintSlice(this.#volume, this.orientation, index, this.#pixels.data);
+      context2d(this.picture)?.putImageData(this.#pixels, 0, 0);
     }
     this.#slider.valueAsNumber = index;
     this.#output.value = String(index);
@@ -167,17 +168,24 @@ export class SlicePanel {
 
   /** Describes the visible content in the canvas's label, for screen readers. */
   #describe(): void {
-    const { name, axis } = this.frame;
-    const where = `${name} slice ${this.#crosshair[axis]} of 0 to ${this.#volume.dims[axis] - 1}`;
-    this.#canvas.setAttribute('aria-label', `${where}, ${tellOutline(this.#outline, this.picture)}`);
+    const { name, axis } = this.orientation;
+    const where = text('view.sliceOf', {
+      name: SLICE_NAMES[name],
+      slice: this.#crosshair[axis],
+      last: this.#volume.dims[axis] - 1,
+    });
+    this.#canvas.setAttribute(
+      'aria-label',
+      text('view.sliceWith', { slice: where, outline: describeOutline(this.#outline, this.picture) }),
+    );
   }
 
   /** Returns position and scale of the image in the canvas, with voxels in their true proportions. */
   #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
     const { width, height } = this.picture;
     const { spacing } = this.#volume;
-    const across = spacing[this.frame.horizontal.axis];
-    const down = spacing[this.frame.vertical.axis];
+    const across = spacing[this.orientation.horizontal.axis];
+    const down = spacing[this.orientation.vertical.axis];
     const { clientWidth, clientHeight } = this.#canvas;
     const fit = Math.min(clientWidth / (width * across), clientHeight / (height * down));
     const [scaleX, scaleY] = [fit * across, fit * down];
@@ -185,9 +193,9 @@ export class SlicePanel {
   }
 
   #drawCrosshair(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
-    const { horizontal, vertical } = this.frame;
+    const { horizontal, vertical } = this.orientation;
     const { width, height } = this.picture;
-    const at = ({ axis, flip }: SliceFrame['horizontal']) => {
+    const at = ({ axis, flip }: SliceOrientation['horizontal']) => {
       const index = this.#crosshair[axis];
       return (flip ? this.#volume.dims[axis] - 1 - index : index) + 0.5;
     };
@@ -221,7 +229,13 @@ export class SlicePanel {
     context.strokeStyle = token('--attractor');
     context.fillStyle = token('--attractor');
     for (const attractor of this.#attractors) {
-      const disc = discOf(attractor, this.#crosshair[this.frame.axis], this.#inverse, this.#volume, this.frame);
+      const disc = ballSection(
+        attractor,
+        this.#crosshair[this.orientation.axis],
+        this.#inverse,
+        this.#volume,
+        this.orientation,
+      );
       if (!disc) continue;
       const at = [disc.x * scaleX, disc.y * scaleY] as const;
       context.beginPath();
@@ -233,12 +247,21 @@ export class SlicePanel {
     }
   }
 
-  /** Marks uncovered regions near this slice: a dot where matter is missing, a ring at a cavity. */
+  /**
+   * Marks the parts of the iso-surface near this slice that the surface does not cover: a dot where object lies outside
+   * the surface, a ring where background lies inside it.
+   */
   #drawUncovered(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
     for (const { position, kind } of this.#uncovered) {
       const point = { point: position, radius: Math.max(...this.#volume.spacing) };
-      const disc = discOf(point, this.#crosshair[this.frame.axis], this.#inverse, this.#volume, this.frame);
+      const disc = ballSection(
+        point,
+        this.#crosshair[this.orientation.axis],
+        this.#inverse,
+        this.#volume,
+        this.orientation,
+      );
       if (!disc?.near) continue;
       context.beginPath();
       context.arc(disc.x * scaleX, disc.y * scaleY, 4, 0, 2 * Math.PI);
@@ -272,8 +295,8 @@ export class SlicePanel {
   #slack(): Vec3 {
     const { scaleX, scaleY } = this.#placement();
     const slack: Vec3 = [0, 0, 0];
-    slack[this.frame.horizontal.axis] = SLACK / scaleX;
-    slack[this.frame.vertical.axis] = SLACK / scaleY;
+    slack[this.orientation.horizontal.axis] = SLACK / scaleX;
+    slack[this.orientation.vertical.axis] = SLACK / scaleY;
     return slack;
   }
 
@@ -282,8 +305,8 @@ export class SlicePanel {
     const { x, y, scaleX, scaleY } = this.#placement();
     const place: Vec3 = [...this.#crosshair];
     for (const [{ axis, flip }, position] of [
-      [this.frame.horizontal, (canvasX - x) / scaleX],
-      [this.frame.vertical, (canvasY - y) / scaleY],
+      [this.orientation.horizontal, (canvasX - x) / scaleX],
+      [this.orientation.vertical, (canvasY - y) / scaleY],
     ] as const)
       place[axis] = (flip ? this.#volume.dims[axis] - position : position) - 0.5;
     return place;
@@ -297,8 +320,8 @@ export class SlicePanel {
 }
 
 /** Describes the size of the surface's cross-section. Points as in {@link projectSegments}. */
-function tellOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
-  if (points.length === 0) return 'which does not cut the surface';
+function describeOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
+  if (points.length === 0) return text('view.noOutline');
   const side = (first: 0 | 1) => {
     let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
     for (let i = first; i < points.length; i += 2) {
@@ -307,7 +330,7 @@ function tellOutline(points: Float32Array, { width, height }: HTMLCanvasElement)
     }
     return Math.round(high - low);
   };
-  return `with the outline of the surface, ${side(0)} by ${side(1)} of ${width} by ${height} voxels`;
+  return text('view.outlineSize', { outlineWidth: side(0), outlineHeight: side(1), width, height });
 }
 
 function line(context: CanvasRenderingContext2D, color: string, x1: number, y1: number, x2: number, y2: number): void {

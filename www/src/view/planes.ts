@@ -14,7 +14,7 @@ import {
   Vector3,
 } from 'three';
 import type { Vec3 } from '../protocol';
-import { type Grid, type SliceFrame, toWorld } from './anatomy';
+import { type Grid, type SliceOrientation, toWorld } from './anatomy';
 import { Lines } from './lines';
 
 export interface PlaneColors {
@@ -29,7 +29,7 @@ export interface PlaneColors {
 export class SlicePlane {
   readonly object = new Group();
   readonly #grid: Grid;
-  readonly #frame: SliceFrame;
+  readonly #frame: SliceOrientation;
   readonly #texture: CanvasTexture;
   readonly #geometry = new BufferGeometry();
   readonly #outline = new BufferGeometry();
@@ -38,10 +38,10 @@ export class SlicePlane {
   readonly #section: Lines;
   #index = 0;
 
-  /** `picture` shows the slice in reading order, oriented as specified by `frame`. */
-  constructor(grid: Grid, frame: SliceFrame, picture: HTMLCanvasElement, colors: PlaneColors) {
+  /** `picture` shows the slice in reading order, oriented as specified by `orientation`. */
+  constructor(grid: Grid, orientation: SliceOrientation, picture: HTMLCanvasElement, colors: PlaneColors) {
     this.#grid = grid;
-    this.#frame = frame;
+    this.#frame = orientation;
     this.#texture = new CanvasTexture(picture);
     this.#texture.colorSpace = SRGBColorSpace;
     this.#texture.minFilter = LinearFilter;

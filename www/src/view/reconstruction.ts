@@ -4,13 +4,13 @@ import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { CameraMarks } from './cameras';
 import { PointCloud } from './cloud';
-import type { PinholeCamera } from './eye';
-import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import type { PinholeCamera } from './pinhole';
+import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
 /** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
-const STRAY = 0.02;
+const OUTLIER_FRACTION = 0.02;
 /**
  * Diameter of a point's disc, as a fraction of the box diagonal: two to three pixels. Smaller ones are hard to see,
  * larger ones hide the surface.
@@ -85,7 +85,7 @@ export class ReconstructionView {
 
   /** Shows other points and discards everything that belonged to the previous ones. */
   setCloud({ points, colors, cameras, up, front }: ShownCloud): void {
-    this.#box = middleBox(points);
+    this.#box = robustBox(points);
     const length = this.#box.getSize(new Vector3()).length();
     const disc = DISC * length * Math.min(1, Math.sqrt((3 * MANY) / points.length));
     for (const cloud of [this.#points, this.#inside]) cloud.size = disc;
@@ -98,7 +98,7 @@ export class ReconstructionView {
     this.showByHand(new Float32Array(0), new Float32Array(0));
     this.showConstraints(new Float32Array(0), new Float32Array(0));
     this.clearSurface();
-    this.#frame();
+    this.#fitView();
   }
 
   showPoints(points: Float32Array, colors: Float32Array | undefined): void {
@@ -131,7 +131,7 @@ export class ReconstructionView {
   }
 
   setOptions(options: CloudViewOptions): void {
-    const reframe = options.cameras !== this.#options.cameras;
+    const refit = options.cameras !== this.#options.cameras;
     this.#options = { ...options };
     this.#surface.solid = options.surface && this.#hasSurface;
     this.#surface.edges = options.edges && this.#hasSurface;
@@ -144,7 +144,7 @@ export class ReconstructionView {
       object.visible = options.points || options.constraints;
     this.#cameras.visible = options.cameras;
     this.#showLegend();
-    if (reframe) this.#frame();
+    if (refit) this.#fitView();
     this.#viewport.invalidate();
   }
 
@@ -171,10 +171,10 @@ export class ReconstructionView {
     return [this.#points, this.#inside, this.#outside, this.#addedByHand, this.#outsideByHand];
   }
 
-  #frame(): void {
+  #fitView(): void {
     const box = this.#box.clone();
     if (this.#options.cameras) for (const centre of this.#cameras.centres) box.expandByPoint(centre);
-    if (!box.isEmpty()) this.#viewport.frameBox(box, this.#front);
+    if (!box.isEmpty()) this.#viewport.fitBox(box, this.#front);
   }
 
   /**
@@ -198,8 +198,8 @@ export class ReconstructionView {
   #showLegend(): void {
     const { color, surface } = this.#options;
     const { range } = this.#surface;
-    if (surface && range > 0 && isShade(color))
-      this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    if (surface && range > 0 && isQuantity(color))
+      this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, '') }, range);
     else this.legend.hide();
   }
 
@@ -216,13 +216,13 @@ export class ReconstructionView {
 }
 
 /** Returns the bounding box of all points but the outermost. */
-function middleBox(points: Float32Array): Box3 {
+function robustBox(points: Float32Array): Box3 {
   const box = new Box3();
   const count = points.length / 3;
   const [low, high] = [new Vector3(), new Vector3()];
   for (let axis = 0; axis < 3; axis++) {
     const sorted = Float32Array.from({ length: count }, (_, i) => points[3 * i + axis] ?? 0).sort();
-    const [first, last] = [Math.floor(STRAY * (count - 1)), Math.ceil((1 - STRAY) * (count - 1))];
+    const [first, last] = [Math.floor(OUTLIER_FRACTION * (count - 1)), Math.ceil((1 - OUTLIER_FRACTION) * (count - 1))];
     low.setComponent(axis, sorted[first] ?? 0);
     high.setComponent(axis, sorted[last] ?? 0);
   }

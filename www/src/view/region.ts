@@ -4,11 +4,11 @@
 import type { Vec3 } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { token } from '../ui/dom';
-import { type Axis, type SliceFrame, toWorld } from './anatomy';
+import { type Axis, type SliceOrientation, toWorld } from './anatomy';
 import type { Grip } from './panel';
 
 /** Smallest size of the region along an axis, voxels; a smaller one contains no window with a boundary. */
-const LEAST = 4;
+const MIN_VOXELS = 4;
 
 export class RegionGrips {
   region: VoxelBox | undefined;
@@ -54,14 +54,20 @@ export class RegionGrips {
   }
 
   /** Draws the intersection of the box with a slice, in pixels of the slice times the scales. */
-  draw(context: CanvasRenderingContext2D, frame: SliceFrame, dims: Vec3, scaleX: number, scaleY: number): void {
+  draw(
+    context: CanvasRenderingContext2D,
+    orientation: SliceOrientation,
+    dims: Vec3,
+    scaleX: number,
+    scaleY: number,
+  ): void {
     const { region } = this;
     if (!region) return;
-    const span = ({ axis, flip }: SliceFrame['horizontal']) => {
+    const span = ({ axis, flip }: SliceOrientation['horizontal']) => {
       const [from, to] = [region.low[axis], region.high[axis] + 1];
       return flip ? [dims[axis] - to, dims[axis] - from] : [from, to];
     };
-    const [[x0 = 0, x1 = 0], [y0 = 0, y1 = 0]] = [span(frame.horizontal), span(frame.vertical)];
+    const [[x0 = 0, x1 = 0], [y0 = 0, y1 = 0]] = [span(orientation.horizontal), span(orientation.vertical)];
     context.save();
     context.setLineDash([5, 4]);
     context.lineWidth = 1.5;
@@ -73,8 +79,8 @@ export class RegionGrips {
 
 function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims: Vec3): VoxelBox {
   const ends: VoxelBox = { low: [...box.low], high: [...box.high] };
-  if (side === 'low') ends.low[axis] = Math.max(0, Math.min(Math.round(to + 0.5), box.high[axis] - LEAST + 1));
-  else ends.high[axis] = Math.min(dims[axis] - 1, Math.max(Math.round(to - 0.5), box.low[axis] + LEAST - 1));
+  if (side === 'low') ends.low[axis] = Math.max(0, Math.min(Math.round(to + 0.5), box.high[axis] - MIN_VOXELS + 1));
+  else ends.high[axis] = Math.min(dims[axis] - 1, Math.max(Math.round(to - 0.5), box.low[axis] + MIN_VOXELS - 1));
   return ends;
 }
 

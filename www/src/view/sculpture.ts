@@ -2,17 +2,18 @@ import { Box3, Group, type Raycaster, type Texture, Vector3 } from 'three';
 import type { Surface, Vec3 } from '../protocol';
 import { boxOf } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Layout, Pose } from '../sculpt/protocol';
+import { text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { EllipsoidHandles, type HandleMode } from './handles';
-import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
 /** Distance between the centres of adjacent meshes in a row, relative to their width. */
-const APART = 1.25;
+const ROW_SPACING = 1.25;
 /** Initial rotation to the side, so that a face is seen almost from the front. */
-const ASIDE = 0.35;
+const VIEW_ANGLE = 0.35;
 
 export interface SculptViewOptions {
   layout: Layout;
@@ -37,13 +38,13 @@ const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = 
   row: ['S1', 'S0', 'T', 'S0dash', 'S1dash'],
 };
 
-/** Caption under each mesh. */
+/** Captions of the meshes; those of the stages A to E come with the stages. */
 const CAPTIONS: Partial<Record<MeshName, string>> = {
-  S1: 'S₁ original',
-  S0: 'S₀ its base',
-  T: 'T link, on the base',
-  S0dash: 'S₀′ deformed base',
-  S1dash: 'S₁′ result',
+  S1: text('view.meshOriginal'),
+  S0: text('view.meshBase'),
+  T: text('view.meshLink'),
+  S0dash: text('view.meshDeformedBase'),
+  S1dash: text('view.meshResult'),
 };
 
 /**
@@ -99,13 +100,13 @@ export class SculptureView {
    * Opens another scene and discards everything of the previous one. The view is fitted to the surface in all `poses`.
    */
   setScene(box: { min: Vec3; max: Vec3 }, up: 'y' | 'z', start: Pose, poses: Pose[]): void {
-    this.#box = roomFor(box, start, poses);
+    this.#box = boxOfAllPoses(box, start, poses);
     this.#viewport.up = up;
     this.#upright = up === 'y';
     for (const mesh of this.#meshes.values()) mesh.has = false;
     this.#stages = [];
     this.setOptions(this.#options);
-    this.#frame();
+    this.#fitView();
   }
 
   /** Shows a surface; its arrays are kept until the next one is shown. */
@@ -129,7 +130,7 @@ export class SculptureView {
 
   /** Shows stages of a computation in a row, with their captions. */
   showStages(stages: { caption: string; surface: Surface }[]): void {
-    const reframe = stages.length !== this.#stages.length;
+    const refit = stages.length !== this.#stages.length;
     this.#stages = stages.map(({ caption }) => caption);
     for (const [index, name] of STAGES.entries()) {
       const mesh = this.#meshes.get(name);
@@ -137,7 +138,7 @@ export class SculptureView {
       this.show(name, stages[index]?.surface);
     }
     this.#apply();
-    if (reframe) this.#frame();
+    if (refit) this.#fitView();
   }
 
   /** Calls `change` at the next animation frame, which then shows its effect. */
@@ -162,10 +163,10 @@ export class SculptureView {
   }
 
   setOptions(options: SculptViewOptions): void {
-    const reframe = options.layout !== this.#options.layout;
+    const refit = options.layout !== this.#options.layout;
     this.#options = { ...options };
     this.#apply();
-    if (reframe) this.#frame();
+    if (refit) this.#fitView();
   }
 
   /** Diagonal of the scene's bounding box as it was opened. */
@@ -206,7 +207,7 @@ export class SculptureView {
   #placeInRow(): void {
     const row = this.#row;
     const [right] = this.#viewport.directions();
-    const apart = APART * this.#width;
+    const apart = ROW_SPACING * this.#width;
     for (const [name, { holder }] of this.#meshes) {
       const at = row.indexOf(name) - (row.length - 1) / 2;
       holder.position.copy(right).multiplyScalar(row.includes(name) ? at * apart : 0);
@@ -226,19 +227,19 @@ export class SculptureView {
   get #width(): number {
     const size = this.#box.getSize(new Vector3());
     // Width of an ellipse seen at this angle.
-    const turn = Math.atan(ASIDE);
+    const turn = Math.atan(VIEW_ANGLE);
     return Math.hypot(size.x * Math.cos(turn), (this.#upright ? size.z : size.y) * Math.sin(turn));
   }
 
-  #frame(): void {
+  #fitView(): void {
     const { length } = this.#row;
     const box = this.#box.clone();
     const { aspect } = this.#viewport;
     // A row is wider than one mesh by the aspect of the view; the rest is compensated by distance.
-    const wider = Math.max(1, (APART * length * this.#width) / (this.size * Math.max(1, aspect)));
+    const wider = Math.max(1, (ROW_SPACING * length * this.#width) / (this.size * Math.max(1, aspect)));
     const [middle, half] = [box.getCenter(new Vector3()), box.getSize(new Vector3()).multiplyScalar(wider / 2)];
     box.set(middle.clone().sub(half), middle.clone().add(half));
-    this.#viewport.frameBox(box, 1, ASIDE);
+    this.#viewport.fitBox(box, 1, VIEW_ANGLE);
   }
 
   #pick(ray: Raycaster): void {
@@ -249,7 +250,8 @@ export class SculptureView {
     const { color } = this.#options;
     const ranges = this.#row.map((name) => this.#meshes.get(name)?.surface.range ?? 0);
     const range = Math.max(...ranges);
-    if (range > 0 && isShade(color)) this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    if (range > 0 && isQuantity(color))
+      this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, '') }, range);
     else this.legend.hide();
   }
 
@@ -261,14 +263,14 @@ export class SculptureView {
 }
 
 /** Returns a box for the surface in all poses: with the same margin around the ellipsoids as at the start. */
-function roomFor(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
-  const room = new Box3(new Vector3(...box.min), new Vector3(...box.max));
+function boxOfAllPoses(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
+  const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));
   const first = boxOf(start);
   for (const pose of poses) {
     const { min, max } = boxOf(pose);
     const corner = (at: Vec3, from: Vec3, of: Vec3) =>
       new Vector3(...of.map((x, k) => x + (at[k] ?? 0) - (from[k] ?? 0)));
-    room.expandByPoint(corner(min, first.min, box.min)).expandByPoint(corner(max, first.max, box.max));
+    all.expandByPoint(corner(min, first.min, box.min)).expandByPoint(corner(max, first.max, box.max));
   }
-  return room;
+  return all;
 }

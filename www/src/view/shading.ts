@@ -1,8 +1,9 @@
 /** Colour map for values on the surface: diverging, blue below zero, red above, light at zero (ColorBrewer RdBu). */
-import type { Shade } from '../protocol';
+import type { VertexQuantity } from '../protocol';
+import { text } from '../texts';
 
 /** Values at the vertices that can be shown as colours. */
-export type ValueShade = Shade | 'distance' | 'area distortion' | 'angle distortion';
+export type ShownQuantity = VertexQuantity | 'distance' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
@@ -25,34 +26,46 @@ const SAMPLES = 4096;
 const TABLE = 256;
 
 /** Title, labels and smallest range of the legend for each kind of value. */
-export const SHADES: Record<ValueShade, ShadeText> = {
-  speed: { title: 'Speed along the normal, δ per iteration', below: 'inwards', above: 'outwards', least: 1e-4 },
-  'mean curvature': { title: 'Mean curvature', power: 1, below: 'hollow', above: 'bulging', least: 1e-6 },
-  'gaussian curvature': { title: 'Gaussian curvature', power: 2, below: 'saddle', above: 'dome or cup', least: 1e-9 },
+export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
+  speed: { title: text('view.speed'), below: text('view.inwards'), above: text('view.outwards'), least: 1e-4 },
+  'mean curvature': {
+    title: text('view.meanCurvature'),
+    power: 1,
+    below: text('view.concave'),
+    above: text('view.convex'),
+    least: 1e-6,
+  },
+  'gaussian curvature': {
+    title: text('view.gaussianCurvature'),
+    power: 2,
+    below: text('view.hyperbolic'),
+    above: text('view.elliptic'),
+    least: 1e-9,
+  },
   distance: {
-    title: 'Distance to the nearest point',
+    title: text('view.pointDistance'),
     power: -1,
-    below: 'at a point',
-    above: 'far',
+    below: text('view.atPoint'),
+    above: text('view.far'),
     least: 1e-9,
     positive: true,
   },
   'area distortion': {
-    title: 'Area on the base over area here, as a power of two',
-    below: 'stretched here',
-    above: 'squeezed here',
+    title: text('view.areaDistortion'),
+    below: text('view.stretched'),
+    above: text('view.compressed'),
     least: 0.1,
   },
   'angle distortion': {
-    title: 'Longest over shortest stretch, as a power of two',
-    below: 'angles kept',
-    above: 'sheared',
+    title: text('view.angleDistortion'),
+    below: text('view.conformal'),
+    above: text('view.sheared'),
     least: 0.1,
     positive: true,
   },
 };
 
-interface ShadeText {
+interface QuantityText {
   title: string;
   /** Power of inverse length in the unit; −1 for a length. */
   power?: 1 | 2 | -1;
@@ -65,16 +78,16 @@ interface ShadeText {
 }
 
 /** Whether a colouring represents values. */
-export function isShade(color: string): color is ValueShade {
-  return color in SHADES;
+export function isQuantity(color: string): color is ShownQuantity {
+  return color in QUANTITIES;
 }
 
 /** Returns the legend's title with the unit, for lengths in `unit`. */
-export function shadeTitle(shade: ValueShade, unit: string): string {
-  const { title, power } = SHADES[shade];
+export function quantityTitle(quantity: ShownQuantity, unit: string): string {
+  const { title, power } = QUANTITIES[quantity];
   if (!power) return title;
-  if (power === -1) return unit ? `${title}, ${unit}` : title;
-  return `${title}, 1/${unit || 'unit'}${power === 2 ? '²' : ''}`;
+  if (power === -1) return unit ? text('view.titleUnit', { title, unit }) : title;
+  return text(power === 2 ? 'view.perUnitSquared' : 'view.perUnit', { title, unit: unit || text('view.unknownUnit') });
 }
 
 /** Returns the colour for t in −1..1, sRGB 0..255. */

@@ -1,27 +1,27 @@
 import type { Attractor, LevelView, VolumeView } from '../protocol';
-import { pen } from '../ui/dom';
-import type { SliceFrame } from './anatomy';
+import { context2d } from '../ui/dom';
+import type { SliceOrientation } from './anatomy';
 
 type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
 
 /** Returns the size of slice images in this direction, voxels. */
-export function pictureSize(volume: Voxels, frame: SliceFrame): { width: number; height: number } {
-  return { width: volume.dims[frame.horizontal.axis], height: volume.dims[frame.vertical.axis] };
+export function pictureSize(volume: Voxels, orientation: SliceOrientation): { width: number; height: number } {
+  return { width: volume.dims[orientation.horizontal.axis], height: volume.dims[orientation.vertical.axis] };
 }
 
 /**
- * Paints a slice as grey RGBA pixels in reading order, oriented as specified by `frame`. `out` holds 4 × width × height
+ * Paints a slice as grey RGBA pixels in reading order, oriented as specified by `orientation`. `out` holds 4 × width × height
  * bytes.
  */
-export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out: Uint8ClampedArray): void {
-  const { width, height } = pictureSize(volume, frame);
+export function paintSlice(volume: Voxels, orientation: SliceOrientation, index: number, out: Uint8ClampedArray): void {
+  const { width, height } = pictureSize(volume, orientation);
   const strides = [1, volume.dims[0], volume.dims[0] * volume.dims[1]] as const;
-  const across = strides[frame.horizontal.axis] * (frame.horizontal.flip ? -1 : 1);
-  const first = frame.horizontal.flip ? (width - 1) * strides[frame.horizontal.axis] : 0;
+  const across = strides[orientation.horizontal.axis] * (orientation.horizontal.flip ? -1 : 1);
+  const first = orientation.horizontal.flip ? (width - 1) * strides[orientation.horizontal.axis] : 0;
   let target = 0;
   for (let j = 0; j < height; j++) {
-    const row = (frame.vertical.flip ? height - 1 - j : j) * strides[frame.vertical.axis];
-    let source = index * strides[frame.axis] + row + first;
+    const row = (orientation.vertical.flip ? height - 1 - j : j) * strides[orientation.vertical.axis];
+    let source = index * strides[orientation.axis] + row + first;
     for (let i = 0; i < width; i++) {
       const grey = volume.voxels[source] ?? 0;
       out[target++] = grey;
@@ -34,43 +34,43 @@ export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out
 }
 
 /** Returns the grey values of a slice in reading order. */
-export function greysOf(volume: Voxels, frame: SliceFrame, index: number): Uint8Array {
-  const { width, height } = pictureSize(volume, frame);
+export function greysOf(volume: Voxels, orientation: SliceOrientation, index: number): Uint8Array {
+  const { width, height } = pictureSize(volume, orientation);
   const rgba = new Uint8ClampedArray(4 * width * height);
-  paintSlice(volume, frame, index, rgba);
+  paintSlice(volume, orientation, index, rgba);
   return Uint8Array.from({ length: width * height }, (_, i) => rgba[4 * i] ?? 0);
 }
 
 /** Returns the index of the slice of a coarser level at the position of the volume's slice with the given index. */
-export function levelIndex(volume: Voxels, level: LevelView, frame: SliceFrame, index: number): number {
-  const last = level.dims[frame.axis] - 1;
-  return Math.min(last, Math.floor(((index + 0.5) * level.dims[frame.axis]) / volume.dims[frame.axis]));
+export function levelIndex(volume: Voxels, level: LevelView, orientation: SliceOrientation, index: number): number {
+  const last = level.dims[orientation.axis] - 1;
+  return Math.min(last, Math.floor(((index + 0.5) * level.dims[orientation.axis]) / volume.dims[orientation.axis]));
 }
 
 /** Paints a slice of a coarser level, stretched to the size of the volume's slices so that its voxels are visible. */
 export function paintLevel(
   volume: Voxels,
   level: LevelView,
-  frame: SliceFrame,
+  orientation: SliceOrientation,
   index: number,
   picture: HTMLCanvasElement,
 ): void {
-  const small = slicePicture(level, frame, levelIndex(volume, level, frame, index));
-  const context = pen(picture);
+  const small = slicePicture(level, orientation, levelIndex(volume, level, orientation, index));
+  const context = context2d(picture);
   if (!context) return;
   context.imageSmoothingEnabled = false;
   context.drawImage(small, 0, 0, picture.width, picture.height);
 }
 
 /** Renders a slice as an image on a new canvas. */
-export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): HTMLCanvasElement {
-  const { width, height } = pictureSize(volume, frame);
+export function slicePicture(volume: Voxels, orientation: SliceOrientation, index: number): HTMLCanvasElement {
+  const { width, height } = pictureSize(volume, orientation);
   const canvas = document.createElement('canvas');
   canvas.width = width;
   canvas.height = height;
   const pixels = new ImageData(width, height);
-  paintSlice(volume, frame, index, pixels.data);
-  pen(canvas)?.putImageData(pixels, 0, 0);
+  paintSlice(volume, orientation, index, pixels.data);
+  context2d(canvas)?.putImageData(pixels, 0, 0);
   return canvas;
 }
 
@@ -79,20 +79,20 @@ export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): 
  * {@link projectSegments}, or undefined if there is none. `near`: the point itself lies within half a voxel of the
  * slice.
  */
-export function discOf(
+export function ballSection(
   { point, radius }: Pick<Attractor, 'point' | 'radius'>,
   slice: number,
   inverse: ArrayLike<number>,
   volume: Pick<VolumeView, 'dims' | 'spacing'>,
-  frame: SliceFrame,
+  orientation: SliceOrientation,
 ): { x: number; y: number; radiusX: number; radiusY: number; near: boolean } | undefined {
-  const [x = 0, y = 0] = projectSegments(new Float32Array(point), inverse, volume, frame);
-  const { axis } = frame;
+  const [x = 0, y = 0] = projectSegments(new Float32Array(point), inverse, volume, orientation);
+  const { axis } = orientation;
   const row = [0, 4, 8].reduce((sum, column, i) => sum + (inverse[column + axis] ?? 0) * (point[i] ?? 0), 0);
   const off = Math.abs(row + (inverse[12 + axis] ?? 0) - slice);
   const left = radius ** 2 - (off * volume.spacing[axis]) ** 2;
   if (left <= 0) return undefined;
-  const [radiusX, radiusY] = [frame.horizontal, frame.vertical].map(
+  const [radiusX, radiusY] = [orientation.horizontal, orientation.vertical].map(
     (side) => Math.sqrt(left) / volume.spacing[side.axis],
   );
   return { x, y, radiusX: radiusX ?? 0, radiusY: radiusY ?? 0, near: off <= 0.5 };
@@ -106,10 +106,10 @@ export function projectSegments(
   segments: Float32Array,
   inverse: ArrayLike<number>,
   volume: Pick<VolumeView, 'dims'>,
-  frame: SliceFrame,
+  orientation: SliceOrientation,
 ): Float32Array {
   const out = new Float32Array((segments.length / 3) * 2);
-  const sides = [frame.horizontal, frame.vertical] as const;
+  const sides = [orientation.horizontal, orientation.vertical] as const;
   for (let point = 0; 3 * point < segments.length; point++) {
     const x = segments[3 * point] ?? 0;
     const y = segments[3 * point + 1] ?? 0;

@@ -3,15 +3,15 @@ import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, Volum
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
-import { invert, sliceFrames, slicePlane, toWorld } from './anatomy';
-import { VolumeFrame } from './frame';
+import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
 import { AttractorMarks, UncoveredMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
-import { diverging, SHADES, shadeTitle } from './shading';
+import { diverging, QUANTITIES, quantityTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
+import { VolumeBox } from './volume-box';
 
 /** The objects on screen that belong to one volume. */
 interface Scene {
@@ -19,7 +19,7 @@ interface Scene {
   inverse: Float64Array;
   panels: SlicePanel[];
   planes: SlicePlane[];
-  frame: VolumeFrame;
+  box: VolumeBox;
 }
 
 /** The 3D view and the three slices of a volume, synchronised by a common crosshair. */
@@ -70,27 +70,30 @@ export class Stage {
   setVolume(volume: VolumeView): void {
     this.#clear();
     const inverse = invert(volume.affine);
-    const panels = sliceFrames(volume).map(
-      (frame) =>
-        new SlicePanel(volume, frame, inverse, {
-          onIndex: (index) => this.#moveSlice(frame.axis, index),
+    const panels = sliceOrientations(volume).map(
+      (orientation) =>
+        new SlicePanel(volume, orientation, inverse, {
+          onIndex: (index) => this.#moveSlice(orientation.axis, index),
           onPoint: (index, pressed) => this.#point(index, pressed),
         }),
     );
     const planes = panels.map(
-      ({ frame, picture }) =>
-        new SlicePlane(volume, frame, picture, { frame: token(AXIS_TOKENS[frame.axis]), section: token('--outline') }),
+      ({ orientation, picture }) =>
+        new SlicePlane(volume, orientation, picture, {
+          frame: token(AXIS_TOKENS[orientation.axis]),
+          section: token('--outline'),
+        }),
     );
-    const frame = new VolumeFrame(volume, token('--muted'));
-    this.#scene = { volume, inverse, panels, planes, frame };
-    for (const { object } of [...planes, frame]) this.#viewport.add(object);
+    const box = new VolumeBox(volume, token('--muted'));
+    this.#scene = { volume, inverse, panels, planes, box };
+    for (const { object } of [...planes, box]) this.#viewport.add(object);
     // Axial first, as in radiology.
     this.#slices.append(
-      ...[...panels].sort((a, b) => a.frame.name.localeCompare(b.frame.name)).map((panel) => panel.element),
+      ...[...panels].sort((a, b) => a.orientation.name.localeCompare(b.orientation.name)).map((panel) => panel.element),
     );
     this.setOptions(this.#options);
     this.showAttractors(this.#attractors);
-    this.#viewport.frame(volume);
+    this.#viewport.fitVolume(volume);
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
 
@@ -137,7 +140,7 @@ export class Stage {
   /** Moves the crosshair to a world point, and centres the 3D view on it. */
   lookAt(point: Vec3): void {
     this.goTo(point);
-    this.#viewport.lookAt(point);
+    this.#viewport.setPivot(point);
   }
 
   /** Shows a coarser pyramid level in the slices, or the volume itself. */
@@ -150,7 +153,7 @@ export class Stage {
   /** Renders the axial slice through the crosshair as a small image, of the volume or of a coarser level. */
   thumbnail(level: LevelView | undefined): HTMLCanvasElement | undefined {
     const scene = this.#scene;
-    const frame = scene?.panels.find((panel) => panel.frame.name === 'Axial')?.frame;
+    const frame = scene?.panels.find((panel) => panel.orientation.name === 'Axial')?.orientation;
     if (!scene || !frame) return undefined;
     const index = this.#crosshair[frame.axis];
     if (!level) return slicePicture(scene.volume, frame, index);
@@ -217,7 +220,7 @@ export class Stage {
     const { color } = this.#options;
     const { range } = this.#surface;
     if (color === 'plain' || color === 'component' || range === 0) this.legend.hide();
-    else this.legend.show({ ...SHADES[color], title: shadeTitle(color, this.unit) }, range);
+    else this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, this.unit) }, range);
   }
 
   #placeSlices(viewer: Vector3): void {
@@ -239,7 +242,7 @@ export class Stage {
   #clear(): void {
     const scene = this.#scene;
     if (!scene) return;
-    for (const item of [...scene.planes, scene.frame]) {
+    for (const item of [...scene.planes, scene.box]) {
       this.#viewport.remove(item.object);
       item.dispose();
     }

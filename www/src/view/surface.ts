@@ -15,9 +15,9 @@ import {
 } from 'three';
 import type { Surface } from '../protocol';
 import type { ColorMode } from '../ui/view-options';
-import { coarseCorners } from './coarse';
 import { componentColors } from './components';
-import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShade } from './shading';
+import { isQuantity, linearColors, QUANTITIES, robustRange, type ShownQuantity, shadeColors } from './shading';
+import { simplifiedIndices } from './simplify';
 
 const BONE: ColorRepresentation = '#e9dcc3';
 /**
@@ -33,7 +33,7 @@ const OWN_GAIN = 1.6;
 const SMOOTH = 10_000;
 
 /** Colouring of a surface: 'own' are the vertex colours it came with, 'texture' an image. */
-export type SurfaceColor = ColorMode | ValueShade | 'own' | 'texture';
+export type SurfaceColor = ColorMode | ShownQuantity | 'own' | 'texture';
 
 /**
  * A surface in the 3D view whose vertices and triangles change every frame. Its arrays are uploaded to the GPU without
@@ -188,7 +188,7 @@ export class SurfaceObject {
     if (!positions || !normals || !index) return;
     const indices = index.array as Uint32Array;
     const [vertices, corners] = [this.#vertices, this.#corners];
-    const list = coarseCorners({ positions, normals, indices, vertices, corners }, SMOOTH);
+    const list = simplifiedIndices({ positions, normals, indices, vertices, corners }, SMOOTH);
     this.#coarse = new BufferGeometry();
     for (const [name, attribute] of Object.entries(attributes)) this.#coarse.setAttribute(name, attribute);
     this.#coarse.setIndex(new BufferAttribute(list, 1));
@@ -225,10 +225,10 @@ export class SurfaceObject {
     geometry.setDrawRange(0, count);
   }
 
-  /** Fills the colour buffer. A shade whose values have not arrived yet is drawn plain. */
+  /** Fills the colour buffer. A quantity whose values have not arrived yet is drawn plain. */
   #fillColors(): void {
     const mode = this.#color;
-    const shaded = isShade(mode) && this.#values.length === this.#vertices;
+    const shaded = isQuantity(mode) && this.#values.length === this.#vertices;
     const own = mode === 'own' && this.#colors.length === 3 * this.#vertices;
     const on = shaded || own || mode === 'component';
     const map = mode === 'texture' && this.#hasUvs ? this.#texture : null;
@@ -239,7 +239,7 @@ export class SurfaceObject {
       this.#material.needsUpdate = true;
     }
     this.#material.color.set(on || map ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
-    this.#range = shaded ? robustRange(this.#values, SHADES[mode].least) : 0;
+    this.#range = shaded ? robustRange(this.#values, QUANTITIES[mode].least) : 0;
     const geometry = this.#fine;
     if (!on || !geometry.index) return;
     const colors = colorsOf(geometry);

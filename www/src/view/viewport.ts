@@ -16,36 +16,36 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Vec3 } from '../protocol';
 import { anatomicalSigns, type Grid } from './anatomy';
-import { Drawing } from './drawing';
-import { type PinholeCamera, placeEye } from './eye';
+import { applyPinhole, type PinholeCamera } from './pinhole';
+import { WebGlRendering } from './rendering';
 
 const FIELD_OF_VIEW = 30;
 /** Rotation of the view by an arrow key, radians, and zoom factor of + and -. */
-const KEY_TURN = 0.12;
+const KEY_ROTATION = 0.12;
 const KEY_ZOOM = 1.12;
 /** Largest distance in pixels between pointer down and up for a click; beyond it the pointer rotates the view. */
-const CLICK_SLACK = 4;
+const CLICK_TOLERANCE = 4;
 
 /** A 3D view: a canvas, an orbit camera for mouse, touch and keyboard, and lights attached to the camera. */
 export class Viewport {
   readonly canvas: HTMLCanvasElement;
-  readonly #drawing: Drawing;
+  readonly #rendering: WebGlRendering;
   readonly #scene = new Scene();
   /** Parent of all objects shown, rotated so that their upward axis is the scene's z. */
   readonly #world = new Group();
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1000);
   /** Camera with the pose of a photograph. */
-  readonly #eye = new PerspectiveCamera();
+  readonly #photoCamera = new PerspectiveCamera();
   /** Lights attached to the viewer. */
   readonly #lamp = new Group();
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
   /**
-   * Called before each rendering, with the camera position. `hurried`: whether the view is being rotated without a GPU,
+   * Called before each rendering, with the camera position. `interactive`: whether the view is being rotated without a GPU,
    * so that simplified objects are preferable.
    */
-  onDraw: (viewer: Vector3, hurried: boolean) => void = () => undefined;
+  onDraw: (viewer: Vector3, interactive: boolean) => void = () => undefined;
   /** Called with the ray through the point that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
   /** Handler called first for key events; returns true for keys that are not for the view. */
@@ -56,29 +56,29 @@ export class Viewport {
   /** Whether a pointer or the wheel is in use: camera motion is then the user's. */
   #dragged = false;
   /** Whether the camera has moved during the current drag. */
-  #turning = false;
+  #rotating = false;
   #disposed = false;
   #pending = 0;
   /** Changes to be made before the next rendering. */
   readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
   /** Aspect ratio of the view, at most 1: in a narrow view the camera is farther away. */
-  #narrowness = 1;
+  #cappedAspect = 1;
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
-    this.#drawing = new Drawing(canvas, () => this.invalidate());
+    this.#rendering = new WebGlRendering(canvas, () => this.invalidate());
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener('change', () => this.#moved());
     this.#controls.addEventListener('start', () => this.#setDragged(true));
     this.#controls.addEventListener('end', () => this.#setDragged(false));
-    this.#eye.matrixAutoUpdate = false;
+    this.#photoCamera.matrixAutoUpdate = false;
     this.#lamp.matrixAutoUpdate = false;
     this.#scene.add(this.#world);
     canvas.addEventListener('keydown', (event) => this.#onKey(event));
-    this.#followClicks();
-    this.#light();
+    this.#listenForClicks();
+    this.#addLights();
     this.#observer.observe(canvas);
   }
 
@@ -152,17 +152,17 @@ export class Viewport {
   }
 
   /** Fits a whole volume into the view, from the front and a little from the patient's left and above. */
-  frame(grid: Grid): void {
+  fitVolume(grid: Grid): void {
     const [x, y, z] = anatomicalSigns(grid.space);
-    this.#frame(worldBox(grid), new Vector3(-0.55 * x, 1 * y, 0.32 * z));
+    this.#fitView(worldBox(grid), new Vector3(-0.55 * x, 1 * y, 0.32 * z));
   }
 
   /**
    * Fits a box in the coordinates of the objects shown into the view, a little from above and from the side. `front`:
    * the visible side, along the horizontal axis towards the viewer.
    */
-  frameBox(box: Box3, front: 1 | -1, aside = 0.7): void {
-    this.#frame(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));
+  fitBox(box: Box3, front: 1 | -1, aside = 0.7): void {
+    this.#fitView(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));
   }
 
   /** Aspect ratio of the view, width by height. */
@@ -170,20 +170,20 @@ export class Viewport {
     return this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
   }
 
-  #frame(box: Box3, towards: Vector3): void {
+  #fitView(box: Box3, towards: Vector3): void {
     const target = box.getCenter(new Vector3());
     const radius = box.getSize(new Vector3()).length() / 2;
     const direction = towards.normalize();
-    const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / this.#narrowness;
+    const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / this.#cappedAspect;
     this.#home = { position: target.clone().addScaledVector(direction, distance), target };
     this.#camera.near = radius / 50;
     this.#camera.far = radius * 50;
     this.#camera.updateProjectionMatrix();
-    this.goHome();
+    this.resetView();
   }
 
   /** Moves the centre of rotation and zoom to another point, keeping the viewing direction. */
-  lookAt(point: Vec3): void {
+  setPivot(point: Vec3): void {
     const target = new Vector3(...point).applyMatrix4(this.#world.matrixWorld);
     this.#camera.position.sub(this.#controls.target).add(target);
     this.#controls.target.copy(target);
@@ -191,7 +191,7 @@ export class Viewport {
     this.invalidate();
   }
 
-  goHome(): void {
+  resetView(): void {
     this.lookThrough(undefined);
     this.#camera.position.copy(this.#home.position);
     this.#controls.target.copy(this.#home.target);
@@ -205,10 +205,10 @@ export class Viewport {
     cancelAnimationFrame(this.#pending);
     this.#observer.disconnect();
     this.#controls.dispose();
-    this.#drawing.dispose();
+    this.#rendering.dispose();
   }
 
-  #light(): void {
+  #addLights(): void {
     const sky = new HemisphereLight('#ffffff', '#8d8577', 1.1);
     sky.position.set(0, 0, 1);
     const key = new DirectionalLight('#fff6e8', 2.1);
@@ -221,25 +221,25 @@ export class Viewport {
 
   #setDragged(dragged: boolean): void {
     this.#dragged = dragged;
-    if (dragged || !this.#turning) return;
-    this.#turning = false;
+    if (dragged || !this.#rotating) return;
+    this.#rotating = false;
     // Objects simplified during the rotation are rendered in full.
     this.invalidate();
   }
 
   #moved(): void {
     if (this.#dragged) this.lookThrough(undefined);
-    this.#turning = this.#dragged;
+    this.#rotating = this.#dragged;
     this.invalidate();
   }
 
-  #followClicks(): void {
+  #listenForClicks(): void {
     let down = { x: 0, y: 0 };
     this.canvas.addEventListener('pointerdown', ({ offsetX: x, offsetY: y }) => {
       down = { x, y };
     });
     this.canvas.addEventListener('pointerup', ({ offsetX: x, offsetY: y, button }) => {
-      if (button !== 0 || Math.hypot(x - down.x, y - down.y) > CLICK_SLACK) return;
+      if (button !== 0 || Math.hypot(x - down.x, y - down.y) > CLICK_TOLERANCE) return;
       const { clientWidth, clientHeight } = this.canvas;
       this.#click((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight);
     });
@@ -259,26 +259,26 @@ export class Viewport {
     const { clientWidth, clientHeight } = this.canvas;
     if (!this.#through || clientHeight === 0) return this.#camera;
     const { near, far } = this.#camera;
-    placeEye(this.#eye, this.#through, this.#world.matrixWorld, clientWidth / clientHeight, [near, far]);
-    this.#eye.updateMatrixWorld();
-    return this.#eye;
+    applyPinhole(this.#photoCamera, this.#through, this.#world.matrixWorld, clientWidth / clientHeight, [near, far]);
+    this.#photoCamera.updateMatrixWorld();
+    return this.#photoCamera;
   }
 
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.#drawing.setSize(width, height);
+    this.#rendering.setSize(width, height);
     this.#camera.aspect = width / height;
-    this.#standOff(Math.min(1, this.#camera.aspect));
+    this.#adjustDistance(Math.min(1, this.#camera.aspect));
     this.#camera.updateProjectionMatrix();
     // Resizing clears the canvas: it is rendered at once to avoid flashing.
     this.#draw();
   }
 
   /** Changes the camera distance so that the same objects stay visible when the window becomes narrower or wider. */
-  #standOff(narrowness: number): void {
-    const factor = this.#narrowness / narrowness;
-    this.#narrowness = narrowness;
+  #adjustDistance(cappedAspect: number): void {
+    const factor = this.#cappedAspect / cappedAspect;
+    this.#cappedAspect = cappedAspect;
     if (factor === 1) return;
     const { position, target } = this.#home;
     position.sub(target).multiplyScalar(factor).add(target);
@@ -286,12 +286,12 @@ export class Viewport {
   }
 
   #draw(): void {
-    this.onDraw(this.#camera.position, this.#turning && this.#drawing.inSoftware);
+    this.onDraw(this.#camera.position, this.#rotating && this.#rendering.inSoftware);
     const viewer = this.#viewer();
     // The eye's matrix is up to date; that of the orbit camera is updated before the lights are placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
     this.#lamp.matrix.copy(viewer.matrixWorld);
-    this.#drawing.render(this.#scene, viewer);
+    this.#rendering.render(this.#scene, viewer);
   }
 
   #onKey(event: KeyboardEvent): void {
@@ -302,14 +302,14 @@ export class Viewport {
       return;
     }
     const moves: Record<string, () => void> = {
-      ArrowLeft: () => this.#turn(-KEY_TURN, 0),
-      ArrowRight: () => this.#turn(KEY_TURN, 0),
-      ArrowUp: () => this.#turn(0, -KEY_TURN),
-      ArrowDown: () => this.#turn(0, KEY_TURN),
+      ArrowLeft: () => this.#rotate(-KEY_ROTATION, 0),
+      ArrowRight: () => this.#rotate(KEY_ROTATION, 0),
+      ArrowUp: () => this.#rotate(0, -KEY_ROTATION),
+      ArrowDown: () => this.#rotate(0, KEY_ROTATION),
       '+': () => this.#zoom(1 / KEY_ZOOM),
       '=': () => this.#zoom(1 / KEY_ZOOM),
       '-': () => this.#zoom(KEY_ZOOM),
-      Home: () => this.goHome(),
+      Home: () => this.resetView(),
       Enter: () => this.#click(0, 0),
     };
     const move = moves[event.key];
@@ -319,7 +319,7 @@ export class Viewport {
     move();
   }
 
-  #turn(around: number, over: number): void {
+  #rotate(around: number, over: number): void {
     this.#orbit((spherical) => {
       spherical.theta += around;
       spherical.phi += over;

@@ -1,7 +1,7 @@
 /** Boundary votes as points, coloured by the number of windows that voted for them, in space and on slices. */
 import type { Surface, Vec3, VolumeView } from '../protocol';
-import type { Votes } from '../track/protocol';
-import { type SliceFrame, toWorld } from './anatomy';
+import type { BoundaryVotes } from '../track/protocol';
+import { type SliceOrientation, toWorld } from './anatomy';
 
 /** Colours of the fewest and of the most votes, sRGB 0..1. */
 const FEW: Vec3 = [0.99, 0.82, 0.38];
@@ -19,7 +19,11 @@ export function voteColors(weights: Float32Array): Float32Array {
 }
 
 /** Returns the votes within about `reach` (world units) of a vertex of the surface. */
-export function votesNear({ frame, points, weights }: Votes, { positions, vertices }: Surface, reach: number): Votes {
+export function votesNear(
+  { frame, points, weights }: BoundaryVotes,
+  { positions, vertices }: Surface,
+  reach: number,
+): BoundaryVotes {
   const cell = (p: Float32Array, i: number, k: number, off = 0) => Math.floor((p[3 * i + k] ?? 0) / reach) + off;
   // Hash collisions are harmless: a distant point is shown as well.
   const key = (x: number, y: number, z: number) =>
@@ -41,7 +45,7 @@ export function votesNear({ frame, points, weights }: Votes, { positions, vertic
 interface OnSlice {
   volume: VolumeView;
   inverse: ArrayLike<number>;
-  frame: SliceFrame;
+  orientation: SliceOrientation;
   slice: number;
   scaleX: number;
   scaleY: number;
@@ -49,23 +53,27 @@ interface OnSlice {
 
 /** Returns the votes that lie in a slice, in pixels of its image. */
 export function votesIn(
-  { points, weights }: Votes,
-  { volume, inverse, frame, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
+  { points, weights }: BoundaryVotes,
+  { volume, inverse, orientation, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
 ): { x: number; y: number; weight: number }[] {
   const out = [];
-  const place = ({ axis, flip }: SliceFrame['horizontal'], index: Vec3) =>
+  const place = ({ axis, flip }: SliceOrientation['horizontal'], index: Vec3) =>
     (flip ? volume.dims[axis] - 1 - index[axis] : index[axis]) + 0.5;
   for (let i = 0; i < weights.length; i++) {
     const point: Vec3 = [points[3 * i] ?? 0, points[3 * i + 1] ?? 0, points[3 * i + 2] ?? 0];
     const index = toWorld(inverse, point);
     // Votes for faces between slices lie half a voxel off.
-    if (Math.abs(index[frame.axis] - slice) > 0.25) continue;
-    out.push({ x: place(frame.horizontal, index), y: place(frame.vertical, index), weight: weights[i] ?? 0 });
+    if (Math.abs(index[orientation.axis] - slice) > 0.25) continue;
+    out.push({
+      x: place(orientation.horizontal, index),
+      y: place(orientation.vertical, index),
+      weight: weights[i] ?? 0,
+    });
   }
   return out;
 }
 
-export function drawVotes(context: CanvasRenderingContext2D, votes: Votes, on: OnSlice): void {
+export function drawVotes(context: CanvasRenderingContext2D, votes: BoundaryVotes, on: OnSlice): void {
   drawFaces(context, votesIn(votes, on), on.scaleX, on.scaleY);
 }
 

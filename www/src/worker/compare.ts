@@ -1,6 +1,6 @@
 /** Runs the same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
 import type { StepReport, Volume } from 'vesicle';
-import type { ComparedRun, ComparingEvent, Requests, Setup } from '../protocol';
+import type { ComparisonProgressEvent, ExtractionRun, Requests, Setup } from '../protocol';
 import { buildModel } from './models';
 
 /** Largest number of iterations of a run; one that has not converged by then is compared in its present state. */
@@ -8,18 +8,18 @@ const MOST_ITERATIONS = 4000;
 /** Milliseconds between two reports to the page. */
 const TELL_EVERY = 150;
 
-type Tell = (run: ComparingEvent['run'], report: StepReport) => void;
+type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => void;
 
 /** Compares the two runs; resolves with undefined when the signal aborts. */
 export async function compare(
   volume: Volume,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onReport: OnReport,
 ): Promise<Requests['compare']['reply']> {
   try {
-    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => tell('direct', report));
-    const coarseToFine = await once(volume, setup, signal, (report) => tell('coarseToFine', report));
+    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => onReport('direct', report));
+    const coarseToFine = await once(volume, setup, signal, (report) => onReport('coarseToFine', report));
     return { direct, coarseToFine };
   } catch (error) {
     if (signal.aborted) return undefined;
@@ -31,8 +31,8 @@ async function once(
   volume: Volume,
   setup: Setup,
   signal: AbortSignal,
-  tell: (report: StepReport) => void,
-): Promise<ComparedRun> {
+  onReport: (report: StepReport) => void,
+): Promise<ExtractionRun> {
   const model = buildModel(volume, setup);
   try {
     const byLevel = Array.from({ length: setup.levels + 1 }, (_, i) => ({
@@ -40,7 +40,7 @@ async function once(
       iterations: 0,
       times: {} as Record<string, number>,
     }));
-    let toldAt = 0;
+    let reportedAt = 0;
     // A step belongs to the level on which it began: the last one of a level includes the change to the next.
     let level = model.level;
     const onStep = (report: StepReport) => {
@@ -50,9 +50,9 @@ async function once(
         entry.iterations += 1;
         for (const [part, time] of Object.entries(report.times)) entry.times[part] = (entry.times[part] ?? 0) + time;
       }
-      if (performance.now() - toldAt < TELL_EVERY && !report.done) return;
-      toldAt = performance.now();
-      tell(report);
+      if (performance.now() - reportedAt < TELL_EVERY && !report.done) return;
+      reportedAt = performance.now();
+      onReport(report);
     };
     const report = await model.run({ signal, onStep, maxIterations: MOST_ITERATIONS });
     return { levels: setup.levels, byLevel, report, info: model.mesh.info() };

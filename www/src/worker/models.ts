@@ -1,6 +1,6 @@
 /** Creates deformable models from the page's settings, and computes the values shown on their surfaces. */
 import { DeformableModel, type Volume } from 'vesicle';
-import type { Setup, Shade } from '../protocol';
+import type { Setup, VertexQuantity } from '../protocol';
 import { otsu } from '../threshold';
 import { HISTOGRAM_BINS } from './volumes';
 
@@ -40,10 +40,10 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
 }
 
 /**
- * Computes one value per vertex for each shade, in the order of the mesh's arrays. A new shade needs an entry here and
+ * Computes one value per vertex for each quantity, in the order of the mesh's arrays. A new quantity needs an entry here and
  * one in `view/shading`.
  */
-const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
+const QUANTITIES: Record<VertexQuantity, (model: DeformableModel) => Float32Array> = {
   /** Speed along the normal, δ per iteration. */
   speed: (model) => {
     const factor = model.params.timeStep / model.delta;
@@ -53,6 +53,6 @@ const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
   'gaussian curvature': ({ mesh }) => mesh.curvature('gaussian'),
 };
 
-export function valuesFor(model: DeformableModel, shade: Shade): Float32Array {
-  return SHADES[shade](model);
+export function valuesFor(model: DeformableModel, quantity: VertexQuantity): Float32Array {
+  return QUANTITIES[quantity](model);
 }

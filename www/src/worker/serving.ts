@@ -2,13 +2,13 @@
 import { toFailure } from './refusal';
 
 /** Work that can be aborted. */
-export interface Work {
+export interface Task {
   abort: AbortController;
   ended: Promise<unknown>;
 }
 
 /** Aborts running work, if any, and waits for its end; its result or error is left to the caller who started it. */
-export async function stop(work: Work | undefined): Promise<undefined> {
+export async function stop(work: Task | undefined): Promise<undefined> {
   work?.abort.abort();
   await work?.ended.catch(() => undefined);
 }
@@ -18,24 +18,24 @@ export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
 }
 
 /** Buffers to transfer with a reply. */
-const along = new WeakMap<object, Transferable[]>();
+const transferLists = new WeakMap<object, Transferable[]>();
 
 /** Marks arrays of a reply to be transferred to the page instead of copied; they become unusable in the worker. */
-export function givingAway<Reply extends object>(reply: Reply, arrays: ArrayBufferView[]): Reply {
-  along.set(reply, buffersOf(arrays));
+export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBufferView[]): Reply {
+  transferLists.set(reply, buffersOf(arrays));
   return reply;
 }
 
 /** Replies to a request with the handler's result, or with its failure. */
-export async function answer(
+export async function reply(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },
 ): Promise<void> {
   const handler = handlers[kind] as (body: unknown) => unknown;
   try {
-    const reply = await handler(body);
-    const transfer = reply instanceof Object ? along.get(reply) : undefined;
-    self.postMessage({ id, ok: true, body: reply }, { transfer: transfer ?? [] });
+    const result = await handler(body);
+    const transfer = result instanceof Object ? transferLists.get(result) : undefined;
+    self.postMessage({ id, ok: true, body: result }, { transfer: transfer ?? [] });
   } catch (error) {
     self.postMessage({ id, ok: false, failure: toFailure(error) });
   }

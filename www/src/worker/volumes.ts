@@ -1,9 +1,10 @@
 /** Opens volumes in the worker, and reduces them to what the page shows. */
 import { VesicleError, Volume } from 'vesicle';
-import { readForeign } from '../foreign';
+import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { quantize } from '../quantize';
 import { shapeVoxels } from '../shapes';
+import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { Refusal } from './refusal';
 
@@ -19,20 +20,16 @@ function parseFile(file: NamedBytes): Volume {
     return Volume.parse(file.bytes);
   } catch (error) {
     if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
-    throw new Refusal(error.code, `${error.message}. Choose or drop a header together with the file of its voxels.`);
+    throw new Refusal(error.code, text('files.headerWithoutData', { reason: error.message }));
   }
 }
 
 /** Parses a volume from one file, or from a header and its data in either order. */
 export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
-  if (!first) throw new Refusal('bad-file', 'no file was given');
+  if (!first) throw new Refusal('bad-file', text('files.noFile'));
   if (!second) return parseFile(first);
-  if (files.length > 2)
-    throw new Refusal(
-      'bad-file',
-      `${files.length} files are neither a series of DICOM or TIFF files, nor a header and its data`,
-    );
+  if (files.length > 2) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
   return Volume.parse(header.bytes, { data: data.bytes });
 }
@@ -42,7 +39,7 @@ export function parseFiles(files: NamedBytes[]): Volume {
  */
 export async function volumeFrom(source: VolumeSource): Promise<Volume> {
   if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
-  const foreign = await readForeign(source.files);
+  const foreign = await importVolume(source.files);
   return foreign ? new Volume(foreign) : parseFiles(source.files);
 }
 

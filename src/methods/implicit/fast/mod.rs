@@ -314,7 +314,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn unit(random: &mut Random) -> f64 {
-        f64::from(random.bits()) / 2_147_483_648.0 - 1.0
+        f64::from(random.next_u32()) / 2_147_483_648.0 - 1.0
     }
 
     fn direction(random: &mut Random) -> DVec3 {

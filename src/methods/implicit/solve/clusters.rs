@@ -1,6 +1,6 @@
 //! Binary cluster tree of the centres, for the hierarchical matrix.
 
-use crate::math::order::{by_both, rank};
+use crate::math::order::{combined_rank, rank_f32};
 use crate::math::{Bounds, Vec3};
 
 /// Maximum number of centres in a leaf of the cluster tree. 32 doubles the number of blocks, 128 the numbers that are
@@ -58,12 +58,13 @@ impl ClusterTree {
     }
 
     fn split(&mut self, points: &[Vec3], order: &mut [u32], start: usize) -> usize {
-        let bounds = order.iter().fold(Bounds::EMPTY, |b, &i| b.joined(&Bounds::of(&[points[i as usize]])));
+        let bounds =
+            order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&Bounds::from_points(&[points[i as usize]])));
         let at = self.clusters.len();
         self.clusters.push(Cluster { start, end: start + order.len(), bounds, halves: None });
         if order.len() > LEAF {
             let (axis, middle) = (bounds.widest_axis(), order.len() / 2);
-            let along = |i: u32| by_both(rank(points[i as usize][axis]), i);
+            let along = |i: u32| combined_rank(rank_f32(points[i as usize][axis]), i);
             let mut ranked: Vec<u64> = order.iter().map(|&i| along(i)).collect();
             ranked.select_nth_unstable(middle);
             order.iter_mut().zip(ranked).for_each(|(i, ranked)| *i = ranked as u32);

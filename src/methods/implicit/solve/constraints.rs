@@ -55,7 +55,7 @@ impl Constraints {
 
     /// Returns the radius of a ball that contains all centres.
     pub fn radius(&self) -> f64 {
-        let bounds = Bounds::of(&self.centres);
+        let bounds = Bounds::from_points(&self.centres);
         0.5 * f64::from(bounds.max.distance(bounds.min))
     }
 

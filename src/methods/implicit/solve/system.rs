@@ -72,7 +72,7 @@ impl System {
             constraint_of_row.iter().map(|&i| constraints.centres[i as usize]).collect();
         let centres: Vec<DVec3> = positions.iter().map(|p| p.as_dvec3()).collect();
         let values = gather_rows(&constraint_of_row, &constraints.values);
-        let shuffled = Random::new(seed).order(positions.len());
+        let shuffled = Random::new(seed).permutation(positions.len());
         let (surface, outside): (Vec<u32>, Vec<u32>) =
             shuffled.iter().partition(|&&i| values[i as usize] == 0.0);
         Self {

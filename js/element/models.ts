@@ -1,0 +1,97 @@
+// Creates a model of each method from the attributes of the element.
+import { invalid } from '../check.js';
+import { VesicleError } from '../error.js';
+import {
+  type ControlEllipsoid,
+  DeformableModel,
+  ImplicitSurface,
+  Mesh,
+  MultiresolutionModel,
+  parsePoints,
+  type Stepper,
+  SurfaceTracker,
+  type Vec3,
+  Volume,
+} from '../worker.js';
+
+/** Named initial surfaces of the deformable model. */
+const STARTS = ['contour', 'enclosing'] as const;
+type StartName = (typeof STARTS)[number];
+
+/** The parsed attributes of the element and the bytes of its file. */
+export interface Settings {
+  bytes: Uint8Array;
+  start: StartName;
+  levels: number;
+  params: Record<string, unknown>;
+  ellipsoids: ControlEllipsoid[];
+}
+
+/** A model, and the direction from which the camera views it initially. */
+export interface ModelWithView {
+  model: Stepper;
+  from: Vec3;
+}
+
+/** Initial viewing direction along +y, for man-made objects, which usually face −y. */
+const FRONT: Vec3 = [-0.5, -1, 0.35];
+
+/** Factory of the model for each method; intermediate objects are freed. */
+export const MODELS = {
+  deformable: ({ bytes, start, levels, params }: Settings): Promise<ModelWithView> =>
+    ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
+  implicit: async ({ bytes, params }: Settings): Promise<ModelWithView> => {
+    const { points, normals } = await parsePoints(bytes);
+    return { model: await ImplicitSurface.create({ points, ...(normals && { normals }), params }), from: FRONT };
+  },
+  tracking: ({ bytes, params }: Settings): Promise<ModelWithView> =>
+    ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params })),
+  multires: async ({ bytes, ellipsoids, params }: Settings): Promise<ModelWithView> => {
+    const make = (detail: Mesh) => MultiresolutionModel.create({ detail, ellipsoids, params });
+    return { model: await withResource(await Mesh.parse(bytes), make), from: FRONT };
+  },
+};
+
+/** Creates a model from a volume, with the camera in front of a patient, a little to their left. */
+function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<ModelWithView> {
+  const made = async (volume: Volume): Promise<ModelWithView> => {
+    const [model, space] = await Promise.all([make(volume), volume.space]);
+    return { model, from: space === 'RAS' ? [-0.6, 1, 0.35] : [0.6, -1, 0.35] };
+  };
+  return Volume.parse(bytes).then((volume) => withResource(volume, made));
+}
+
+async function withResource<T extends { free(): void }, Made>(
+  thing: T,
+  make: (thing: T) => Promise<Made>,
+): Promise<Made> {
+  try {
+    return await make(thing);
+  } finally {
+    thing.free();
+  }
+}
+
+/** Downloads the file at an address. */
+export async function fetched(address: string): Promise<Uint8Array> {
+  const response = await fetch(address);
+  if (!response.ok) throw new VesicleError('bad-file', `src: ${address}: ${response.status} ${response.statusText}`);
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+/** Returns the initial surface that an attribute names; `'contour'` by default. */
+export function parseStart(name: string | null): StartName {
+  const start = STARTS.find((one) => one === (name ?? 'contour'));
+  if (!start) throw invalid('start', `'${name}'; accepted: ${STARTS.join(', ')}`);
+  return start;
+}
+
+/** Parses an attribute as JSON; returns `otherwise` if it is empty or missing. */
+export function json<T>(name: string, text: string | null, otherwise: T): T {
+  if (text === null || text.trim() === '') return otherwise;
+  try {
+    return JSON.parse(text) as T;
+  } catch {
+    throw invalid(name, `'${text}' is not JSON, such as '{ "iso": 95 }'`);
+  }
+}

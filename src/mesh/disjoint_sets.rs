@@ -1,0 +1,44 @@
+//! A union-find structure, for connected components.
+
+use super::edge_table::{HalfEdge, by_edge};
+
+/// A partition of the numbers below a limit into disjoint sets (union-find).
+pub(crate) struct DisjointSets {
+    parents: Vec<usize>,
+    count: usize,
+}
+
+impl DisjointSets {
+    /// Creates a partition in which each number below `limit` is a set by itself.
+    pub fn new(limit: usize) -> Self {
+        Self { parents: (0..limit).collect(), count: limit }
+    }
+
+    /// Returns the lowest number in the set of `i`, its representative.
+    pub fn find(&mut self, mut i: usize) -> usize {
+        while self.parents[i] != i {
+            self.parents[i] = self.parents[self.parents[i]];
+            i = self.parents[i];
+        }
+        i
+    }
+
+    /// Merges the sets of `i` and `j`.
+    pub fn union(&mut self, i: usize, j: usize) {
+        let (i, j) = (self.find(i), self.find(j));
+        self.parents[i.max(j)] = i.min(j);
+        self.count -= usize::from(i != j);
+    }
+
+    /// Merges the sets of the triangles at each edge; the numbers are triangle indices.
+    pub(super) fn join_across_edges(&mut self, uses: &[HalfEdge]) {
+        for pair in by_edge(uses).flat_map(|edge| edge.windows(2)) {
+            self.union(pair[0].triangle as usize, pair[1].triangle as usize);
+        }
+    }
+
+    /// Returns the number of disjoint sets.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+}

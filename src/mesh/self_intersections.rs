@@ -1,0 +1,99 @@
+//! Self-intersections of triangle meshes: pairs found by a bounding volume hierarchy, decided by exact predicates.
+
+use super::TriangleMesh;
+use crate::math::predicates::{
+    collinear, triangles_intersect, triangles_intersect_sharing_vertex, triangles_overlap_sharing_edge,
+};
+use crate::math::{Bounds, BoxTree, Vec3};
+
+/// Returns the pairs of triangles that intersect beyond their common corners and edges, each with the lower index
+/// first, sorted.
+///
+/// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
+/// two triangles with the same three corners. Triangles with two equal corners, an invalid index or a position that is
+/// not finite are ignored. The list may be quadratic in the number of triangles; [`count_self_intersections`] only
+/// counts.
+pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
+    let mut pairs = Vec::new();
+    for_each_intersecting_pair(mesh, |s, t| pairs.push([s, t]));
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Returns the number of self-intersections: the length of [`intersecting_pairs`], without storing the pairs.
+///
+/// Memory is linear in the number of triangles. So is time if few bounding boxes of triangles overlap; it is quadratic
+/// if all do.
+pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
+    let mut count = 0;
+    for_each_intersecting_pair(mesh, |_, _| count += 1);
+    count
+}
+
+fn for_each_intersecting_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32)) {
+    let (valid, boxes): (Vec<u32>, Vec<Bounds>) = (0..)
+        .zip(&mesh.triangles)
+        .filter_map(|(t, triangle)| {
+            valid_corners(mesh, triangle).map(|corners| (t, Bounds::from_points(&corners)))
+        })
+        .unzip();
+    BoxTree::new(&boxes).for_each_pair(|i, j| {
+        let (s, t) = (valid[i as usize], valid[j as usize]);
+        if facets_intersect(&facet(mesh, s), &facet(mesh, t)) {
+            visit(s, t);
+        }
+    });
+}
+
+fn valid_corners(mesh: &TriangleMesh, &[a, b, c]: &[u32; 3]) -> Option<[Vec3; 3]> {
+    let corner = |v: u32| mesh.positions.get(v as usize).copied().filter(|p| p.is_finite());
+    let corners = [corner(a)?, corner(b)?, corner(c)?];
+    (a != b && b != c && c != a).then_some(corners)
+}
+
+fn facet(mesh: &TriangleMesh, triangle: u32) -> Facet {
+    let corners = mesh.triangles[triangle as usize];
+    Facet { corners, points: corners.map(|v| mesh.positions[v as usize]) }
+}
+
+/// A triangle given by vertex indices and positions, the input of intersection tests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// The vertex indices of the corners; equal indices mean a common corner.
+    pub corners: [u32; 3],
+    /// The positions of the corners.
+    pub points: [Vec3; 3],
+}
+
+impl Facet {
+    /// Returns the corners rotated cyclically, so that the one that satisfies `is_first` comes first.
+    fn rotated(&self, is_first: impl Fn(u32) -> bool) -> [Vec3; 3] {
+        let [a, b, c] = self.points;
+        match self.corners.map(is_first) {
+            [true, _, _] => [a, b, c],
+            [_, true, _] => [b, c, a],
+            _ => [c, a, b],
+        }
+    }
+}
+
+/// Returns whether two triangles intersect beyond their common corners and edges.
+///
+/// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
+/// two triangles with the same three corners.
+pub fn facets_intersect(s: &Facet, t: &Facet) -> bool {
+    let in_s = |v: u32| s.corners.contains(&v);
+    let in_t = |v: u32| t.corners.contains(&v);
+    match s.corners.iter().filter(|&&v| in_t(v)).count() {
+        0 => triangles_intersect(s.points, t.points),
+        1 => {
+            let ([shared, a, b], [_, c, d]) = (s.rotated(in_t), t.rotated(in_s));
+            triangles_intersect_sharing_vertex(shared, [a, b], [c, d])
+        }
+        2 => {
+            let ([tip, u, v], [other_tip, ..]) = (s.rotated(|v| !in_t(v)), t.rotated(|v| !in_s(v)));
+            triangles_overlap_sharing_edge(u, v, tip, other_tip)
+        }
+        _ => !collinear(s.points),
+    }
+}

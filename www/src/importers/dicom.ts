@@ -1,0 +1,63 @@
+/**
+ * Reads series of DICOM files with ITK: all transfer syntaxes supported by GDCM, with slices sorted along their normal.
+ */
+import { type Image, InterfaceTypes, runPipeline } from 'itk-wasm';
+import type { VolumeInit, VoxelArray } from 'vesicle';
+import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
+import { Refusal } from '../worker/refusal';
+
+const PIPELINE = 'read-image-dicom-file-series';
+
+/** The ITK program is served beside the page; it runs in the calling worker. */
+const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
+
+/**
+ * Returns the address of the page that this worker belongs to: the worker's own file is in a subfolder of the built
+ * page.
+ */
+function pageAddress(): string {
+  return new URL(import.meta.env.DEV ? import.meta.env.BASE_URL : '../', self.location.href).href;
+}
+
+/** Reads the volume of one series, in LPS as in DICOM. */
+export async function readSeries(files: NamedBytes[]): Promise<VolumeInit> {
+  const paths = files.map((_, k) => `${k}.dcm`);
+  const inputs = files.map(({ bytes }, k) => ({
+    type: InterfaceTypes.BinaryFile,
+    data: { path: paths[k] ?? '', data: bytes },
+  }));
+  const outputs = [{ type: InterfaceTypes.Image }, { type: InterfaceTypes.JsonCompatible }];
+  const args = ['0', '1', '--memory-io', '--input-images', ...paths];
+  const run = await runPipeline(PIPELINE, args, outputs, inputs, options()).catch((error: unknown) => {
+    throw unreadable(files, error instanceof Error ? error.message : String(error));
+  });
+  const [image] = run.outputs ?? [];
+  if (run.returnValue !== 0 || !image) throw unreadable(files, run.stderr);
+  return volumeOf(image.data as Image);
+}
+
+function unreadable(files: NamedBytes[], reason: string): Refusal {
+  const what = files.length === 1 ? text('files.thisFile') : text('files.theseFiles', { count: files.length });
+  return new Refusal('bad-file', text('files.dicomUnreadable', { files: what, reason: firstLine(reason) }));
+}
+
+const firstLine = (text: string) => text.trim().split('\n').at(-1)?.slice(0, 200) ?? '';
+
+function volumeOf({ imageType, data, size, spacing, origin, direction }: Image): VolumeInit {
+  if (imageType.components !== 1)
+    throw new Refusal('bad-file', text('files.dicomComponents', { components: imageType.components }));
+  const dims = [0, 1, 2].map((axis) => Number(size[axis] ?? 1)) as [number, number, number];
+  return {
+    data: data as VoxelArray,
+    dims,
+    affine: affineOf(spacing, origin, Array.from(direction, Number)),
+    space: 'LPS',
+  };
+}
+
+/** Returns the column-major affine matrix; ITK's direction matrix is row-major, with the image axes in its columns. */
+function affineOf(spacing: number[], origin: number[], direction: number[]): number[] {
+  const column = (axis: number) => [0, 1, 2].map((row) => (direction[3 * row + axis] ?? 0) * (spacing[axis] ?? 1));
+  return [...[0, 1, 2].flatMap((axis) => [...column(axis), 0]), ...[0, 1, 2].map((axis) => origin[axis] ?? 0), 1];
+}

@@ -1,0 +1,41 @@
+/** Formats read by other libraries, which are loaded only when such a file is opened. */
+import type { VolumeInit } from 'vesicle';
+import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
+import { Refusal } from '../worker/refusal';
+
+/** Number of bytes before the letters DICM at the start of a DICOM file. */
+const PREAMBLE = 128;
+
+const hasBytes = (bytes: Uint8Array, at: number, expected: number[]) =>
+  expected.every((byte, k) => bytes[at + k] === byte);
+
+export function isDicom({ bytes, name }: NamedBytes): boolean {
+  return hasBytes(bytes, PREAMBLE, [0x44, 0x49, 0x43, 0x4d]) || /\.(dcm|dicom)$/i.test(name);
+}
+
+/** Whether a file is a TIFF of either byte order; includes BigTIFF with 64-bit offsets. */
+export function isTiff({ bytes }: NamedBytes): boolean {
+  return [42, 43].some(
+    (kind) => hasBytes(bytes, 0, [0x49, 0x49, kind, 0]) || hasBytes(bytes, 0, [0x4d, 0x4d, 0, kind]),
+  );
+}
+
+/**
+ * Reads the volume from a series of DICOM files, or from TIFF files with one slice each or all in one; undefined if
+ * they are neither.
+ */
+export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
+  // DICOM folders contain other files as well, and DICOM files without that extension.
+  const series = files.filter(isDicom);
+  if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
+  if (files.length > 0 && files.every(isTiff))
+    return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
+  return undefined;
+}
+
+/** Rejects a single slice, which has no surface. */
+function rejectSingleSlice(format: string, init: VolumeInit): VolumeInit {
+  if (init.dims[2] > 1) return init;
+  throw new Refusal('bad-file', text('files.singleSlice', { format }));
+}

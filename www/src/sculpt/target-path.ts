@@ -1,0 +1,96 @@
+import type { MultiresolutionModel } from 'vesicle';
+import { type Film, glide, lastFrame, poseAt } from './film';
+import type { Pose } from './protocol';
+
+/** Sets the ellipsoids' target of each frame: along a film while it plays, else along a glide to the last pose sent. */
+export class TargetPath {
+  /** The film that is loaded. */
+  #film: Film | undefined;
+  /** Frame of the film that the ellipsoids were sent to last. */
+  #frame = 0;
+  #playing = false;
+  /** Remaining poses of the glide to the last pose sent. */
+  #glide: Pose[] = [];
+
+  get film(): Film | undefined {
+    return this.#film;
+  }
+
+  get frame(): number {
+    return this.#frame;
+  }
+
+  /** Whether poses of a film or a glide remain. */
+  get isUnderWay(): boolean {
+    return this.#playing || this.#glide.length > 0;
+  }
+
+  /** Returns the final pose of the glide, or else the model's present target. */
+  finalTarget(model: MultiresolutionModel): Pose {
+    return this.#glide.at(-1) ?? model.targets;
+  }
+
+  /** Loads a film at a frame, without playing it. */
+  setFilm(film: Film | undefined, frame: number): void {
+    this.#film = film;
+    this.#frame = film ? Math.min(frame, lastFrame(film)) : 0;
+    this.#playing = false;
+  }
+
+  /** Plays the film from its present frame, or from the start if it is at its end. */
+  play(): void {
+    if (!this.#film) return;
+    if (this.#frame >= lastFrame(this.#film)) this.#frame = 0;
+    this.#playing = true;
+    this.#glide = [];
+  }
+
+  /** Arranges for one more frame of the film, if there is one, when the user steps through it. */
+  playOne(): void {
+    const film = this.#film;
+    this.#playing = film !== undefined && (film.loop || this.#frame < lastFrame(film));
+    if (this.#playing) this.#glide = [];
+  }
+
+  stop(): void {
+    this.#playing = false;
+  }
+
+  /** Sets the film to another frame, and ends playing and gliding. */
+  rewind(frame: number): void {
+    this.#frame = frame;
+    this.#glide = [];
+    this.#playing = false;
+  }
+
+  /** Sets the target pose at once, as during a drag. */
+  jumpTo(model: MultiresolutionModel, pose: Pose): void {
+    model.setEllipsoids(pose);
+    this.#glide = [];
+    this.#playing = false;
+  }
+
+  /** Starts a glide to a pose, frame by frame. If the model rejects the pose, it throws now. */
+  glideTo(model: MultiresolutionModel, pose: Pose): void {
+    const from = model.targets;
+    model.setEllipsoids(pose);
+    model.setEllipsoids(from);
+    this.#glide = glide(from, pose);
+    this.#playing = false;
+  }
+
+  /** Sets the model's target to the pose of the next frame, if there is one. */
+  next(model: MultiresolutionModel): void {
+    const next = this.#playing ? this.#nextOfFilm() : this.#glide.shift();
+    if (next) model.setEllipsoids(next);
+  }
+
+  #nextOfFilm(): Pose | undefined {
+    const film = this.#film;
+    if (!film) return undefined;
+    const last = lastFrame(film);
+    this.#frame = film.loop ? (this.#frame + 1) % last : Math.min(last, this.#frame + 1);
+    if (this.#frame === last) this.#playing = false;
+    return poseAt(film, this.#frame);
+  }
+}

@@ -1,0 +1,64 @@
+import catalogue from './en.json';
+
+/** All texts of the interface are in `en.json`, by the part of the app; to translate it, translate that file, and set this to its language. */
+export const LANGUAGE = 'en';
+
+type Catalogue = typeof catalogue;
+type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
+/** Key of a text, as in `extract.noVolume`. */
+export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
+/** Key of a text with plural forms, without the suffix of the form. */
+export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;
+/** What replaces the placeholders of a text, by their names. */
+export type TextValues = Record<string, string | number>;
+
+const sections: Record<string, Record<string, string>> = catalogue;
+const FORMS = new Intl.PluralRules(LANGUAGE);
+const NUMBER = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
+
+/**
+ * Returns a text of the interface with its placeholders `{name}` replaced.
+ *
+ * Throws an Error if the value of a placeholder is missing.
+ */
+export function text(key: TextKey, values: TextValues = {}): string {
+  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => {
+    const value = values[name];
+    if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
+    return String(value);
+  });
+}
+
+/**
+ * Returns the form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
+ * `{count}` is the number. The forms have the suffixes `_one`, `_other` and so on.
+ */
+export function plural(key: PluralKey, count: number, values: TextValues = {}): string {
+  const form = `${key}_${FORMS.select(count)}`;
+  const known = (isKnown(form) ? form : `${key}_other`) as TextKey;
+  return text(known, { count: NUMBER.format(count), ...values });
+}
+
+/** Returns a text whose placeholders may be elements, as children for an element. */
+export function textNodes(key: TextKey, values: Record<string, Node | string>): (Node | string)[] {
+  return template(key)
+    .split(/(\{\w+\})/)
+    .filter((part) => part !== '')
+    .map((part) => {
+      const name = /^\{(\w+)\}$/.exec(part)?.[1];
+      if (name === undefined) return part;
+      const value = values[name];
+      if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
+      return value;
+    });
+}
+
+function template(key: string): string {
+  const [section = '', name = ''] = key.split('.');
+  return sections[section]?.[name] ?? key;
+}
+
+function isKnown(key: string): boolean {
+  const [section = '', name = ''] = key.split('.');
+  return sections[section]?.[name] !== undefined;
+}

@@ -1,0 +1,45 @@
+/** Intersections of a surface with a plane, and of the resulting segments with a line. */
+import type { Plane, Surface } from '../protocol';
+
+/** Returns the cross-section of a surface with a plane, as segments: pairs of points, packed xyz. */
+export function crossSection(
+  { positions, indices, vertices, triangles }: Surface,
+  { origin, normal }: Plane,
+): Float32Array {
+  const heights = new Float32Array(vertices);
+  const offset = normal[0] * origin[0] + normal[1] * origin[1] + normal[2] * origin[2];
+  for (let i = 0; i < vertices; i++) {
+    const height =
+      normal[0] * (positions[3 * i] ?? 0) +
+      normal[1] * (positions[3 * i + 1] ?? 0) +
+      normal[2] * (positions[3 * i + 2] ?? 0) -
+      offset;
+    // A vertex in the plane counts as above it, so that each triangle is cut twice or not at all.
+    heights[i] = height === 0 ? 1e-12 : height;
+  }
+  const out: number[] = [];
+  for (let i = 0; i < 3 * triangles; i += 3) {
+    for (let side = 0; side < 3; side++) {
+      const [a, b] = [indices[i + side] ?? 0, indices[i + ((side + 1) % 3)] ?? 0];
+      const [from, to] = [heights[a] ?? 0, heights[b] ?? 0];
+      if (from > 0 === to > 0) continue;
+      const part = from / (from - to);
+      for (let k = 0; k < 3; k++) {
+        const [x, y] = [positions[3 * a + k] ?? 0, positions[3 * b + k] ?? 0];
+        out.push(x + part * (y - x));
+      }
+    }
+  }
+  return Float32Array.from(out);
+}
+
+/** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row at a height. */
+export function intersectionsWithRow(segments: Float32Array, height: number): number[] {
+  const out: number[] = [];
+  for (let i = 0; i + 3 < segments.length; i += 4) {
+    const [x1 = 0, y1 = 0, x2 = 0, y2 = 0] = segments.subarray(i, i + 4);
+    if (y1 > height === y2 > height) continue;
+    out.push(x1 + ((height - y1) / (y2 - y1)) * (x2 - x1));
+  }
+  return out.sort((a, b) => a - b);
+}

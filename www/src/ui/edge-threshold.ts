@@ -1,0 +1,96 @@
+import type { ParamSpec } from '../protocol';
+import { text } from '../texts';
+import { h, symbol, uniqueId } from './dom';
+import { figure } from './format';
+
+/** Multiple of the noise below which noise alone is detected as boundary. */
+const NOISE_FACTOR = 2.5;
+
+/** Control for the edge threshold τ, with the noise level it must exceed. */
+export class EdgeThreshold {
+  readonly element: HTMLElement;
+  readonly #number: HTMLInputElement;
+  readonly #slider: HTMLInputElement;
+  readonly #suggest: HTMLButtonElement;
+  readonly #noise = h('p', { class: 'help' });
+  readonly #warning = h('p', { class: 'warning', role: 'status' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  #suggested = 0;
+
+  /** `onTry` is called with the value during a drag, and with undefined at its end. */
+  constructor(
+    { label, symbol: letter, help }: ParamSpec,
+    onChange: (threshold: number) => void,
+    onTry: (threshold: number | undefined) => void,
+  ) {
+    const id = uniqueId('threshold');
+    this.#number = h('input', {
+      type: 'number',
+      id,
+      step: 'any',
+      min: 0,
+      inputmode: 'decimal',
+      'aria-describedby': `${id}-help`,
+    });
+    this.#slider = h('input', {
+      type: 'range',
+      min: 0,
+      max: 1,
+      step: 'any',
+      'aria-label': text('controls.sliderOf', { label }),
+    });
+    this.#number.addEventListener('change', () => onChange(this.#number.valueAsNumber));
+    // A change restarts the tracker, so it is applied only when the slider is released.
+    this.#slider.addEventListener('input', () => {
+      this.#number.value = String(rounded(this.#slider.valueAsNumber));
+      onTry(rounded(this.#slider.valueAsNumber));
+    });
+    this.#slider.addEventListener('change', () => {
+      onTry(undefined);
+      onChange(rounded(this.#slider.valueAsNumber));
+    });
+    this.#suggest = h('button', {
+      type: 'button',
+      'data-threshold': 'suggest',
+      onclick: () => onChange(this.#suggested),
+    });
+    this.element = h(
+      'div',
+      { class: 'param', 'data-param': 'threshold' },
+      h('label', { for: id }, label, ' ', ...(letter ? [symbol(letter)] : [])),
+      h('span', { class: 'value' }, this.#number),
+      this.#slider,
+      h('p', { class: 'help', id: `${id}-help` }, help),
+      this.#noise,
+      h('div', { class: 'buttons' }, this.#suggest),
+      this.#warning,
+      this.#error,
+    );
+  }
+
+  /** `largest`: the largest possible difference of intensities. */
+  show(threshold: number, noise: number, suggested: number, largest: number): void {
+    this.#suggested = suggested;
+    const top = rounded(Math.max(largest / 2, threshold));
+    Object.assign(this.#slider, { max: String(top), step: String(top / 500) });
+    this.#slider.valueAsNumber = threshold;
+    this.#slider.setAttribute('aria-valuetext', figure(threshold));
+    this.#number.value = String(Number(threshold.toPrecision(6)));
+    this.#noise.textContent = text('trackPanels.noiseEstimate', {
+      noise: figure(rounded(noise)),
+      suggested: figure(rounded(suggested)),
+    });
+    this.#suggest.textContent = text('trackPanels.useSuggested', { suggested: figure(rounded(suggested)) });
+    this.#suggest.disabled = Object.is(threshold, suggested);
+    const low = threshold < NOISE_FACTOR * noise;
+    const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(NOISE_FACTOR * noise)) }) : '';
+    if (this.#warning.textContent !== warning) this.#warning.textContent = warning;
+    this.#error.textContent = '';
+  }
+
+  showError(message: string): void {
+    this.#error.textContent = message;
+  }
+}
+
+const rounded = (value: number) => Number(value.toPrecision(3));

@@ -1,0 +1,77 @@
+import { type PerspectiveCamera, type Scene, WebGLRenderer } from 'three';
+import { text } from '../texts';
+import { h } from '../ui/dom';
+
+const NONE = text('view.noWebGl');
+const LOST = text('view.contextLost');
+
+/** WebGL 2 rendering on a canvas; handles a missing context, and one that is lost and restored. */
+export class WebGlRendering {
+  readonly #canvas: HTMLCanvasElement;
+  readonly #renderer: WebGLRenderer | undefined;
+  /** Message shown in place of the rendering. */
+  readonly #note = h('p', { class: 'view-note', role: 'alert' });
+  #inSoftware: boolean | undefined;
+  #disposed = false;
+
+  /** `onBack` is called when the context has been restored and the scene must be rendered again. */
+  constructor(canvas: HTMLCanvasElement, onBack: () => void) {
+    this.#canvas = canvas;
+    this.#renderer = rendererFor(canvas);
+    canvas.addEventListener('webglcontextlost', () => this.#showNote(LOST));
+    canvas.addEventListener('webglcontextrestored', () => {
+      this.#note.remove();
+      onBack();
+    });
+  }
+
+  setSize(width: number, height: number): void {
+    this.#renderer?.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.#renderer?.setSize(width, height, false);
+  }
+
+  render(scene: Scene, camera: PerspectiveCamera): void {
+    if (this.#renderer) this.#renderer.render(scene, camera);
+    else this.#showNote(NONE);
+  }
+
+  /** Whether rendering is done by the processor. Queried on first use only, because it blocks the page. */
+  get inSoftware(): boolean {
+    if (!this.#renderer) return false;
+    this.#inSoftware ??= isSoftware(this.#renderer.getContext());
+    return this.#inSoftware;
+  }
+
+  /** Frees the GPU memory; browsers limit the number of contexts of a page. */
+  dispose(): void {
+    this.#disposed = true;
+    this.#renderer?.dispose();
+    this.#renderer?.forceContextLoss();
+  }
+
+  #showNote(text: string): void {
+    if (this.#disposed || this.#note.isConnected) return;
+    this.#note.textContent = text;
+    this.#canvas.after(this.#note);
+  }
+}
+
+/**
+ * Creates the renderer, or returns undefined without WebGL 2. The context is requested here because three.js logs an
+ * error if there is none.
+ */
+function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
+  const context = canvas.getContext('webgl2', { alpha: true, antialias: true, depth: true, stencil: false });
+  if (!context) return undefined;
+  const renderer = new WebGLRenderer({ canvas, context, antialias: true, alpha: true });
+  // Checking a shader for errors blocks until it is compiled.
+  renderer.debug.checkShaderErrors = false;
+  return renderer;
+}
+
+/** Whether rendering is done by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const info = context.getExtension('WEBGL_debug_renderer_info');
+  const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(String(renderer));
+}

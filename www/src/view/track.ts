@@ -1,0 +1,327 @@
+import { Box3, Vector3 } from 'three';
+import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
+import type { VoxelBox } from '../track/box';
+import { sliceVotes } from '../track/clusters';
+import { crossSection } from '../track/cross-section';
+import type { BoundaryVotes } from '../track/protocol';
+import { onSchemeChange, token } from '../ui/dom';
+import type { SlicePlacement } from '../ui/view-options';
+import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
+import { PointCloud } from './cloud';
+import { Lines } from './lines';
+import { AXIS_TOKENS, SlicePanel } from './panel';
+import { SlicePlane } from './planes';
+import { RegionGrips, regionEdges } from './region';
+import { greysOf, pictureSize, projectSegments } from './slicing';
+import { SurfaceObject } from './surface';
+import { Viewport } from './viewport';
+import { VolumeBox } from './volume-box';
+import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
+
+/** Content below the 3D view: the slices, or one of the paper's figures. */
+export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
+
+/** Boundary votes that are shown: those near the surface, or all in the box. */
+export type VisibleVotes = 'none' | 'near' | 'all';
+
+export interface TrackViewOptions {
+  surface: boolean;
+  edges: boolean;
+  votes: VisibleVotes;
+  region: boolean;
+  slices: SlicePlacement;
+  below: ContentBelow;
+}
+
+interface Scene {
+  volume: VolumeView;
+  inverse: Float64Array;
+  panels: SlicePanel[];
+  planes: SlicePlane[];
+  box: VolumeBox;
+}
+
+/** Diameter of a boundary vote, as a fraction of the voxel's shortest side. */
+const DISC = 1.1;
+/** Distance from a vertex within which votes are near the surface, in shortest voxel sides. */
+const NEAR_DISTANCE = 2;
+/** Scale of the box to which the view is fitted, because the object leaves a margin in it. */
+const FIT_SCALE = 0.44;
+
+/** The 3D view and the slices of the Track lab for one frame at a time, synchronised by a common crosshair. */
+export class TrackView {
+  /** Called when the region of interest was dragged to other voxels. */
+  onRegion: (region: VoxelBox) => void = () => undefined;
+  /** Called whenever the slices have moved. */
+  onMoved: () => void = () => undefined;
+  readonly #viewport: Viewport;
+  readonly #slices: HTMLElement;
+  readonly #surface = new SurfaceObject();
+  readonly #cloud = new PointCloud();
+  readonly #box = new Lines('#fff');
+  readonly #grips = new RegionGrips(
+    () => this.#redraw(),
+    (region) => this.onRegion(region),
+  );
+  #options: TrackViewOptions;
+  #scene: Scene | undefined;
+  #shown: Surface | undefined;
+  #votes: BoundaryVotes | undefined;
+  #frame = 0;
+  /** Previewed votes by voxel axis. */
+  #preview: ReturnType<typeof sliceVotes>[] = [];
+  #crosshair: Vec3 = [0, 0, 0];
+
+  constructor(canvas: HTMLCanvasElement, slices: HTMLElement, options: TrackViewOptions) {
+    this.#viewport = new Viewport(canvas);
+    this.#slices = slices;
+    this.#options = options;
+    for (const { object } of [this.#surface, this.#cloud, this.#box]) this.#viewport.add(object);
+    this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
+    this.#recolor();
+    onSchemeChange(() => this.#recolor());
+  }
+
+  /**
+   * Shows another image, or the same with other preprocessing: `keep` leaves slices and camera unchanged in world
+   * space.
+   */
+  setVolume(volume: VolumeView, keep: boolean): void {
+    const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
+    this.#clear();
+    const inverse = invert(volume.affine);
+    const panels = sliceOrientations(volume).map((orientation) => {
+      const panel: SlicePanel = new SlicePanel(volume, orientation, inverse, {
+        onIndex: (index) => this.#moveSlice(orientation.axis, index),
+        onPoint: (index) => this.#moveTo(index),
+        grab: (place, slack) =>
+          this.#options.region ? this.#grips.grab(place, slack, orientation.axis, volume.dims) : undefined,
+      });
+      panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
+      return panel;
+    });
+    const planes = panels.map(
+      ({ orientation, picture }) =>
+        new SlicePlane(volume, orientation, picture, {
+          frame: token(AXIS_TOKENS[orientation.axis]),
+          section: token('--outline'),
+        }),
+    );
+    const box = new VolumeBox(volume, token('--muted'));
+    this.#scene = { volume, inverse, panels, planes, box };
+    for (const { object } of [...planes, box]) this.#viewport.add(object);
+    this.#slices.append(
+      ...[...panels].sort((a, b) => a.orientation.name.localeCompare(b.orientation.name)).map((panel) => panel.element),
+    );
+    this.#cloud.size = DISC * Math.min(...volume.spacing);
+    if (!keep) this.#viewport.fitVolume(volume);
+    this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
+    this.showFrame(0, undefined);
+    if (at) this.goTo(at);
+  }
+
+  /** Fits a box of voxels closely into the view. */
+  fitRegion(region: VoxelBox): void {
+    if (!this.#scene) return;
+    const { space, affine } = this.#scene.volume;
+    const all = new Box3().setFromArray(regionEdges(region, affine));
+    const [middle, size] = [all.getCenter(new Vector3()), all.getSize(new Vector3()).multiplyScalar(2 * FIT_SCALE)];
+    this.#viewport.fitBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
+  }
+
+  /** Shows the slices of a frame, and its surface if it has one. */
+  showFrame(frame: number, surface: Surface | undefined): void {
+    this.#frame = frame;
+    this.#shown = surface;
+    if (surface) this.#surface.show(surface);
+    const level = this.#level;
+    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
+    this.#placePlanes();
+    this.#updateSections();
+    this.#apply();
+  }
+
+  /** Shows the boundary votes of a frame, or none. */
+  showVotes(votes: BoundaryVotes | undefined): void {
+    this.#votes = votes;
+    this.#showCloud();
+    this.#apply();
+    this.#redraw();
+  }
+
+  #showCloud(): void {
+    const { votes } = this.#options;
+    if (!this.#votes || votes === 'none') return;
+    const reach = NEAR_DISTANCE * Math.min(...(this.#scene?.volume.spacing ?? [1]));
+    const near = votes === 'near' && this.#shown ? votesNear(this.#votes, this.#shown, reach) : this.#votes;
+    this.#cloud.show(near.points, voteColors(near.weights));
+  }
+
+  /**
+   * Previews the boundary for an edge threshold, found in each slice separately with windows of half width `halfWidth`, in pixels
+   * to each side; undefined removes the preview.
+   */
+  preview(threshold: number | undefined, halfWidth: number): void {
+    const level = this.#level;
+    this.#preview = [];
+    for (const { orientation } of threshold !== undefined && level ? (this.#scene?.panels ?? []) : []) {
+      const [low, high] = this.#scene?.volume.window ?? [0, 1];
+      const values = greysOf(level as LevelView, orientation, this.#crosshair[orientation.axis]);
+      const { width, height } = pictureSize(level as LevelView, orientation);
+      const leastDifference = ((threshold ?? 0) * 255) / (high - low || 1);
+      this.#preview[orientation.axis] = sliceVotes({ width, height, values }, halfWidth, leastDifference);
+    }
+    this.#redraw();
+  }
+
+  /** Shows the region of interest. */
+  showRegion(region: VoxelBox): void {
+    this.#grips.region = region;
+    this.#redraw();
+  }
+
+  setOptions(options: TrackViewOptions): void {
+    this.#options = { ...options };
+    this.#showCloud();
+    this.#apply();
+    this.#redraw();
+  }
+
+  goTo(point: Vec3): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    const last = (axis: number) => (scene.volume.dims[axis] ?? 1) - 1;
+    this.#moveTo(toWorld(scene.inverse, point).map((x, k) => Math.min(last(k), Math.max(0, Math.round(x)))) as Vec3);
+  }
+
+  goToVoxel(voxel: Vec3): void {
+    this.#moveTo(voxel);
+  }
+
+  /** The crosshair, in world space and as a voxel. */
+  get crosshair(): { point: Vec3; voxel: Vec3 } {
+    const voxel: Vec3 = [...this.#crosshair];
+    return { point: this.#scene ? toWorld(this.#scene.volume.affine, voxel) : [0, 0, 0], voxel };
+  }
+
+  /** Redraws the overlays of the slices. */
+  refresh(): void {
+    this.#redraw();
+  }
+
+  /**
+   * Returns the cross-section of a surface with the slice across the given voxel axis, in pixels of the slice's image.
+   */
+  outlineIn(surface: Surface, axis: 0 | 1 | 2): Float32Array {
+    const scene = this.#scene;
+    const panel = scene?.panels[axis];
+    if (!scene || !panel) return new Float32Array(0);
+    const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
+    return projectSegments(crossSection(surface, plane), scene.inverse, scene.volume, panel.orientation);
+  }
+
+  dispose(): void {
+    this.#clear();
+    for (const part of [this.#surface, this.#cloud, this.#box]) part.dispose();
+    this.#viewport.dispose();
+  }
+
+  /** The voxels of the current frame. */
+  get #level(): LevelView | undefined {
+    const volume = this.#scene?.volume;
+    return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
+  }
+
+  #moveSlice(axis: 0 | 1 | 2, index: number): void {
+    const at: Vec3 = [...this.#crosshair];
+    at[axis] = index;
+    this.#moveTo(at);
+  }
+
+  #moveTo(index: Vec3): void {
+    this.#crosshair = index;
+    for (const panel of this.#scene?.panels ?? []) panel.setCrosshair(index);
+    this.#placePlanes();
+    this.#updateSections();
+    this.onMoved();
+  }
+
+  #placePlanes(): void {
+    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
+    this.#viewport.invalidate();
+  }
+
+  /** Updates the surface's outlines on the slices. */
+  #updateSections(): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    for (const axis of [0, 1, 2] as const) {
+      const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
+      const section = this.#shown ? crossSection(this.#shown, plane) : new Float32Array(0);
+      scene.panels[axis]?.setOutline(section);
+      scene.planes[axis]?.showSection(section);
+    }
+    this.#viewport.invalidate();
+  }
+
+  #apply(): void {
+    const { surface, edges, votes, region } = this.#options;
+    this.#surface.solid = surface && this.#shown !== undefined;
+    this.#surface.edges = edges && this.#shown !== undefined;
+    this.#cloud.object.visible = votes !== 'none' && this.#votes !== undefined;
+    this.#box.object.visible = region;
+    this.#viewport.invalidate();
+  }
+
+  #redraw(): void {
+    const scene = this.#scene;
+    for (const panel of scene?.panels ?? []) panel.draw();
+    if (scene && this.#grips.region) this.#box.show(regionEdges(this.#grips.region, scene.volume.affine));
+    this.#box.object.visible = this.#options.region;
+    this.#viewport.invalidate();
+  }
+
+  #drawOver(panel: SlicePanel, context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    const { volume, inverse } = scene;
+    const slice = this.#crosshair[panel.orientation.axis];
+    const preview = this.#preview[panel.orientation.axis];
+    if (preview) drawFaces(context, preview, scaleX, scaleY);
+    else if (this.#options.votes !== 'none' && this.#votes)
+      drawVotes(context, this.#votes, { volume, inverse, orientation: panel.orientation, slice, scaleX, scaleY });
+    if (this.#options.region) this.#grips.draw(context, panel.orientation, volume.dims, scaleX, scaleY);
+  }
+
+  #placeSlices(viewer: Vector3): void {
+    const { slices } = this.#options;
+    for (const plane of this.#scene?.planes ?? []) {
+      plane.object.visible = slices !== 'hidden';
+      if (slices !== 'hidden') plane.stand(slices, viewer);
+    }
+  }
+
+  #recolor(): void {
+    this.#surface.edgeColor = token('--wire');
+    this.#box.object.material.color.set(token('--region'));
+    this.#redraw();
+  }
+
+  #clear(): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    for (const item of [...scene.planes, scene.box]) {
+      this.#viewport.remove(item.object);
+      item.dispose();
+    }
+    for (const panel of scene.panels) panel.dispose();
+    this.#scene = undefined;
+    this.#votes = undefined;
+  }
+}
+
+/** Returns the grey values of one frame. */
+export function voxelsOfFrame({ dims, voxels }: VolumeView, frame: number): Uint8Array {
+  const size = dims[0] * dims[1] * dims[2];
+  return voxels.subarray(frame * size, (frame + 1) * size);
+}

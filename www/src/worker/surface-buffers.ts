@@ -1,0 +1,53 @@
+/** Arrays with spare capacity in which a mesh is sent to the page. */
+import type { Mesh } from 'vesicle';
+import type { Surface } from '../protocol';
+import { buffersOf } from './serving';
+
+/**
+ * Ratio of consecutive capacities. A smaller one needs new buffers more often, a larger one leaves more of them unused.
+ */
+const CAPACITY_RATIO = 1.25;
+
+/**
+ * Rounds a count up to the next capacity of a geometric sequence, so that the buffers of a growing surface fit for a
+ * while, here and on the GPU.
+ */
+export function capacityFor(count: number): number {
+  return Math.ceil(CAPACITY_RATIO ** Math.ceil(Math.log(Math.max(1, count)) / Math.log(CAPACITY_RATIO)));
+}
+
+export type Arrays = Pick<Surface, 'positions' | 'normals' | 'indices' | 'uvs' | 'colors'>;
+
+export function emptyArrays(): Arrays {
+  return { positions: new Float32Array(0), normals: new Float32Array(0), indices: new Uint32Array(0) };
+}
+
+/**
+ * Copies a mesh into arrays with spare capacity, which are transferred to the page and uploaded to the GPU unchanged.
+ * The given arrays are reused if their lengths match.
+ */
+export function copySurface({ positions, normals, indices }: Arrays, mesh: Mesh): Surface {
+  const [numbers, corners] = [3 * capacityFor(mesh.vertexCount), 3 * capacityFor(mesh.triangleCount)];
+  const arrays: Arrays = {
+    positions: positions.length === numbers ? positions : new Float32Array(numbers),
+    normals: normals.length === numbers ? normals : new Float32Array(numbers),
+    indices: indices.length === corners ? indices : new Uint32Array(corners),
+  };
+  const counts = mesh.copyTo(arrays);
+  return { ...arrays, ...counts };
+}
+
+/** Copies a mesh with its texture coordinates into arrays with the same spare capacity. */
+export function texturedSurface(mesh: Mesh): Surface {
+  const capacity = capacityFor(mesh.vertexCount);
+  const surface = copySurface(emptyArrays(), mesh);
+  if (!surface.uvs) return surface;
+  const uvs = new Float32Array(2 * capacity);
+  uvs.set(surface.uvs);
+  return { ...surface, uvs };
+}
+
+/** Returns the buffers of a surface that are transferred instead of copied. */
+export function transferOf({ positions, normals, indices, values, colors, uvs }: Surface): Transferable[] {
+  return buffersOf([positions, normals, indices, values, colors, uvs].filter((array) => array !== undefined));
+}
