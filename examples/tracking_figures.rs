@@ -108,16 +108,16 @@ fn track(cine: &Cine) {
             all.votes += took;
         }
         let (Some(mesh), None) = (tracker.meshes().last(), tracker.cycle_closure_error()) else { continue };
-        let (frame, facts) = (tracker.frame(), tracker.statistics()[tracker.frame()]);
+        let (frame, statistics) = (tracker.frame(), tracker.statistics()[tracker.frame()]);
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
         let self_intersections = count_self_intersections(mesh);
-        let folds = 100.0 * facts.folded as f64 / facts.triangles as f64;
+        let folds = 100.0 * statistics.folded as f64 / statistics.triangles as f64;
         println!(
             "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, self-intersections {}",
             took * 1e3,
-            facts,
+            statistics,
             a.volume / 1000.0,
             b.volume / 1000.0,
             100.0 * (a.volume / b.volume - 1.0),
@@ -134,7 +134,7 @@ fn track(cine: &Cine) {
         all.folds = all.folds.max(folds);
         all.areas.push(100.0 * (a.area / b.area - 1.0));
         all.self_intersections += self_intersections;
-        all.steps += facts.steps / tracker.frames() as f64;
+        all.steps += statistics.steps / tracker.frames() as f64;
         all.volumes.push([a.volume, b.volume]);
         all.times.push(took);
     }
@@ -218,7 +218,7 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
         let began = Instant::now();
         tracker.step().unwrap();
         let (Some(mesh), None) = (tracker.meshes().last(), tracker.cycle_closure_error()) else { continue };
-        let (m, facts) = (measure(mesh), tracker.statistics()[tracker.frame()]);
+        let (m, statistics) = (measure(mesh), tracker.statistics()[tracker.frame()]);
         println!(
             "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, self-intersections {}, folds {:.2} %, {:?}",
             tracker.frame(),
@@ -228,8 +228,8 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
             m.area / 100.0,
             m.euler,
             count_self_intersections(mesh),
-            100.0 * facts.folded as f64 / facts.triangles as f64,
-            facts
+            100.0 * statistics.folded as f64 / statistics.triangles as f64,
+            statistics
         );
         if let Ok(folder) = std::env::var("OUT") {
             let bytes = vesicle::io::write_mesh(mesh, vesicle::io::MeshFormat::Ply).unwrap();

@@ -110,13 +110,13 @@ fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
         Cine { papillary: true, dims: [52; 3], spacing: fine, frames: 12, size: 30.0, ..Cine::small() };
     let tracker = tracked(options(&cine, cine.volume()));
     let mut retracted = 0;
-    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
+    for (frame, (mesh, statistics)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
         assert_eq!((found.components, count_self_intersections(mesh)), (1, 0), "{frame}");
         let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
         assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.05, "{frame} {area} {volume}");
-        assert!(facts.folded * 100 < facts.triangles, "{frame} {facts:?}");
-        retracted += facts.without_boundary;
+        assert!(statistics.folded * 100 < statistics.triangles, "{frame} {statistics:?}");
+        retracted += statistics.without_boundary;
     }
     assert!(retracted > 100, "{retracted}");
 }
@@ -198,12 +198,12 @@ fn a_side_of_the_box_inside_the_cavity_closes_the_surface() {
     // Half of the cavity, cut where it is widest, and narrower than it.
     let bounds = Some(Bounds::Voxels([[18, 14, 10], [35, 21, 20]]));
     let tracker = tracked(TrackingOptions { bounds, volume, ..open_ended(&cine) });
-    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
+    for (frame, (mesh, statistics)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let found = measure(mesh);
         assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let x = mesh.positions.iter().map(|p| p.x).fold(f32::MAX, f32::min);
         assert!((x - 35.0).abs() < 1.2, "{frame} {x}");
-        assert!(facts.without_boundary < facts.triangles / 20, "{frame} {facts:?}");
+        assert!(statistics.without_boundary < statistics.triangles / 20, "{frame} {statistics:?}");
     }
 }
 
@@ -238,9 +238,12 @@ fn a_cycle_closes_and_every_frame_has_its_volume() {
     assert!((progress - 1.0).abs() < 1e-12);
     let closing = tracker.cycle_closure_error().unwrap();
     assert!(closing > 0.0 && closing < 0.3 * cine.spacing.x, "{closing}");
-    for (facts, mesh) in tracker.statistics().iter().zip(tracker.meshes()) {
+    for (statistics, mesh) in tracker.statistics().iter().zip(tracker.meshes()) {
         let found = measure(mesh);
-        assert_eq!((facts.volume, facts.area, facts.triangles), (found.volume, found.area, found.triangles));
+        assert_eq!(
+            (statistics.volume, statistics.area, statistics.triangles),
+            (found.volume, found.area, found.triangles)
+        );
     }
     assert_eq!(tracker.frame(), cine.frames - 1);
 }

@@ -171,8 +171,8 @@ impl Forces {
                 force += self.gradient_force(v, x, image, scale);
             }
             if !attractors.is_empty() {
-                let attractor = attractors.iter().map(|attractor| attraction(attractor, x)).sum();
-                force += self.fade_tangential(v, attractor, velocities[v], scale.delta);
+                let force_of_attractors = attractors.iter().map(|attractor| attraction(attractor, x)).sum();
+                force += self.fade_tangential(v, force_of_attractors, velocities[v], scale.delta);
             }
             self.force[v] = force;
         }

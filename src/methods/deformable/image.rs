@@ -107,8 +107,8 @@ impl LevelImage {
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
-            let crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
-            crossings.for_each(|(&a, &b)| visit(a - b));
+            let iso_crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
+            iso_crossings.for_each(|(&a, &b)| visit(a - b));
         };
         let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
         for (k, row) in rows.iter().enumerate() {

@@ -187,7 +187,7 @@ mod tests {
     /// Regression: with sizes by the offset of the midpoint alone, edges of a surface 0.3 voxels off its contour were a
     /// quarter shorter.
     #[test]
-    fn sizes_are_those_of_the_contour_where_the_surface_is_beside_it() {
+    fn sizes_do_not_depend_on_the_offset_from_the_contour() {
         let mut model = model();
         let mean = |model: &DeformableModel| {
             let all: Vec<VertexId> = model.mesh.vertices().collect();
@@ -201,7 +201,7 @@ mod tests {
             .map(|v| (v, model.mesh.position(v) + model.mesh.area_normal(v).normalize_or_zero() * 0.3))
             .collect();
         moved.into_iter().for_each(|(v, p)| model.mesh.set_position(v, p));
-        let beside_it = mean(&model);
-        assert!((beside_it / on_contour - 1.0).abs() < 0.1, "{on_contour} and {beside_it}");
+        let off_contour = mean(&model);
+        assert!((off_contour / on_contour - 1.0).abs() < 0.1, "{on_contour} and {off_contour}");
     }
 }

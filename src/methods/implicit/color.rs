@@ -535,7 +535,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_seen_is_no_color() {
+    fn unseen_surfaces_have_no_colors() {
         let ball = UNIT.mesh(0.5);
         let [front, ..] = &six_sides(|_| [20, 20])[..] else { panic!() };
         let away = camera(&[&UNIT], DVec3::X * 4.0, DVec3::X * 9.0, [20, 20], TEAL);

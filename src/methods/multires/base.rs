@@ -128,11 +128,11 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
         return Err(MethodError::invalid("ellipsoids", problem));
     }
     let lattice = Lattice { origin: DVec3::splat(-radius), edge: cell, dims: [nodes as usize; 3] };
-    let mut follower = SurfaceExtractor::new(lattice)?;
+    let mut extractor = SurfaceExtractor::new(lattice)?;
     for e in ellipsoids {
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            follower.seed(e.at_unit(axis) - centre);
-            follower.seed(e.at_unit(-axis) - centre);
+            extractor.seed(e.at_unit(axis) - centre);
+            extractor.seed(e.at_unit(-axis) - centre);
         }
     }
     let inside = |p: &DVec3| {
@@ -142,9 +142,9 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     let mut values = |points: &[DVec3], values: &mut [f64]| {
         values.iter_mut().zip(points).for_each(|(value, p)| *value = inside(p));
     };
-    follower.refine(2);
-    while !follower.advance(usize::MAX, &mut values)? {}
-    let mut mesh = follower.mesh()?;
+    extractor.refine(2);
+    while !extractor.advance(usize::MAX, &mut values)? {}
+    let mut mesh = extractor.mesh()?;
     mesh.positions.iter_mut().for_each(|p| *p = (p.as_dvec3() + centre).as_vec3());
     Ok(mesh)
 }

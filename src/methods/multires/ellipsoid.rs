@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn all_moved_alike_carry_everything_along() {
+    fn points_follow_ellipsoids_that_move_alike() {
         let mut random = Random::new(13);
         let before: Vec<_> = (0..4).map(|_| random_ellipsoid(&mut random)).collect();
         let turn = DMat3::from_rotation_y(0.7);

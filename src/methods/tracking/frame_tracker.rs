@@ -207,10 +207,10 @@ impl FrameTracker {
         statistics: &mut FrameStatistics,
     ) {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        let (steps, displacement) = self.project(mesh, &all, offsets, context, onto, statistics);
+        let (steps, total) = self.project(mesh, &all, offsets, context, onto, statistics);
         let count = all.len().max(1) as f64;
         statistics.steps += steps as f64 / count;
-        statistics.mean_final_correction = displacement / count;
+        statistics.mean_final_correction = total / count;
     }
 
     /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. All move at once, with one

@@ -73,8 +73,8 @@ impl SurfaceTracker {
         let edge_fits = state.edge.is_none_or(|edge| (1e-3 * pixel..1e3 * pixel).contains(&edge));
         let closure_fits =
             state.cycle_closure_error.is_none() || params.cyclic && meshes.len() == self.frames();
-        let begins_well = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
-        if !edge_fits || !closure_fits || !begins_well {
+        let start_fits = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
+        if !edge_fits || !closure_fits || !start_fits {
             return bad("frames", "inconsistent with this tracker");
         }
         if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
