@@ -23,7 +23,7 @@ const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesi
 // Documents that the README links to.
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
 
-// Between the package and other people's: `vesicle/three` and so on.
+// Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk'];
 
 async function compile({ target, env }) {

@@ -194,7 +194,7 @@ fn numbers<'a>(
         FormatError::invalid(
             FORMAT,
             format!("line {line}"),
-            format!("at least {min_count} numbers are needed"),
+            format!("must have at least {min_count} numbers"),
         )
     })
 }

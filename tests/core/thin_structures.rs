@@ -1,4 +1,4 @@
-//! Walls, gaps, strands and hollows that a uniform δ would lose, at the default settings: right components and Euler
+//! Walls, gaps, strands and cavities that a uniform δ would lose, at the default settings: right components and Euler
 //! characteristics, and a mean error of at most 0.15 voxels.
 
 use crate::common::{Random, euler_of_parts, scenes};

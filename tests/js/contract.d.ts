@@ -16,7 +16,7 @@ export class VesicleError extends Error {
     | 'invalid-argument' // a parameter out of range, NaN, wrong length; names the parameter
     | 'bad-file' // truncated, inconsistent or unsupported file; names the format and the field
     | 'not-closed' // a mesh with boundary or non-manifold edges where a closed one is needed
-    | 'self-intersecting' // a start mesh that crosses itself where an embedded one is needed
+    | 'self-intersecting' // a start mesh that intersects itself where an embedded one is needed
     | 'singular-system' // the linear system has no usable solution; names the likely cause
     | 'too-large' // needs more memory than wasm32 has; says how much
     | 'aborted'
@@ -77,7 +77,7 @@ export class Volume {
   intensities(frame?: number): Float32Array;
   /** One volume per level, [0] = this one; smoothed before it is thinned. */
   pyramid(levels: number, options?: { factor?: number }): Volume[];
-  /** Means of blocks of so many voxels along x, y and z, in all frames. */
+  /** Means of blocks of the given numbers of voxels along x, y and z, in all frames. */
   binned(factors: Vec3): Volume;
   /** In-between slices by symmetric optical flow, so that spacing becomes close to isotropic. */
   enrichSlices(options?: { factor?: number; method?: 'flow' | 'linear' }): Volume;

@@ -9,7 +9,7 @@ type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
 export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
 /** Key of a text with plural forms, without the suffix of the form. */
 export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;
-/** What replaces the placeholders of a text, by their names. */
+/** Values for the placeholders of a text, by name. */
 export type TextValues = Record<string, string | number>;
 
 const sections: Record<string, Record<string, string>> = catalogue;
