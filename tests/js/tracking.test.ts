@@ -503,7 +503,7 @@ const REFUSED: [string, string, string, () => unknown][] = [
   ['no options', 'invalid-argument', 'volume', () => new SurfaceTracker(wrong(undefined))],
   ['no volume', 'invalid-argument', 'volume', () => new SurfaceTracker(wrong({}))],
   ['a volume that is none', 'invalid-argument', 'volume', () => tracker({ volume: wrong(closed) })],
-  ['one frame', 'invalid-argument', 'volume: it has one frame', () => tracker({ volume: beating({ frames: 1 }) })],
+  ['one frame', 'invalid-argument', 'volume: must have at least two frames', () => tracker({ volume: beating({ frames: 1 }) })],
   ['no contrast', 'invalid-argument', 'volume', () => tracker({ volume: flat() })],
   ['slanted axes', 'invalid-argument', 'volume', () => tracker({ volume: slanted() })],
   ['a misspelled option', 'invalid-argument', 'bounds', () => tracker(wrong({ bounds: REACH }))],
@@ -548,7 +548,7 @@ test('without any boundary the largest step is reported, and a lower threshold w
   one.step(3);
   const { code, message } = failure(() => one.step());
   expect([code, message]).toEqual(['invalid-argument', expect.stringMatching(/^threshold: .*largest step/)]);
-  const largest = Number(/largest step in the box is ([\d.]+)/.exec(message)?.[1]);
+  const largest = Number(/must be below ([\d.]+), the largest step in the box/.exec(message)?.[1]);
   expect(largest).toBeGreaterThan(90);
   expect(largest).toBeLessThan(119);
   expect(failure(() => one.step()).message).toBe(message);
@@ -607,7 +607,7 @@ test('the largest step is reported for thresholds beyond all intensities as well
   const one = tracker({ volume: short, params: { threshold: 1000 } });
   one.step(3);
   const { message } = failure(() => one.step());
-  expect(Number(/largest step in the box is ([\d.]+)/.exec(message)?.[1])).toBeGreaterThan(90);
+  expect(Number(/must be below ([\d.]+), the largest step in the box/.exec(message)?.[1])).toBeGreaterThan(90);
 });
 
 test.each([null, 0, '', false])('%o as a start is refused by name', (start) => {

@@ -49,7 +49,7 @@ impl SurfaceTracker {
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.quantum;
             let problem = format!(
-                "no boundary found with {}: must be below the largest step in the box, {largest:.4}",
+                "must be below {largest:.4}, the largest step in the box, got {}: no boundary was found",
                 self.params.threshold
             );
             return Err(MethodError::invalid("threshold", problem));
