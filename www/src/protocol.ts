@@ -189,7 +189,7 @@ export interface Requests {
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Gives buffers that the page no longer draws back to the worker; has no reply. */
+/** Returns buffers to the worker when the page no longer draws them; has no reply. */
 export interface ReturnMessage {
   kind: 'return';
   buffers: SurfaceBuffers;
@@ -228,7 +228,7 @@ export interface SectionsEvent {
 }
 /**
  * State of the run: sent when a run starts and, after its last results, when it is done or was stopped; also after
- * single steps and other changes without a run.
+ * single steps and, in the Extract lab, after seeding or restoring.
  */
 export interface StateEvent {
   event: 'state';

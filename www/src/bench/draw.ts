@@ -19,7 +19,7 @@ export function drawSection({ id, title, measured, command, notes, charts }: Sec
   );
 }
 
-/** Displayed labels of the verdicts: whether a measurement meets its target. */
+/** Displayed labels of the verdicts: whether a measurement meets its target, or was not measured. */
 export const VERDICTS = {
   met: text('bench.met'),
   'not met': text('bench.notMet'),

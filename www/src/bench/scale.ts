@@ -1,7 +1,7 @@
 /** Scale of a chart's axis, mapping values to 0 at its left end and 1 at its right. */
 export interface Scale {
   at: (value: number) => number;
-  /** Position of the ends at which bars start, 0 to 1: that of the value 1 for ratios, else the left end. */
+  /** Position, 0 to 1, at which bars start: that of the value 1 for ratios, else the left end. */
   base: number;
   ticks: number[];
 }
