@@ -13,8 +13,8 @@ use crate::volume::{Grid, marching_cubes};
 /// voxel are too coarse.
 const MIN_SIDE: f32 = 0.7;
 
-/// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound,
-/// a tube of radius 1.2 became a square prism.
+/// The largest distance along its normal, in voxels of the level, between a vertex and the mean of its cluster. Without
+/// this bound, a tube of radius 1.2 became a square prism.
 const FLATNESS: f32 = 0.15;
 
 /// The side of the iso value on which the object is.
