@@ -5,7 +5,7 @@
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// The count of still iterations, in which a vertex is slower than [`stillness`], from which on it sleeps.
+/// The number of still iterations, those in which a vertex is slower than [`stillness`], after which it sleeps.
 pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
 /// The speed below which a vertex is still, as a share of the speed that each vertex of a surface with the tolerated
