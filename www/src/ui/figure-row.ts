@@ -26,8 +26,9 @@ const CANNY_FIELDS = [
 /** Data for the paper's figures in the Track lab; undefined while it is not available. */
 export interface FigureData {
   subject: Subject;
-  /** Half width k of the window in voxels; below, the edge threshold τ in intensity units. */
+  /** Half width k of the window, in voxels. */
   window: number;
+  /** Edge threshold τ, in intensity units. */
   threshold: number;
   votes: BoundaryVotes | undefined;
   between: InterpolatedSlice | undefined;
