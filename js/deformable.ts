@@ -55,7 +55,10 @@ export interface DeformableParams {
   timeStep?: number;
   /** Largest displacement of a vertex in one iteration, as a fraction of δ. */
   maxMove?: number;
-  /** Mean kinetic energy along the normals below which a level has converged, ε. */
+  /**
+   * Mean kinetic energy of the vertices along the normals, ε, with speeds in δ per unit of time, below which a level has
+   * converged.
+   */
   energyTolerance?: number;
   /**
    * 'adaptive' (the default): edges are split, collapsed and flipped, and the surface may split and merge. 'fixed':

@@ -14,7 +14,7 @@ export interface StepReport {
   /**
    * Convergence measure: mean kinetic energy (deformable model), relative residual of the linear system (implicit
    * surface), root mean square displacement in target edges (multiresolution model), or mean final correction of the
-   * newest frame, world units (tracker). NaN before there is one.
+   * newest frame, world units (tracker). May be NaN before there is one.
    */
   residual: number;
   /** Value below which `residual` counts as converged. */
