@@ -29,7 +29,7 @@ pub struct SparseInverse {
 #[derive(Clone, Debug, Default)]
 struct Rows {
     centres: Vec<u32>,
-    /// Neighbours of all centres, one row after the other; `ends` holds the end of each row here.
+    /// Neighbours of all centres, one row after the other; `ends` holds the end of each row in this list.
     neighbours: Vec<u32>,
     ends: Vec<usize>,
 }
@@ -142,8 +142,8 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
     found.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Appends the entries of gᵢ for one centre to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b, where A is the matrix Φ
-/// + Λ of its neighbours, and b holds its entries of Φ with them.
+/// Appends the entries of gᵢ for one centre to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b, where A is the matrix
+/// Φ+Λ of its neighbours, and b holds its entries of Φ with them.
 fn row(
     centre: u32,
     neighbours: &[u32],
@@ -222,7 +222,7 @@ fn max(a: f64, b: f64) -> f64 {
 const FIRST_SPACING: f32 = 2.0;
 /// Ratio of the minimum distance of one round of the ordering to that of the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Minimum distance of a round, in box units, from which on all centres left are taken in their given order.
+/// Minimum distance of a round, in box units, at or below which all centres left are taken in their given order.
 const MIN_SPACING: f32 = 1e-6;
 /// Edge length of the cells of the grid that holds the centres taken, in minimum distances of the round.
 const CELL: f32 = 3.6;
