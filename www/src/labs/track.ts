@@ -38,7 +38,7 @@ export class TrackLab implements Lab {
   /** Number of slices of the image before its preparation. */
   #slices = 1;
   #truth: number[] | undefined;
-  /** Time in milliseconds at which the present run began; undefined if it is not running, or was resumed after a step. */
+  /** Time in milliseconds at which the present run began; undefined if none is running, or if it was resumed midway. */
   #began: number | undefined;
   /** Duration in milliseconds of the last run without a pause, for comparisons; undefined after a pause. */
   #duration: number | undefined;
