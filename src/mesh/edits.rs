@@ -26,8 +26,8 @@ impl Mesh {
         }
     }
 
-    /// Splits the edge `uv` by a new vertex at `position`, with the mean attributes of `u` and `v`, and returns the vertex
-    /// (creation in Lachaud & Montanvert).
+    /// Splits the edge `uv` by a new vertex at `position`, with the mean attributes of `u` and `v`, and returns the
+    /// vertex (creation in Lachaud & Montanvert).
     ///
     /// ```text
     ///      a                a
@@ -68,8 +68,8 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`] if
-    /// `u` or `v` has three neighbours only.
+    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`]
+    /// if `u` or `v` has three neighbours only.
     pub fn flip(&mut self, u: VertexId, v: VertexId) -> Result<(), EditError> {
         let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
         if self.ring(a).contains(b) {

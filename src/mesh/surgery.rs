@@ -105,8 +105,8 @@ impl Mesh {
         Ok(TubeRims { first, second })
     }
 
-    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim in
-    /// the order of its ring.
+    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim
+    /// in the order of its ring.
     ///
     /// ```text
     ///   n1-----n0             n1-----n0

@@ -34,7 +34,7 @@ const MAX_COLUMNS_PER_BALL: usize = 8;
 const FILTER_BITS: usize = 8;
 
 /// Calls `found` once with every pair of `balls` whose centres are no farther apart than [`Proximity::distance_for`]
-/// their radii. The order is unspecified but deterministic.
+/// returns for their radii. The order is unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);

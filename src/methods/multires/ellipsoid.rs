@@ -200,8 +200,8 @@ impl Ellipsoid {
     /// Returns the point of the surface closest to `p`, which may be inside or outside. For the centre, it is an end of
     /// the shortest axis.
     ///
-    /// The surface normal at this point passes through p. With local coordinates y of p and semi-axes a, it is a²y/(a²
-    /// + t) for the largest root t of Σ (a y/(a² + t))² = 1.
+    /// The surface normal at this point passes through p. With local coordinates y of p and semi-axes a, the point is
+    /// a²y/(a² + t) for the largest root t of Σ (a y/(a² + t))² = 1.
     pub fn nearest(&self, p: DVec3) -> DVec3 {
         if self.lengths.min_element() == self.lengths.max_element() {
             return self.center + self.shortest_axis() * (p - self.center).normalize_or(self.rotation.x_axis);

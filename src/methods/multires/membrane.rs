@@ -126,8 +126,9 @@ fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     ring.iter().fold(Vec3::ZERO, |sum, w| sum + positions[w.index()]) * (1.0 / ring.len() as f32)
 }
 
-/// Returns the position with the least bending energy: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p, U² of U, and ν = 1
-/// + Σ 1/nᵢ / n (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
+/// Returns the position with the least bending energy, all others fixed: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p,
+/// U²(p) = Σ U(pᵢ) / n − U(p), and ν = 1 + (Σ 1/nᵢ) / n, where nᵢ is the valence of the neighbour pᵢ (Kobbelt et al.,
+/// *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
 fn min_bending_position(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let umbrella = |w: VertexId| neighbour_mean(mesh, positions, w) - positions[w.index()];
     let ring = mesh.ring(v).as_slice();

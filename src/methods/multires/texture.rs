@@ -56,7 +56,7 @@ fn uv_at(mesh: &TriangleMesh, at: &BasePoint) -> Vec2 {
     blend(triangle_uvs(mesh, at.triangle), at.weights)
 }
 
-/// Returns the longest edge of a triangle in the texture, divided by its longest edge in space.
+/// Returns the longest edge of a triangle of the finest surface in the texture, divided by its longest edge in space.
 fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
     let [p, q, r] = finest.corners(triangle);
