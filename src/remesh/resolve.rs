@@ -181,8 +181,8 @@ impl Resolver {
     /// Restores the edge bounds and resolves contacts around the `active` vertices and those pending since the last
     /// call; returns the changes made.
     ///
-    /// Other vertices are processed only if an edit or a contact reaches them. First, components crushed by the last move
-    /// are removed, and necks held in it are cut.
+    /// Other vertices are processed only if an edit or a contact reaches them. First, components crushed by the last
+    /// move are removed, and necks held in it are cut.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }

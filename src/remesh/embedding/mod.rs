@@ -10,8 +10,9 @@
 //! Two triangles intersect in one of three configurations, each tested where it can occur:
 //! - they share a corner: in the one-ring of a vertex;
 //! - a corner of one is adjacent to a corner of the other: across an edge;
-//! - otherwise two non-adjacent corners are near each other. If an edge of length `a` with end P meets a triangle with edges up to `b`,
-//!   and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two ends.
+//! - otherwise two non-adjacent corners are near each other. If an edge of length `a` with end P meets a triangle with
+//!   edges up to `b`, and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two
+//!   ends.
 
 mod broad_phase;
 mod certificates;

@@ -7,7 +7,8 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
-/// The work of an edit is counted once more for each such number of changed triangles; most edits change fewer.
+/// Number of changed triangles for which the work of an edit is counted twice, for double of it three times, and so on;
+/// most edits change fewer.
 const ORDINARY_PATCH: usize = 24;
 
 /// The work counted for an edit that is tested in one-rings only, in units of nearby vertices visited.
