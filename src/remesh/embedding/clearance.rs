@@ -80,8 +80,8 @@ pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     clearance
 }
 
-/// Returns the clearance of two triangles that share the edge from the origin to `edge`, with third corners `tips`: by
-/// it all vertices may move before the two can fold onto each other.
+/// Returns the clearance of two triangles that share the edge from the origin to `edge` and have the third corners
+/// `tips`: the displacement of all vertices below which the two cannot fold onto each other.
 fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
