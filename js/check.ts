@@ -14,7 +14,7 @@ function format(value: unknown): string {
   return String(value);
 }
 
-/** Inclusive bounds of a number. */
+/** Inclusive bounds of a number; a missing one does not limit it. */
 interface Bounds {
   min?: number;
   max?: number;
@@ -86,7 +86,7 @@ export function typedArray<T extends { readonly length: number }>(
   throw invalid(parameter, `the length must be a multiple of ${stride}, got ${value.length}`);
 }
 
-/** Whether a typed array is detached or out of bounds; its length is then 0, as if it were only empty. */
+/** Returns whether a typed array is detached or out of bounds. Its length is then 0, as if it were only empty. */
 function isDetached(array: { readonly length: number }): boolean {
   try {
     if (array.length === 0 && ArrayBuffer.isView(array)) (array as unknown as Uint8Array).at(0);
@@ -124,7 +124,10 @@ export function checkProperties<T extends object>(
   return value;
 }
 
-/** Copies an array; holes become `undefined`, so that `map` visits them, too. */
+/**
+ * Copies an array, or throws `invalid-argument` if it is none; holes become `undefined`, so that `map` visits them,
+ * too.
+ */
 export function denseCopy<T>(parameter: string, value: readonly T[]): readonly T[] {
   if (Array.isArray(value)) return Array.from(value);
   throw invalid(parameter, `must be an array, got ${format(value)}`);
@@ -132,7 +135,7 @@ export function denseCopy<T>(parameter: string, value: readonly T[]): readonly T
 
 /**
  * Returns a shallow copy of an options object, so that getters and proxies run their code here and not during a call
- * into the WebAssembly module.
+ * into the WebAssembly module; throws `invalid-argument` for anything else.
  */
 export function shallowCopy<T extends object>(parameter: string, value: T): T {
   if (value === null || typeof value !== 'object' || Array.isArray(value))

@@ -12,11 +12,14 @@ export interface Coverage {
   recall: number;
   /** Fraction of the surface's area within one voxel of the iso-surface, 0..1; 1 if there is no surface. */
   precision: number;
-  /** Connected regions of the iso-surface farther than one voxel from the surface, largest first. */
+  /**
+   * Connected regions of the iso-surface whose triangles are not completely within one voxel of the surface, largest
+   * first.
+   */
   uncovered: UncoveredRegion[];
 }
 
-/** A connected region of the iso-surface that the surface does not cover. */
+/** A connected region of the iso-surface that is farther than one voxel from the surface. */
 export interface UncoveredRegion {
   /** A point of the region near its middle, in world space. */
   position: Vec3;
@@ -30,7 +33,9 @@ export interface UncoveredRegion {
 export interface CoverageOptions {
   /** Aborts the measurement, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
-  /** Called with the fraction done, up to 1. If it throws, the measurement ends and rejects with that error. */
+  /**
+   * Called with the fraction of the work done, up to 1. If it throws, the measurement ends and rejects with that error.
+   */
   onProgress?: (share: number) => void;
 }
 

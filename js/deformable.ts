@@ -21,13 +21,19 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 export interface DeformableParams {
   /** Iso value, πI: intensity at the surface, in intensity units of the volume; default the middle of its range. */
   iso?: number;
-  /** Strength of the iso force, αI; negative where the object is brighter than `iso`. */
+  /**
+   * Strength of the iso force, αI, which moves the surface along its normal to the iso-surface; negative where the
+   * object is brighter than `iso`.
+   */
   isoForce?: number;
-  /** Strength of the gradient force's normal component, αg. */
+  /** Strength of the gradient force's normal component, αg; positive values pull towards bright ridges of the image. */
   gradientNormal?: number;
-  /** Strength of the gradient force's tangential component, βg. */
+  /**
+   * Strength of the gradient force's tangential component, βg; positive values pull vertices within the surface towards
+   * bright ridges of the image.
+   */
   gradientTangent?: number;
-  /** Upper bound of the gradient's magnitude; longer gradients are clamped to it. */
+  /** Length to which longer image gradients are clamped, in intensity ranges of the volume per voxel. */
   gradientBound?: number;
   /** Resistance to bending, αc. */
   rigidity?: number;
@@ -45,13 +51,19 @@ export interface DeformableParams {
    * 3.
    */
   integrator?: 'euler' | 'runge-kutta' | 'implicit';
-  /** Time step of one iteration, Δt. */
+  /** Time step, Δt, of one iteration of 'euler' and 'runge-kutta'; an iteration of 'implicit' takes 16 at once. */
   timeStep?: number;
   /** Largest displacement of a vertex in one iteration, as a fraction of δ. */
   maxMove?: number;
-  /** Mean kinetic energy along the normals below which a level has converged, ε. */
+  /**
+   * Mean kinetic energy of the vertices along the normals, ε, with speeds in δ per unit of time, below which a level has
+   * converged.
+   */
   energyTolerance?: number;
-  /** Whether the surface may split and merge. */
+  /**
+   * 'adaptive' (the default): edges are split, collapsed and flipped, and the surface may split and merge. 'fixed':
+   * only vertices move.
+   */
   topology?: 'adaptive' | 'fixed';
   /**
    * Local adaptation of the surface to the image, 0..1; default 1: walls and gaps visible in the image are kept,
@@ -83,14 +95,14 @@ export interface Attractor {
  *
  * - `'contour'`, for real data: the iso-surface of the coarsest level at `iso`, with its cavities, without components
  *   and cavities that enclose fewer voxels than `smallestPart`. If there is none, the model starts empty (components
- *   appear on finer levels, or with another `iso`), or from the enclosing surface if `seeding` is 'off' or `adaptivity`
- *   0.
- * - `'enclosing'`: a surface around everything brighter than `iso` at construction (around the whole volume if nothing
- *   is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and for objects without a usable
- *   iso-surface.
+ *   appear on finer levels, or with another `iso`), or from the enclosing surface if `seeding` is 'off', or if
+ *   `adaptivity` or `isoForce` is 0.
+ * - `'enclosing'`: a surface around everything brighter than `iso` on the coarsest level at construction (around the
+ *   whole volume if nothing is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and for
+ *   objects without a usable iso-surface.
  * - `{ bubbles }`: a grid of n × n × n spheres, which grow and merge.
  * - `{ seeds, radius }`: spheres around packed points in world space.
- * - `{ marchingCubes }`: the iso-surface of the volume itself at the given intensity.
+ * - `{ marchingCubes }`: the iso-surface of the coarsest level at the given intensity.
  * - A closed mesh without self-intersections, in world space; it is copied.
  */
 export type DeformableStart =
@@ -103,7 +115,7 @@ export type DeformableStart =
 
 /** Constructor options of a {@link DeformableModel}. */
 export interface DeformableOptions {
-  /** The image; it may be freed once the model is made. */
+  /** The volume that the model is fitted to; it may be freed once the model is made. */
   volume: Volume;
   /** Frame of a 4D volume; default 0. */
   frame?: number;
@@ -111,8 +123,8 @@ export interface DeformableOptions {
   start?: DeformableStart;
   /**
    * Number of pyramid levels above the volume itself. With 0 (the default) the surface works on the volume from the
-   * first iteration. Each level halves the resolution; the surface starts on the coarsest and is refined on each finer
-   * one.
+   * first iteration. The voxels of each level are √3 times larger than those of the next finer one; the surface starts
+   * on the coarsest level and is refined on each finer one.
    */
   levels?: number;
   /** Target edge length at the finest level, world units; default from the voxel size. */
@@ -171,8 +183,8 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. With anisotropic voxels, both
-   * bounds hold on average over all directions.
+   * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. It is √3 times larger on each
+   * coarser level. With anisotropic voxels, both bounds hold on average over all directions.
    */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());
@@ -184,7 +196,7 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Replaces all attractors: points placed by the user that pull the surface within their radius.
+   * Replaces all attractors.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the entry.
    */

@@ -1,20 +1,28 @@
 /** The kinds of failure that a {@link VesicleError} reports. */
 export type ErrorCode =
-  /** A parameter out of range, NaN, of the wrong length, missing or misspelled; the message names it. */
+  /**
+   * A parameter out of range, NaN, of the wrong length, missing or misspelled, or a call that is not allowed at the
+   * time; the message names it.
+   */
   | 'invalid-argument'
-  /** A truncated, inconsistent or unsupported file; the message names the format and the field. */
+  /** A truncated, inconsistent or unsupported file or saved state; the message names the format and the field. */
   | 'bad-file'
-  /** A mesh with boundary or non-manifold edges; a closed one is needed. */
+  /**
+   * A mesh with a boundary, non-manifold edges or vertices, or inconsistently oriented triangles; a closed one is
+   * needed.
+   */
   | 'not-closed'
-  /** A start mesh with self-intersections; an embedded one is needed. */
+  /** A mesh with self-intersections, given as initial surface or base; an embedded one is needed. */
   | 'self-intersecting'
   /** A linear system without a usable solution; the message names the likely cause. */
   | 'singular-system'
-  /** More memory needed than there is; the message says how much. */
+  /** More memory needed than there is, or more vertices than are allowed; the message says how much. */
   | 'too-large'
-  /** Work that was aborted. */
+  /**
+   * Work that `terminate()` of `vesicle/worker` ended. A run that its own signal aborts rejects with `signal.reason`.
+   */
   | 'aborted'
-  /** Use of an object after its `free()`. */
+  /** Use of an object after its `free()`, or after it was lost in a crash or with its worker. */
   | 'freed';
 
 /**

@@ -6,8 +6,8 @@ import { RawCameras, RawImplicit, RawPoints } from './vesicle.js';
 import { type Vec3, type Volume, wrapVolume } from './volume.js';
 
 /**
- * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. All lengths
- * except `cell` are in units of the normalised box, in which the longest side of the points' bounds is 2.
+ * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. The unit of
+ * length of all but `cell` is that of the normalised box, in which the longest side of the points' bounds is 2.
  */
 export interface ImplicitParams {
   /**
@@ -15,19 +15,20 @@ export interface ImplicitParams {
    * Gaussian exp(−r²/2σ²).
    */
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
-  /** First-order smoothness, δ: larger values give a tighter surface. */
+  /** First-order smoothness of the multi-order kernel, δ, per unit of length: larger values give a tighter surface. */
   delta?: number;
-  /** Third-order smoothness, τ: larger values give less detail. */
+  /** Third-order smoothness of the multi-order kernel, τ, a length: larger values give less detail. */
   tau?: number;
-  /** Width of the Gaussian, σ. */
+  /** Width of the Gaussian kernel, σ, a length. */
   sigma?: number;
   /**
-   * Regularisation λ of surface constraints; 0 interpolates. With more than 3,000 points it is multiplied by n/3,000.
+   * Regularisation λ of surface constraints: how much each may be missed; 0 interpolates. With more than 3,000 points
+   * it is multiplied by n/3,000.
    */
   lambdaSurface?: number;
-  /** Regularisation λ of exterior constraints. */
+  /** Regularisation λ of exterior constraints: how much each may be missed. */
   lambdaExterior?: number;
-  /** Relative residual at which the solver stops. */
+  /** Relative residual of the linear system at which the solver stops. */
   tolerance?: number;
   /** Edge of an extraction cell in the points' units; 0, the default, derives it from the points' spacing. */
   cell?: number;
@@ -35,7 +36,7 @@ export interface ImplicitParams {
   level?: 'zero' | 'mean';
 }
 
-/** A camera from which the points were reconstructed. */
+/** A camera from which the points were reconstructed, or with which the mesh is coloured. */
 export interface Camera {
   /**
    * Projection matrix, 3x4 world to pixel, row-major: (x s, y s, s) = P (p, 1). x to the right, y down, the centre of
@@ -68,7 +69,7 @@ export interface ImplicitOptions {
   cameras?: Camera[];
   /** Largest number of points used; more are reduced to a Poisson-disc subsample. 4 to 100,000, default 20,000. */
   maxPoints?: number;
-  /** Removes outliers: keeps the n largest connected clusters; default all. */
+  /** Removes outliers: keeps only the n largest connected clusters of points; default all. */
   keepComponents?: number;
   /** Parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
@@ -78,7 +79,7 @@ export interface ImplicitOptions {
 export interface PointEdits {
   /** Additional points near the surface, packed. */
   added?: Float32Array;
-  /** Points to leave out, by their index in the original points. */
+  /** Points to leave out, by their zero-based index in the original points. */
   removed?: Uint32Array;
   /** Additional points known to be outside, packed. */
   exterior?: Float32Array;
@@ -86,17 +87,17 @@ export interface PointEdits {
 
 /** Distances of the points from a surface, in the points' units, and its curvature. */
 export interface Fitness {
-  /** Mean distance of all the original points from the surface. */
+  /** Mean distance of the points, with edits, from the surface. */
   mean: number;
-  /** Root mean square distance. */
+  /** Root mean square distance of the points from the surface. */
   rms: number;
-  /** Maximum distance. */
+  /** Largest distance of a point from the surface. */
   max: number;
   /** Mean of |H| over the vertices, per unit of length of the points. */
   meanCurvature: number;
 }
 
-/** Figures of an {@link ImplicitSurface} that are not part of the {@link StepReport}. */
+/** Results of an {@link ImplicitSurface} that are not part of the {@link StepReport}. */
 interface Statistics {
   cell: number;
   spacing: number;
@@ -187,7 +188,7 @@ export class ImplicitSurface implements Stepper {
     return this.#statistics().duplicates;
   }
 
-  /** Number of spurious components of the last surface: those with no point near. */
+  /** Number of spurious components of the last surface: connected components with no point near. */
   get spuriousComponents(): number {
     return this.#statistics().spuriousComponents;
   }
@@ -270,8 +271,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Evaluates f at packed points: above 0 inside, 0 on the surface, below 0 outside. Direct summation: some 3 ns for
-   * each pair of a point and a constraint.
+   * Evaluates f minus its value at the surface (see `level`) at packed points: above 0 inside, 0 on the surface, below
+   * 0 outside. Direct summation: some 3 ns for each pair of a point and a constraint.
    *
    * @throws {@link VesicleError} `invalid-argument` before the system is solved.
    */
@@ -281,8 +282,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Evaluates ∇f at packed points; packed vectors, per unit of length of the points, pointing inwards. Throws as
-   * {@link ImplicitSurface.evaluate}.
+   * Evaluates ∇f at packed points, as packed vectors per unit of length of the points; on the surface they point
+   * inwards. Throws as {@link ImplicitSurface.evaluate}.
    */
   gradient(points: Float32Array): Float32Array {
     finite('points', points, 3);
@@ -306,14 +307,17 @@ export class ImplicitSurface implements Stepper {
     return this.#handle.use((raw) => raw.fitness() as Fitness);
   }
 
-  /** Returns the partial surface during extraction: open where the extraction continues; empty in other phases. */
+  /**
+   * Returns the new surface before it is complete: during extraction the part extracted so far, open where the
+   * extraction continues, and during colouring all of it; empty in other phases.
+   */
   preview(): Mesh {
     return wrapMesh(new Handle('Mesh', () => this.#handle.use((raw) => raw.preview())));
   }
 
   /**
-   * Samples f on a grid around the points and the surface, so that the deformable model can continue from it with iso
-   * 0.
+   * Samples f minus its value at the surface on a grid around the points and the surface, so that the deformable model
+   * can continue from it with iso 0.
    *
    * @throws {@link VesicleError} `invalid-argument` before the system is solved, or below 2 voxels along an axis;
    *   `too-large`.

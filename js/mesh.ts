@@ -53,36 +53,41 @@ export interface MeshInfo {
   components: number;
   /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
-  /** Genus, summed over components; closed orientable, so euler = 2 * components - 2 * genus. */
+  /** Genus, summed over components; valid for a closed, orientable mesh, where euler = 2 * components - 2 * genus. */
   genus: number;
   /** Surface area, world units squared. */
   area: number;
-  /** Enclosed volume, world units cubed. */
+  /** Enclosed volume, world units cubed; positive if triangles are counter-clockwise seen from outside. */
   volume: number;
-  /** Centroid of the enclosed solid. */
+  /** Centroid of the enclosed solid; that of the surface if the volume is negligible. */
   centroid: Vec3;
-  /** Second moments about the centroid of the enclosed solid, row-major 3x3. */
+  /**
+   * Second moments of the enclosed solid about its centroid c: ∫ (x − c)(x − c)ᵀ dV, row-major 3x3. Not the inertia
+   * tensor.
+   */
   inertia: number[];
-  /** Edge lengths, world units. */
+  /** Lengths of the shortest edge, of the mean and of the longest, world units. */
   edge: { min: number; mean: number; max: number };
-  /** Smallest angle of all triangles. */
+  /** Smallest angle of a triangle, degrees. */
   minAngleDegrees: number;
   bounds: { min: Vec3; max: Vec3 };
 }
 
 /** Result of {@link Mesh.check}; a valid mesh is closed, oriented and has all counts at 0. */
 export interface MeshReport {
-  /** Whether every edge has two triangles. */
+  /** Whether no edge has only one triangle; an edge with more than two is counted in `nonManifoldEdges`. */
   closed: boolean;
   /** Whether all neighbouring triangles have the same orientation. */
   oriented: boolean;
   /** Number of edges with more than two triangles. */
   nonManifoldEdges: number;
-  /** Number of vertices whose triangles form more than one fan. */
+  /** Number of vertices whose triangles do not form a single fan. */
   nonManifoldVertices: number;
-  /** Number of triangles with zero area. */
+  /** Number of triangles with equal or collinear corners, tested exactly. */
   degenerateTriangles: number;
-  /** Number of pairs of triangles that intersect, counted with exact predicates. */
+  /**
+   * Number of pairs of triangles that intersect beyond their common corners and edges, tested with exact predicates.
+   */
   selfIntersections: number;
 }
 
@@ -122,7 +127,7 @@ export interface SurfaceDistance {
   hausdorff: number;
 }
 
-/** A pass of {@link Mesh.restructure}. */
+/** A pass of {@link Mesh.restructure}, by its edit of edges. */
 export type RestructurePass = 'collapse' | 'split' | 'flip';
 
 const RESTRUCTURE_PASSES: readonly RestructurePass[] = ['collapse', 'split', 'flip'];
@@ -133,7 +138,7 @@ const TEXTURES: readonly TextureType[] = ['image/png', 'image/jpeg', 'image/webp
 
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
-/** Returns the handle of a mesh, for the other modules of the library. */
+/** Returns the handle of a mesh, for the other modules of the library; throws `invalid-argument` if it is no Mesh. */
 export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
 /**
  * Creates a mesh from a raw handle, for the other modules of the library. A live mesh belongs to its model, which frees
@@ -509,7 +514,7 @@ function checkTexture(texture: MeshTexture | undefined): void {
   typedArray('texture.bytes', bytes, Uint8Array);
 }
 
-/** Copies a texture into the module, which takes ownership. */
+/** Copies a texture into the WebAssembly module. The call that the raw texture is passed to takes ownership of it. */
 function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
   return texture && new RawTexture(texture.type, texture.bytes);
 }

@@ -24,22 +24,24 @@ export interface MultiresParams {
   edgeMin?: number;
   /** ε_max: longer edges are split; more than twice `edgeMin`. */
   edgeMax?: number;
-  /** Number of levels of the multi-level solver above the target resolution. */
+  /** Number of levels of the multi-level solver that are coarser than the target resolution. */
   levels?: number;
   /** q: factor by which edge bounds shrink from one level to the next finer one. */
   refineFactor?: number;
-  /** Umbrella iterations per level. */
+  /** Smoothing iterations with the umbrella operator per level. */
   smoothing?: number;
-  /** Applications of the operator D per step. */
+  /** Applications of the operator D, which evens out the map T, per step. */
   distribute?: number;
   /**
-   * Largest number of times that edges of the base are halved for the detail, where it is finer than the base, or
-   * stretched.
+   * Largest number of times that an edge of the base is halved for the detail, where the detail is finer than the base,
+   * or stretched. The base itself does not change.
    */
   supersample?: number;
-  /** Energy that the low-frequency surface minimises: membrane (area) or thin plate (bending). */
+  /**
+   * Energy that the low-frequency surface minimises between the ellipsoids: area (membrane) or bending (thin plate).
+   */
   energy?: 'membrane' | 'thin-plate';
-  /** Topology changes: whether thin necks are cut, and whether parts in contact are joined. */
+  /** Topology changes: none, only cuts of thin necks, or also joins of parts in contact. */
   topology?: 'never' | 'split' | 'split-and-join';
 }
 
@@ -48,8 +50,8 @@ export interface MultiresOptions {
   /** The detailed surface, closed; without it the model is a bare membrane (lava lamp). */
   detail?: Mesh;
   /**
-   * Low-frequency approximation of the detailed surface, closed and without self-intersections; by default made by
-   * smoothing and coarsening.
+   * Low-frequency approximation of the detailed surface, closed and without self-intersections; by default made from
+   * `detail` by smoothing and coarsening, or around the ellipsoids.
    */
   base?: Mesh;
   /** Initial control ellipsoids: at least one, of which one has to touch the base. */
@@ -58,7 +60,7 @@ export interface MultiresOptions {
   params?: MultiresParams;
 }
 
-/** Figures of a {@link MultiresolutionModel} that are not part of the {@link StepReport}. */
+/** Counts of a {@link MultiresolutionModel} that are not part of the {@link StepReport}. */
 interface Counts {
   bandCount: number;
   folded: number;
@@ -106,10 +108,7 @@ export class MultiresolutionModel implements Stepper {
     this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true));
   }
 
-  /**
-   * The surface with its detail, and with texture coordinates if the finest surface has them: the same live object
-   * always.
-   */
+  /** The surface with its detail, and with texture coordinates if `detail` has them: the same live object always. */
   get mesh(): Mesh {
     return this.#meshes[0] as Mesh;
   }
@@ -133,8 +132,8 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Current ellipsoids, between their previous positions and their targets; a copy. Removed ones that are still shrinking
-   * come last.
+   * Current ellipsoids, between their previous positions and their targets; a copy. Removed ones that are still
+   * shrinking come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
@@ -150,13 +149,14 @@ export class MultiresolutionModel implements Stepper {
     return this.#counts().bandCount;
   }
 
-  /** Number of triangles of the base surface whose image under T is flipped. */
+  /** Number of triangles of the base surface whose image under T is flipped or has no area. */
   get folded(): number {
     return this.#counts().folded;
   }
 
   /**
-   * Number of vertices of the mesh whose normal on the base did not hit the detail; the closest point is used instead.
+   * Number of vertices of the mesh whose normal on the base did not hit the detailed surface; the closest point is used
+   * instead.
    */
   get unmatchedVertices(): number {
     return this.#counts().unmatchedVertices;
@@ -173,8 +173,8 @@ export class MultiresolutionModel implements Stepper {
 
   /**
    * Sets new targets for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
-   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside the
-   * surface; those omitted shrink and vanish.
+   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside
+   * the surface; those omitted shrink and vanish.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid; nothing has changed then.
    */

@@ -16,12 +16,12 @@ export interface ParamSpec {
   default: unknown;
   min?: number;
   max?: number;
-  /** Step of a slider. */
+  /** Suggested step of a slider. */
   step?: number;
-  /** Scale of a slider. */
+  /** How values are spread over a slider. */
   scale?: 'linear' | 'log';
   unit?: string;
-  /** Accepted values, for type 'choice'. */
+  /** Accepted words, for type 'choice'; if `min` is set, numbers are accepted, too. */
   choices?: string[];
 }
 

@@ -69,7 +69,10 @@ function restart(): void {
   crash = undefined;
 }
 
-/** Runs a call into the WebAssembly module and translates its errors into those of the library. */
+/**
+ * Calls `work`, which calls into the WebAssembly module, and translates the errors of the module into those of the
+ * library.
+ */
 export function call<T>(work: () => T): T {
   if (crash) throw crash;
   if (!instance) throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
@@ -107,7 +110,10 @@ export class Handle<Raw extends { free(): void }> {
     this.#raw = call(make);
   }
 
-  /** Calls `work` with the raw object. Throws `freed` if it was freed, or lost in a crash. */
+  /**
+   * Calls `work` with the raw object and returns its result. Throws `freed` if the object was freed, or lost in a
+   * crash.
+   */
   use<T>(work: (raw: Raw) => T): T {
     const raw = this.#raw;
     if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and can no longer be used`);
@@ -117,7 +123,7 @@ export class Handle<Raw extends { free(): void }> {
     return call(() => work(raw));
   }
 
-  /** Frees the object's memory; further calls have no effect. */
+  /** Frees the object's memory in the WebAssembly module; further calls have no effect. */
   free(): void {
     const raw = this.#raw;
     this.#raw = undefined;

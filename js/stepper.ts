@@ -7,13 +7,17 @@ export interface StepReport {
   iteration: number;
   /** Whether the method has finished. */
   done: boolean;
-  /** Current stage of the method: 'level 2', 'solve', 'extract', 'frame 7' ... */
+  /** Current stage of the method: 'level 2', 'solve', 'extract', 'tracking surface, frame 7 of 20' ... */
   phase: string;
   /** Progress from 0 to 1 if it can be known, else NaN. */
   progress: number;
-  /** Convergence measure of the method. */
+  /**
+   * Convergence measure: mean kinetic energy (deformable model), relative residual of the linear system (implicit
+   * surface), root mean square displacement in target edges (multiresolution model), or mean final correction of the
+   * newest frame, world units (tracker). May be NaN before there is one.
+   */
   residual: number;
-  /** Value that the residual is compared with. */
+  /** Value below which `residual` counts as converged. */
   tolerance: number;
   vertices: number;
   triangles: number;
@@ -21,8 +25,9 @@ export interface StepReport {
   /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
   /**
-   * Counts of mesh edits since the last report. `axial`: joins (or splits) by contact; `annular`: necks cut; `seeds`:
-   * components added where the image shows something that the surface lacks.
+   * Numbers of mesh edits since the last report: edges split (`creations`), collapsed (`deletions`) and flipped
+   * (`inversions`), contacts joined (`axial`), necks cut (`annular`), components removed (`vanished`), and components
+   * added where the image shows something that the surface lacks (`seeds`).
    */
   events: {
     creations: number;
@@ -77,7 +82,10 @@ const DEFAULT_BUDGET_MS = 12;
 
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
-/** Yields to the event loop by posting a message to itself, which is faster than timers, which browsers throttle. */
+/**
+ * Yields to the event loop by posting a message to itself, which is faster than a timer, since browsers throttle
+ * timers.
+ */
 class EventLoopYield {
   readonly #channel = new MessageChannel();
 
@@ -94,7 +102,10 @@ class EventLoopYield {
   }
 }
 
-/** Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason`. */
+/**
+ * Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason` when
+ * the signal aborts.
+ */
 export async function runInSlices<T extends object>(
   work: () => T | undefined,
   signal: AbortSignal | undefined,
@@ -126,7 +137,10 @@ export class Runner {
     if (this.#running) throw invalid(what, 'not allowed during a run of this model: abort it, or wait for its end');
   }
 
-  /** Steps until the model is done, the run is aborted, or `maxIterations` is reached. See {@link RunOptions}. */
+  /**
+   * Steps until the model is done, the run is aborted, or `maxIterations` is reached; returns the last report. See
+   * {@link RunOptions}.
+   */
   async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
     const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
     signal?.throwIfAborted();

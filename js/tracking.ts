@@ -8,30 +8,36 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {
   /**
-   * Edge threshold τ: the smallest difference between the two cluster means that counts as a boundary, intensity units;
-   * by default, or if 0, above the noise.
+   * Edge threshold τ: the means of the two clusters of a window must differ by more than this for a boundary, intensity
+   * units; by default, or if 0, derived from the noise and the intensity range.
    */
   threshold?: number;
   /** k: the window for clustering is 2k + 1 voxels wide along each axis. */
   window?: number;
   /** Number of frames before and after that a window covers; 0 treats each frame separately. */
   windowFrames?: number;
-  /** Support of the weight θ, world units: 2h. */
+  /**
+   * Radius around a position beyond which boundary points have no weight θ in the plane fitted there, world units: 2h;
+   * by default, or if 0, derived from the voxel size.
+   */
   radius?: number;
-  /** Time scale c, world units per frame. */
+  /** Time scale c: the distance that one frame counts as, world units; by default, or if 0, derived from the radius. */
   timeScale?: number;
   /** Damping β: each step of a projection is scaled by this factor relative to the one before. */
   damping?: number;
-  /** c_min: shorter edges are collapsed, in units of the first frame's mean edge. */
+  /** c_min: edges shorter than this are collapsed, in units of the first frame's mean edge. */
   edgeMin?: number;
-  /** c_max: longer edges are split, in the same units; more than twice `edgeMin`. */
+  /** c_max: edges longer than this are split, in units of the first frame's mean edge; more than twice `edgeMin`. */
   edgeMax?: number;
   /**
    * Whether each frame starts from a prediction by the surface's motion in the one before; else from the previous
    * surface.
    */
   prediction?: boolean;
-  /** Whether the sequence is periodic: the first frame follows the last. */
+  /**
+   * Whether the sequence is periodic: the first frame follows the last. The last step then tracks the surface on into
+   * the first frame, for {@link SurfaceTracker.cycleClosureError}.
+   */
   cyclic?: boolean;
 }
 
@@ -41,11 +47,11 @@ export interface TrackingOptions {
   volume: Volume;
   /**
    * Region to process, corners in world space; default the whole volume. Bright objects that extend beyond it are
-   * closed at its faces. If the volume's axes differ from those of the world, the bounding box of this one along the
-   * volume's axes is used.
+   * closed at its faces. If the volume's axes are rotated against those of the world, the region is the bounding box of
+   * `box` along the volume's axes.
    */
   box?: { min: Vec3; max: Vec3 };
-  /** The same region by its first and last voxel; instead of `box`. */
+  /** Region to process as in `box`, but given by its first and last voxel along x, y and z, both inclusive. */
   voxels?: { min: Vec3; max: Vec3 };
   /**
    * Component to track: the largest of the first frame (the default), or the one that encloses a point in world space,
@@ -68,20 +74,21 @@ export interface FrameStatistics {
   /** Surface area, world units squared. */
   area: number;
   triangles: number;
-  /** Number of triangles that face away from all three neighbours. */
+  /** Number of triangles that face away from the sum of their three neighbours. */
   folded: number;
   /**
-   * Number of rejected projections, which did not converge or moved too far; these vertices follow their neighbours.
+   * Number of rejected projections, which found too few boundary points or moved too far; these vertices follow their
+   * neighbours.
    */
   rejected: number;
-  /** Number of displacements reduced to avoid self-intersections. */
+  /** Number of vertex displacements reduced to avoid self-intersections. */
   heldMoves: number;
   /**
    * Number of vertices without boundary points: collapsed where a narrow gap has closed, grown where one has opened,
    * else smoothed.
    */
   withoutBoundary: number;
-  /** Mean number of projection steps of a vertex, onto space-time and onto the frame. */
+  /** Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together. */
   steps: number;
   /** Mean displacement of the vertices by the last projection, world units. */
   meanFinalCorrection: number;
@@ -95,7 +102,7 @@ interface Statistics {
 
 const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
 
-/** Default duration of a frame in an animation, seconds, for volumes that do not define it. */
+/** Duration of a frame in {@link SurfaceTracker.toGlb}, seconds, for volumes that do not define it. */
 const FRAME_SECONDS = 0.1;
 
 /**
@@ -144,7 +151,7 @@ export class SurfaceTracker implements Stepper {
     return this.#mesh;
   }
 
-  /** Index of the frame shown by {@link SurfaceTracker.mesh}, from 0. */
+  /** Index of the frame shown by {@link SurfaceTracker.mesh}, from 0; also 0 before the first frame is done. */
   get frame(): number {
     return this.#handle.use((raw) => raw.frame());
   }
@@ -231,8 +238,8 @@ export class SurfaceTracker implements Stepper {
 
   /**
    * Returns the boundary votes as weighted space-time points, five numbers each: x, y, z in world space, t in frames,
-   * and the weight w, the fraction of windows that separate the two voxels of a face. Faces between two frames have t
-   * half a frame later.
+   * and the weight w, the fraction of windows that separate the two voxels of a face. A face between a voxel in this
+   * frame and the same voxel in the next has t half a frame later.
    *
    * @param frame - Default the newest with a boundary; a frame whose boundary is not found yet has no points.
    * @throws {@link VesicleError} `invalid-argument`: no such frame.

@@ -44,7 +44,7 @@ export interface VolumeInit {
   origin?: Vec3;
   /** Slope of intensity = stored value * slope + intercept. Default 1; not 0. */
   slope?: number;
-  /** Intercept, see `slope`. Default 0. */
+  /** Intercept of intensity = stored value * slope + intercept. Default 0. */
   intercept?: number;
   /** Seconds from one frame to the next; 4D only. */
   frameSeconds?: number;
@@ -58,9 +58,11 @@ const ELEMENTS = [
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
 ];
 
-/** Returns the handle of a volume, for the other modules of the library. */
+/**
+ * Returns the handle of a volume, for the other modules of the library; throws `invalid-argument` if it is no Volume.
+ */
 export let volumeHandle: (parameter: string, volume: Volume) => Handle<RawVolume>;
-/** Creates a volume from a raw one, for the other modules of the library. */
+/** Creates a volume from the raw one that `make` returns, for the other modules of the library. */
 export let wrapVolume: (make: () => RawVolume) => Volume;
 
 /**
@@ -92,7 +94,8 @@ export class Volume {
 
   /**
    * Parses a volume file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage (`.mha`,
-   * or `.mhd` and data), detected from the bytes. gzip is handled.
+   * or `.mhd` and data), detected from the bytes. NIfTI files may be gzipped as a whole, the voxels of NRRD and
+   * MetaImage compressed inside the file.
    *
    * @param options - `data`: the payload of a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
@@ -122,7 +125,7 @@ export class Volume {
     });
   }
 
-  /** Encodes the volume as a NIfTI-1 file. */
+  /** Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767. */
   toNifti(): Uint8Array {
     return this.#handle.use((raw) => raw.toNifti());
   }
@@ -137,7 +140,7 @@ export class Volume {
     return this.#handle.use((raw) => raw.frames());
   }
 
-  /** Seconds from one frame to the next; 0 if undefined. */
+  /** Seconds from one frame to the next; 0 if they are not known. */
   get frameSeconds(): number {
     return this.#handle.use((raw) => raw.frameSeconds());
   }
@@ -157,7 +160,7 @@ export class Volume {
     return this.#handle.use((raw) => raw.space() as Space);
   }
 
-  /** Smallest and largest intensity, after slope and intercept. */
+  /** Smallest and largest intensity of all frames, after slope and intercept. */
   get range(): [number, number] {
     const [low, high] = this.#handle.use((raw) => raw.range()) as unknown as [number, number];
     return [low, high];
@@ -165,9 +168,9 @@ export class Volume {
 
   /**
    * Returns the intensity histogram of one frame: the number of voxels in each of `bins` equal parts of
-   * {@link Volume.range}.
+   * {@link Volume.range}. Voxels that are not finite are not counted.
    *
-   * @throws {@link VesicleError} `invalid-argument`: no bins, or no such frame.
+   * @throws {@link VesicleError} `invalid-argument`: `bins` not from 1 to 65,536, or no such frame.
    */
   histogram(bins: number, frame = 0): Uint32Array {
     integer('bins', bins, { min: 1 });
@@ -187,7 +190,8 @@ export class Volume {
   }
 
   /**
-   * Returns the intensities of one slice, row-major: for axis 0 (sagittal) rows of y, for 1 and 2 rows of x.
+   * Returns the intensities of the slice at `index` along `axis`, row-major: for axis 0 (sagittal) rows of y, for 1 and
+   * 2 rows of x.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such axis, slice or frame.
    */

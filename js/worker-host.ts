@@ -46,10 +46,12 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
-/** Abort reason of tasks aborted by the page; the page knows the real reason. */
+/**
+ * Abort reason of tasks that the page aborts, since the reason itself is not sent; the page rejects with that reason.
+ */
 const ABORTED = new VesicleError('aborted', 'the run was aborted');
 
-/** Handles the page's requests in order; runs continue between them. */
+/** Handles the page's requests in order, also between the slices of a run in progress. */
 class Host {
   readonly #post: Post;
   readonly #objects = new Map<number, Entry>();

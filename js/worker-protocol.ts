@@ -10,15 +10,15 @@ export interface Reference {
   /** Id of the object: above 0 if assigned by the page, below 0 if assigned by the worker. */
   readonly vesicle: number;
   readonly class: ClassName;
-  /** Name of the property that holds the live mesh. */
+  /** In a reference to a live mesh, the name of the model's property that holds it. */
   readonly part?: string;
 }
 
-/** A task that the page posts to the worker and that has an answer; without its id. */
+/** A task that the page posts to the worker and that has an answer. `Request` adds its id. */
 export type Task =
   | { type: 'init'; module: BufferSource | WebAssembly.Module | string | undefined }
   | { type: 'make'; as: Reference; args: unknown[] }
-  /** Call on an object, on a class, or of a free function. */
+  /** Call of the method or property `name` of an object or class, or of a free function if `on` is undefined. */
   | { type: 'call'; on: Reference | ClassName | undefined; name: string; args: unknown[]; reports?: boolean };
 
 /** A message from the page to the worker. */
@@ -30,7 +30,7 @@ export type Reply =
   | { type: 'error'; id: number; failure: Failure }
   | { type: 'report'; id: number; report: Report };
 
-/** Content of a report: that of a step, or the fraction done of a measurement. */
+/** Content of a report: that of a step of a run, or the fraction done of a coverage measurement. */
 export type Report = StepReport | number;
 
 /** Methods that the page can abort, with the name of the listener option that receives their reports. */
@@ -41,7 +41,7 @@ export type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
   | { kind: 'crash'; message: string; cause: Error | undefined }
   | { kind: 'aborted' }
-  /** Structured clones lose the name of an error that is not one of JavaScript's own. */
+  /** Any other error, with its name, which structured cloning loses unless the error is one of JavaScript's own. */
   | { kind: 'other'; name: string; error: Error };
 
 type Kind<T> = T extends (...args: never) => unknown
@@ -62,7 +62,10 @@ const STEPPER = {
   restore: 'method',
 } as const;
 
-/** Members of the objects of each class that may be accessed. Compilation fails if a name is missing or superfluous. */
+/**
+ * Kind of each member that may be accessed, by class: method, value or live mesh. Compilation fails if a name is
+ * missing or superfluous.
+ */
 export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype']> } = {
   Volume: {
     dims: 'value',
@@ -177,7 +180,7 @@ export const FUNCTIONS: Names<FunctionName> = {
   animationGlb: 'method',
 };
 
-/** Returns the entry of `name` in a table. Throws `invalid-argument` unless it is an own property. */
+/** Returns the entry `name` of one of the tables. Throws `invalid-argument` if it has no own entry of that name. */
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
   if (found !== undefined) return found;

@@ -40,7 +40,7 @@ class RemoteState {
   constructor(
     readonly reference: Reference,
     readonly session: Session | undefined,
-    /** Why there is no object, if not even the request to create it could be posted. */
+    /** The error that kept the request for the object's creation from being posted; undefined if it was posted. */
     readonly failed?: unknown,
     /** For a live mesh: its model, which must not be collected while the mesh is used. */
     readonly owner?: Remote,
@@ -70,7 +70,7 @@ class Remote {
     if (!state.owner) finalizers.register(this, state, state);
   }
 
-  /** Returns the proxy of a live mesh, always the same. */
+  /** Returns the proxy of the live mesh in property `name`, the same object at every call. */
   part(name: string): Remote {
     const { reference, session, failed } = this.#state;
     const made = () =>
@@ -139,13 +139,16 @@ function unsendable(path: string, value: object): VesicleError {
   return invalid(path, `a ${name} cannot be sent to the worker; ${accepted}`);
 }
 
-/** Returns an array to be transferred with its buffer; throws `invalid-argument` for shared memory. */
+/**
+ * Returns an array to be transferred with its buffer, or a copy if it is empty; throws `invalid-argument` for shared
+ * memory.
+ */
 function transferable(path: string, array: ArrayBufferView): ArrayBufferView {
   if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'shared memory cannot be transferred');
   return array.byteLength > 0 ? array : copyOfView(path, array);
 }
 
-/** Copies the visible part of an array's buffer. */
+/** Copies a typed array, without the rest of its buffer; throws `invalid-argument` if it was already transferred. */
 function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
   try {
     // Works for all typed arrays, and copies also where a subclass's slice returns a view.
@@ -245,7 +248,7 @@ async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
   return counts;
 }
 
-/** Requests the creation of an object; an error is kept and thrown by every later use of the object. */
+/** Requests the creation of an object of a class; an error is kept and thrown by every later use of the object. */
 function make(name: ClassName, args: readonly unknown[]): { state: RemoteState; created: Promise<unknown> } {
   try {
     const session = currentSession();
@@ -290,7 +293,7 @@ function memberOf(name: string, kind: string): PropertyDescriptor {
   return { value: asMethod(call) };
 }
 
-/** Turns a function of the proxy into a method or getter. */
+/** Returns a function to be used as method or getter, which calls `work` with its object and its arguments. */
 function asMethod<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remote, ...args: unknown[]) => T {
   return function (this: Remote, ...args) {
     return work(this, args);
@@ -303,7 +306,10 @@ function define(target: object, name: string, what: PropertyDescriptor): void {
   Object.defineProperty(target, name, { configurable: true, enumerable: false, ...writable, ...what });
 }
 
-/** Suppresses the unhandled rejection: the failure is reported by every use of the object. */
+/**
+ * Keeps a failed creation from being reported as unhandled rejection: every use of the object reports it. Returns the
+ * object's state.
+ */
 function ignoreRejection({ state, created }: ReturnType<typeof make>): RemoteState {
   created.catch(() => undefined);
   return state;
@@ -322,7 +328,7 @@ const classes = Object.fromEntries(
   Object.keys(MEMBERS).map((name) => [name, remoteClass(name as ClassName)]),
 ) as Record<ClassName, Class>;
 
-/** Proxy classes for the classes of the library. */
+/** Proxy classes for the classes of the library, by name. */
 export const remoteClasses = classes as unknown as { readonly [N in ClassName]: RemoteClass<N> };
 
 /** Returns the proxy of a free function of the library. */

@@ -15,7 +15,7 @@ interface PendingRequest {
   resolve: (value: unknown) => void;
   reject: (error: unknown) => void;
   onReport: ((report: Report) => void) | undefined;
-  /** The object of the call, kept from garbage collection until the answer arrives. */
+  /** The proxy of the object of the call, kept from garbage collection until the answer arrives. */
   target: unknown;
 }
 
@@ -71,12 +71,12 @@ export class Session {
     return { id, answer };
   }
 
-  /** Aborts a run or a measurement, whose promise then rejects. */
+  /** Aborts the run or the measurement requested under `id`, whose promise then rejects. */
   abort(id: number): void {
     if (!this.#end) this.#send({ type: 'abort', id }, []);
   }
 
-  /** Frees an object in the worker. */
+  /** Frees the object with the id `object` in the worker. */
   free(object: number): void {
     if (!this.#end) this.#send({ type: 'free', object }, []);
   }

@@ -63,7 +63,10 @@ type SwapRemotes<T> = T extends LibraryObject
       ? { [K in keyof T]: SwapRemotes<T[K]> }
       : T;
 
-/** A type with remote objects in place of the library's. A type that contains none of them keeps its name. */
+/**
+ * The type T with remote objects in place of the library's. A type that contains none of them is T itself, so that it
+ * keeps its name.
+ */
 export type WithRemotes<T> = [T, SwapRemotes<T>] extends [SwapRemotes<T>, T] ? T : SwapRemotes<T>;
 
 type Arguments<A extends unknown[]> = { [K in keyof A]: WithRemotes<A[K]> };

@@ -2,7 +2,8 @@
 
 use vesicle::math::DVec3;
 
-/// A source of numbers read from fuzzer input; once it is used up, from a generator seeded with it.
+/// A source of numbers for random scenes: reads the fuzzer's input and, once that is used up, a generator seeded with
+/// the whole input.
 pub struct Choices<'a> {
     left: &'a [u8],
     state: u64,

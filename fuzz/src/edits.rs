@@ -9,11 +9,11 @@ use vesicle::mesh::{
 use vesicle::remesh::{EdgeBounds, Unchecked, decimate, remesh, restructure};
 use vesicle::spatial::{cross_section, surface_distance};
 
-/// Number of vertices beyond which no more edits are made.
+/// Number of vertices beyond which [`edits`] makes no more edits.
 const MAX_VERTICES: usize = 200;
 
-/// Makes random edits: each is rejected and changes nothing, or succeeds and leaves a valid mesh; recorded ones may be
-/// rolled back.
+/// Makes up to 60 random edits of a random mesh. After a failed edit, and after one in four successful ones, the mesh
+/// is rolled back and must equal the one before. It must be valid after each.
 pub fn edits(data: &[u8]) {
     let bytes = &mut Choices::new(data);
     let Ok(mut mesh) = Mesh::from_triangles(&shape(bytes)) else { return };
@@ -34,7 +34,7 @@ pub fn edits(data: &[u8]) {
     }
 }
 
-/// Makes one random edit.
+/// Makes one random edit of the mesh; an error if that edit is impossible.
 fn edit(mesh: &mut Mesh, bytes: &mut Choices) -> Result<(), EditError> {
     let live: Vec<_> = mesh.vertices().collect();
     let u = live[bytes.below(live.len())];
@@ -59,7 +59,8 @@ fn edit(mesh: &mut Mesh, bytes: &mut Choices) -> Result<(), EditError> {
     }
 }
 
-/// Decimates, remeshes and restructures a random mesh: embedded meshes stay embedded, and measures are finite.
+/// Decimates, remeshes or restructures a random mesh one to three times: it stays valid and keeps χ, no
+/// self-intersections appear in a mesh without any, and its measures are finite.
 pub fn remeshing(data: &[u8]) {
     let bytes = &mut Choices::new(data);
     let given = shape(bytes);
@@ -76,7 +77,8 @@ pub fn remeshing(data: &[u8]) {
     }
 }
 
-/// Makes one random pass over the mesh.
+/// Decimates the mesh, remeshes it, or restructures a copy, with random parameters; `edge` is the longest edge at the
+/// start.
 fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Choices) {
     let min = edge * bytes.within(0.2, 1.5) as f32;
     let bounds = EdgeBounds { min, max: min * bytes.within(1.9, 5.0) as f32 };
@@ -93,8 +95,8 @@ fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Choices) {
     }
 }
 
-/// Asserts that measures, curvatures, geodesic distances, cross-sections and distances of a mesh are finite and
-/// complete.
+/// Asserts that volume, area and a cross-section of a mesh are finite, that curvature and geodesic distances have one
+/// value per vertex, and that the distance of the mesh from itself can be computed.
 pub fn assert_measurable(mesh: &TriangleMesh) {
     let found = measure(mesh);
     assert!(found.volume.is_finite() && found.area.is_finite());

@@ -10,7 +10,7 @@ pub mod states;
 pub mod steppers;
 pub mod volumes;
 
-/// A fuzz target.
+/// A fuzz target: a function that the fuzzer and `tests/fuzz_corpus.rs` call with bytes, and its limits.
 pub struct Target {
     /// Name of the target, of its program and of its folder of seeds.
     pub name: &'static str,
@@ -18,16 +18,16 @@ pub struct Target {
     pub run: fn(&[u8]),
     /// Limit of the memory in use at any time, in bytes, whatever sizes the input claims.
     pub memory_limit: usize,
-    /// Number of mutated seeds that the ordinary test runs, which takes a second or so.
+    /// Number of mutated seeds on which `tests/fuzz_corpus.rs` runs the target, which takes a second or so.
     pub mutations: usize,
 }
 
-/// Returns the target of a file reader.
+/// Returns the fuzz target of a file reader, which may use 16 MiB.
 const fn reader(name: &'static str, run: fn(&[u8])) -> Target {
     Target { name, run, memory_limit: 16 << 20, mutations: 20_000 }
 }
 
-/// Returns the target of a saved state or a scene, which is slower and needs more memory for solvers.
+/// Returns the fuzz target of a saved state, a method or mesh edits, which is slower and may use 256 MiB.
 const fn method(name: &'static str, run: fn(&[u8]), mutations: usize) -> Target {
     Target { name, run, memory_limit: 256 << 20, mutations }
 }

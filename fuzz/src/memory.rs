@@ -40,18 +40,19 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// Counts bytes that this thread allocates.
+/// Adds `bytes` to the count of memory in use by this thread, and updates the peak.
 fn allocated(bytes: usize) {
     NOW.set(NOW.get().saturating_add(bytes));
     PEAK.set(PEAK.get().max(NOW.get()));
 }
 
-/// Counts bytes that are freed. Some may have been allocated before counting began, or by another thread.
+/// Subtracts freed bytes from the count. Some may have been allocated before counting began, or by another thread, so
+/// the count stops at 0.
 fn freed(bytes: usize) {
     NOW.set(NOW.get().saturating_sub(bytes));
 }
 
-/// Returns the largest number of bytes that this thread had allocated at any time while `work` ran.
+/// Returns the largest number of bytes that this thread had in use at any time during `work`, from 0 at its start.
 pub fn peak_of(work: impl FnOnce()) -> usize {
     NOW.set(0);
     PEAK.set(0);

@@ -6,7 +6,7 @@ use vesicle::io::{MeshFormat, parse_mesh, parse_points, parse_textured_mesh, wri
 use vesicle::mesh::{Mesh, Texture, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::decimate;
 
-/// Largest number of triangles for which a mesh is checked in full.
+/// Largest number of triangles of a mesh that [`check`] also measures, edits and writes.
 const FULL_CHECK_LIMIT: usize = 60;
 
 /// Reads a whole file as a mesh and as points; the seeds are PLY files.
@@ -71,12 +71,12 @@ fn use_points(data: &[u8]) {
     }
 }
 
-/// Asserts that an error message is short, whatever the file holds.
+/// Asserts that an error message has fewer than 2000 bytes, whatever the file contains.
 fn is_short(message: &str) {
     assert!(message.len() < 2000, "a message of {} bytes", message.len());
 }
 
-/// Reads a mesh, also with a texture, and checks it.
+/// Reads a file as a mesh, and again with a texture if its length is a multiple of 4; checks each mesh.
 fn use_mesh(data: &[u8]) {
     match parse_mesh(data) {
         Ok(mesh) => check(&mesh, data.len()),
@@ -91,7 +91,8 @@ fn use_mesh(data: &[u8]) {
     }
 }
 
-/// Asserts that a mesh that was read is valid, and that it can be measured, edited and written.
+/// Asserts that a mesh that was read is valid and, if small, that it can be measured, edited and written; `choice`
+/// selects the format.
 fn check(mesh: &TriangleMesh, choice: usize) {
     assert!(mesh.validate().is_ok() && !mesh.triangles.is_empty());
     if mesh.triangles.len() > FULL_CHECK_LIMIT {
@@ -111,7 +112,8 @@ fn check(mesh: &TriangleMesh, choice: usize) {
     write(mesh, choice);
 }
 
-/// Writes the mesh in the format number `choice` or as an animation, and reads it again.
+/// Writes the mesh in format number `choice` mod 7, or as an animation for number 6, and reads it again, except in VTP
+/// and MZ3.
 fn write(mesh: &TriangleMesh, choice: usize) {
     let Some(&format) = MeshFormat::ALL.get(choice % 7) else { return animate(mesh) };
     let file = write_mesh(mesh, format).unwrap();

@@ -9,10 +9,11 @@ use vesicle::methods::implicit::ImplicitSurface;
 use vesicle::methods::multires::MultiresolutionModel;
 use vesicle::methods::tracking::SurfaceTracker;
 
-/// Size of signature and checksum in bytes.
+/// Size of signature and checksum at the start of a saved state, in bytes.
 const HEADER: usize = 16;
 
-/// Returns a state with a valid checksum: that of `saved` up to the number that identifies the input, then `contents`.
+/// Returns a saved state with a valid checksum: the signature and the fingerprint of the input from `saved`, followed
+/// by `contents`.
 pub fn with_checksum(saved: &[u8], contents: &[u8]) -> Vec<u8> {
     let body = [&saved[HEADER..contents_offset(saved)], contents].concat();
     let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
@@ -20,14 +21,15 @@ pub fn with_checksum(saved: &[u8], contents: &[u8]) -> Vec<u8> {
     [&saved[..8], &sum.to_le_bytes(), &body].concat()
 }
 
-/// Returns the offset of the contents, after the number that identifies the input; its last byte is the first below
-/// 128.
+/// Returns the offset of the contents in a saved state, in bytes: after the header and the fingerprint of the input, an
+/// integer of variable length whose last byte is the first below 128.
 pub fn contents_offset(saved: &[u8]) -> usize {
     let number = &saved[HEADER..];
     HEADER + 1 + number.iter().position(|&byte| byte < 0x80).unwrap_or(0)
 }
 
-/// Defines a function that returns the state of a small fixed model after three steps, and the model at its start.
+/// Defines a function that returns the saved state of a small fixed model after three steps, and that model before
+/// them.
 macro_rules! scene {
     ($name:ident, $model:ty, $make:expr) => {
         fn $name() -> (&'static [u8], $model) {
@@ -43,8 +45,9 @@ macro_rules! scene {
     };
 }
 
-/// Defines a target that restores a changed state. If the state is accepted, saving returns it unchanged, and a few
-/// steps are made.
+/// Defines a target that restores a state with changed contents. If it is rejected, the unchanged state can still be
+/// restored and saved; if it is accepted, the model's own state can be, and the meshes are valid after each of two
+/// steps.
 macro_rules! target {
     ($name:ident, $saved:ident, $scene:ident, $meshes:expr) => {
         pub fn $name(data: &[u8]) {

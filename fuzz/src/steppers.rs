@@ -65,7 +65,7 @@ fn volume(bytes: &mut Choices, dims: [usize; 4]) -> Volume {
     Volume::new(init).unwrap_or_else(|_| flat())
 }
 
-/// Returns a constant volume, used if the random one has no finite voxels.
+/// Returns a constant volume, used if the random one is rejected, as without finite voxels.
 fn flat() -> Volume {
     let voxels = Voxels::U8(vec![1; 27]);
     let affine = DAffine3::IDENTITY;
@@ -113,14 +113,15 @@ pub fn deformable(data: &[u8]) {
     }
 }
 
-/// Asserts that coverage consists of fractions and finite positions.
+/// Asserts that recall and precision of the coverage are fractions, and that uncovered regions have a finite position
+/// and a positive area.
 fn assert_covers(model: &DeformableModel) {
     let Ok(coverage) = model.coverage() else { return };
     assert!([coverage.recall, coverage.precision].iter().all(|share| (0.0..=1.0 + 1e-9).contains(share)));
     assert!(coverage.uncovered.iter().all(|part| part.position.is_finite() && part.area > 0.0));
 }
 
-/// Restores the model from its own saved state.
+/// Restores the model from its own saved state, and asserts that saving it again gives the same bytes.
 fn restored(model: &mut DeformableModel) {
     let saved = model.save();
     model.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
@@ -205,7 +206,8 @@ fn assert_healthy(mesh: &TriangleMesh) {
     assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));
 }
 
-/// Changes the parameters or the points, or restores the surface from its own saved state.
+/// Makes one random change of an implicit surface: of its parameters, of its points, or a restoration of its own saved
+/// state.
 fn implicit_change(
     surface: &mut ImplicitSurface,
     bytes: &mut Choices,
@@ -229,7 +231,7 @@ fn implicit_change(
     }
 }
 
-/// Returns the approximate extent of the points.
+/// Returns the largest distance of a point from the first one, by which cells are scaled.
 fn size(points: &[Vec3]) -> f64 {
     points.iter().map(|p| p.as_dvec3().distance(points[0].as_dvec3())).fold(0.0, f64::max)
 }
@@ -420,7 +422,7 @@ pub fn shape(bytes: &mut Choices) -> TriangleMesh {
     whole
 }
 
-/// Returns a sphere, which may be flattened.
+/// Returns a sphere of random size, which may be flattened.
 fn ball(bytes: &mut Choices) -> TriangleMesh {
     let (radius, edge) = (bytes.within(0.4, 2.0) as f32, bytes.within(0.35, 0.9) as f32);
     let mesh = Mesh::icosphere(Vec3::ZERO, radius, edge * radius);
@@ -430,7 +432,7 @@ fn ball(bytes: &mut Choices) -> TriangleMesh {
     TriangleMesh { positions: mesh.positions, triangles: mesh.triangles, ..TriangleMesh::default() }
 }
 
-/// Returns a torus.
+/// Returns a torus of random size and resolution.
 fn ring(bytes: &mut Choices) -> TriangleMesh {
     let (n, m) = (3 + bytes.below(12) as u32, 3 + bytes.below(6) as u32);
     let (wide, thin) = (bytes.within(0.8, 2.0), bytes.within(0.05, 0.7));
@@ -448,14 +450,14 @@ fn ring(bytes: &mut Choices) -> TriangleMesh {
     mesh
 }
 
-/// Returns a fixed scene of few vertices, for the targets of saved states.
+/// Returns a fixed deformable model of few vertices, for the target of its saved states.
 pub fn small_deformable() -> DeformableModel {
     let volume = volume(&mut Choices::new(&[0; 24]), [6, 6, 6, 1]);
     let options = DeformableOptions { edge: Some(3.0), levels: 1, ..DeformableOptions::default() };
     DeformableModel::new(&volume, options).unwrap()
 }
 
-/// Returns a fixed scene of few points, for the targets of saved states.
+/// Returns a fixed implicit surface of six points, for the target of its saved states.
 pub fn small_implicit() -> ImplicitSurface {
     let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
     let params = ImplicitParams { cell: 0.5, ..ImplicitParams::default() };
@@ -463,7 +465,7 @@ pub fn small_implicit() -> ImplicitSurface {
     ImplicitSurface::new(Cloud { points, ..Cloud::default() }, options).unwrap()
 }
 
-/// Returns a fixed scene of few vertices, for the targets of saved states.
+/// Returns a fixed multiresolution model of few vertices, for the target of its saved states.
 pub fn small_multires() -> MultiresolutionModel {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let ellipsoids = vec![ControlEllipsoid { center: [0.0; 3], axes }];
@@ -471,7 +473,7 @@ pub fn small_multires() -> MultiresolutionModel {
     MultiresolutionModel::new(MultiresOptions { ellipsoids, params, ..MultiresOptions::default() }).unwrap()
 }
 
-/// Returns a fixed scene of few voxels, for the targets of saved states.
+/// Returns a fixed tracker of few voxels, for the target of its saved states.
 pub fn small_tracking() -> SurfaceTracker {
     let volume = volume(&mut Choices::new(&[0; 24]), [6, 6, 4, 3]);
     let options = TrackingOptions {

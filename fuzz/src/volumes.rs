@@ -4,7 +4,7 @@ use vesicle::io::{parse_volume, write_nifti};
 use vesicle::math::DVec3;
 use vesicle::volume::{Enrichment, Volume, marching_cubes_world};
 
-/// Largest number of voxels for which a volume is checked in full.
+/// Largest number of voxels of a volume that [`check`] also samples, contours and writes.
 const FULL_CHECK_LIMIT: usize = 4096;
 
 /// Reads a whole file as a volume; the seeds are NIfTI files.
@@ -22,14 +22,15 @@ pub fn metaimage(data: &[u8]) {
     use_volume(data, None);
 }
 
-/// Reads a header with detached voxels; the first two bytes are the length of the header.
+/// Reads a header with detached voxels; the first two bytes are the length of the header, low byte first.
 pub fn pair(data: &[u8]) {
     let Some((&length, rest)) = data.split_first_chunk() else { return };
     let (header, voxels) = rest.split_at(usize::from(u16::from_le_bytes(length)).min(rest.len()));
     use_volume(header, Some(voxels));
 }
 
-/// Reads compressed voxels with valid checksums; the first byte chooses the format of the file around them.
+/// Reads compressed voxels with valid checksums; the first byte selects the file around them: plain gzip, NRRD or
+/// MetaImage.
 pub fn gzip(data: &[u8]) {
     let Some((&kind, deflated)) = data.split_first() else { return };
     let content = inflated(deflated).unwrap_or_default();
@@ -41,12 +42,12 @@ pub fn gzip(data: &[u8]) {
     use_volume(&file, None);
 }
 
-/// Inflates a deflate stream, up to a limit.
+/// Inflates a deflate stream; `None` if it is invalid or gives more than 64 KiB.
 fn inflated(deflated: &[u8]) -> Option<Vec<u8>> {
     miniz_oxide::inflate::decompress_to_vec_with_limit(deflated, 1 << 16).ok()
 }
 
-/// Returns a deflate stream as a gzip member with valid checksum.
+/// Returns a gzip member with valid checksum that contains a deflate stream; `content` is the inflated stream.
 fn gzipped(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     let header = [0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 0, 255];
     [&header[..], deflated, &crc32(content).to_le_bytes(), &(content.len() as u32).to_le_bytes()].concat()
@@ -57,7 +58,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), bit))
 }
 
-/// Returns a deflate stream as a zlib stream with valid checksum.
+/// Returns a zlib stream with valid checksum that contains a deflate stream; `content` is the inflated stream.
 fn zlib(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     let sums = content.iter().fold([1, 0], |[a, b], &byte| {
         let a = (a + u32::from(byte)) % 65_521;
@@ -66,7 +67,7 @@ fn zlib(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     [&[0x78, 0x9C], deflated, &(sums[1] << 16 | sums[0]).to_be_bytes()].concat()
 }
 
-/// Reads a volume and checks it.
+/// Reads a volume, with `detached` voxels if there are any, and checks it; an error must have a short message.
 fn use_volume(bytes: &[u8], detached: Option<&[u8]>) {
     match parse_volume(bytes, detached) {
         Ok(volume) => check(&volume),
@@ -76,7 +77,7 @@ fn use_volume(bytes: &[u8], detached: Option<&[u8]>) {
     }
 }
 
-/// Asserts that a volume that was read is valid, and that it can be sampled, contoured and written.
+/// Asserts that a volume that was read is valid and, if small, that it can be sampled, contoured and written.
 fn check(volume: &Volume) {
     let ([nx, ny, nz], frames) = (volume.dims(), volume.frames());
     assert_eq!(volume.voxels().len(), nx * ny * nz * frames);
@@ -105,7 +106,7 @@ fn check(volume: &Volume) {
     write(volume);
 }
 
-/// Derives other volumes from it, or fails with an error.
+/// Computes pyramid, binned volume and interpolated slices; errors are accepted, panics are findings.
 fn derive(volume: &Volume) {
     let levels = volume.max_pyramid_levels(2.0).unwrap_or(0);
     let _ = volume.pyramid(levels.min(3), 2.0);
@@ -115,7 +116,7 @@ fn derive(volume: &Volume) {
     }
 }
 
-/// Writes the volume and reads it again.
+/// Writes the volume as NIfTI and, if that can be read again, asserts that dimensions and frames are the same.
 fn write(volume: &Volume) {
     let file = write_nifti(volume).unwrap();
     if let Ok(again) = parse_volume(&file, None) {

@@ -28,7 +28,10 @@ export interface NiivueVolume {
   } | null;
 }
 
-/** NIfTI datatype codes with several numbers a voxel (colours and complex numbers), which are rejected. */
+/**
+ * Names of the NIfTI datatype codes with more than one number per voxel (colours and complex numbers), which are
+ * rejected.
+ */
 const SEVERAL_NUMBERS: Record<number, string> = { 32: 'complex64', 128: 'RGB', 1792: 'complex128', 2304: 'RGBA' };
 
 /** Seconds per unit of each NIfTI time unit code; 0, unknown, counts as seconds. */
@@ -69,7 +72,7 @@ function secondsBetween(hdr: { pixDims: number[]; xyzt_units: number }, frames: 
 /** The methods used of a `Niivue`, called `NiiVueGPU` in 1.0. */
 export interface Niivue {
   addMesh(mesh: object): unknown;
-  /** Takes the mesh in 0.69, its index in `meshes` in 1.0. */
+  /** Removes a mesh, given by itself in 0.69 and by its index in `meshes` in 1.0. */
   removeMesh(mesh: object | number): unknown;
   readonly meshes: readonly object[];
 }
@@ -93,7 +96,7 @@ export interface NiivueSurfaceOptions {
   name?: string;
   /** Colour as rgba, 0..1; default a warm white. Vertex colours of the mesh take precedence. */
   color?: readonly [number, number, number, number];
-  /** Space of the mesh, that of its volume; default RAS, as in NiiVue. */
+  /** World space of the mesh, which is that of its volume; default RAS, as in NiiVue. */
   space?: Space;
 }
 
@@ -157,7 +160,7 @@ interface Appearance {
   color: readonly [number, number, number, number];
 }
 
-/** The mesh in one of the two supported generations of NiiVue. */
+/** Shows and removes one mesh in NiiVue; implemented once for 0.69 and once for 1.0. */
 interface MeshAdapter {
   readonly mesh: object | undefined;
   show(frame: SurfaceArrays): unknown;
@@ -339,8 +342,8 @@ class Niivue10 implements MeshAdapter {
   }
 
   /**
-   * Returns NiiVue's own buffers of the mesh before the update, if their size matches the known record format; else
-   * undefined.
+   * Returns NiiVue's own WebGL buffers of `mesh`, which still has its previous arrays, if the size of the vertex buffer
+   * matches the record format of `vertexRecords10`; else undefined.
    */
   #buffers(mesh: Mesh10): Buffers10 | undefined {
     const { gl, meshResources } = this.#view;
@@ -382,7 +385,7 @@ class Niivue10 implements MeshAdapter {
     };
   }
 
-  /** Returns the other properties of a mesh of 1.0. */
+  /** Returns the properties of a new NiiVue 1.0 mesh that are not geometry: name, colour, shader and unused ones. */
   #plain() {
     const { name, color } = this.#appearance;
     const [r, g, b, a] = color;

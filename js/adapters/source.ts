@@ -20,7 +20,7 @@ export interface MeshSource {
 
 /** A surface ready to be shown, in the host's space. The arrays are valid until the next read. */
 export interface SurfaceArrays extends MeshArrays {
-  /** Whether the connectivity has changed, or the mesh is another one. */
+  /** Whether the connectivity has changed since the last read, or the mesh is another one. */
   topology: boolean;
 }
 
@@ -42,7 +42,7 @@ export class MeshReader {
     this.#rotated = spaces[0] !== spaces.at(-1);
   }
 
-  /** Returns the surface, or undefined if it has not changed. */
+  /** Returns the surface in the host's space, or undefined if it has not changed since the last read. */
   read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
@@ -76,7 +76,7 @@ function copied({ positions, normals, ...rest }: MeshArrays): MeshArrays {
   return { ...rest, positions: positions.slice(), normals: normals.slice() };
 }
 
-/** Returns views of the used part of the arrays. */
+/** Returns views of the used part of the arrays, which may be longer than the mesh needs. */
 function usedPart(
   { positions, normals, indices, uvs, colors }: MeshArrays,
   vertices: number,

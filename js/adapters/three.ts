@@ -130,7 +130,7 @@ export interface ThreeObject {
   geometry: Geometry;
 }
 
-/** Arrays of the mesh, their attribute names in three.js, and numbers per vertex. */
+/** Arrays of the mesh, each with its attribute name in three.js and its numbers per vertex. */
 const ATTRIBUTES = [
   ['positions', 'position', 3],
   ['normals', 'normal', 3],
@@ -231,7 +231,7 @@ class Buffers {
     this.#parts.set('indices', { array, attribute });
   }
 
-  /** Whether the buffers have the capacity for this surface, and the same set of attributes. */
+  /** Returns whether the buffers have the capacity for this surface, and exactly its set of attributes. */
   fit(frame: MeshArrays): boolean {
     return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every((name) => {
       const [room, needed] = [this.#parts.get(name)?.array.length, frame[name]?.length];

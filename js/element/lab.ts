@@ -13,8 +13,9 @@ export type LabMethod = keyof typeof MODELS;
 /** State of a `<vesicle-lab>`, also in its attribute `data-state`. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
-/** Approximate time for steps between two renderings, milliseconds, and the largest number of steps. */
+/** Approximate duration of the steps between two renderings, milliseconds. */
 const SLICE_MS = 60;
+/** Largest number of steps between two renderings. */
 const MAX_STEPS = 256;
 
 const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
@@ -38,7 +39,7 @@ export class VesicleLab extends HTMLElement {
   });
   #view: View | undefined;
   #model: Stepper | undefined;
-  /** Number of resets, so that results of an earlier one are discarded. */
+  /** Number of resets so far, by which results of an earlier one are recognised and discarded. */
   #opening = 0;
   #viewDirection: Vec3 = [0, -1, 0];
   #fitted = false;
@@ -143,7 +144,7 @@ export class VesicleLab extends HTMLElement {
     }
   }
 
-  /** Runs `steps` steps and shows the result. */
+  /** Runs `steps` steps, dispatches the events, and shows the surface. */
   async #runSteps(model: Stepper, steps: number): Promise<void> {
     const report = await model.step(steps);
     if (model !== this.#model) return;
@@ -230,7 +231,10 @@ class Parts {
     }
   }
 
-  /** Replaces the canvas, because a context cannot be created twice on one; for an element that is inserted again. */
+  /**
+   * Replaces the canvas, so that an element that is inserted again can create a new WebGL context: a canvas has only
+   * one.
+   */
   newCanvas(): void {
     const fresh = canvas();
     this.#canvas.replaceWith(fresh);

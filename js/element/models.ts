@@ -27,16 +27,16 @@ export interface Settings {
   ellipsoids: ControlEllipsoid[];
 }
 
-/** A model, and the direction from which the camera views it initially. */
+/** A model, and the direction from the model to the initial position of the camera. */
 export interface ModelWithView {
   model: Stepper;
   from: Vec3;
 }
 
-/** Initial viewing direction along +y, for man-made objects, which usually face −y. */
+/** Direction from man-made objects, which usually face −y, to the initial position of the camera in front of them. */
 const FRONT: Vec3 = [-0.5, -1, 0.35];
 
-/** Factory of the model for each method; intermediate objects are freed. */
+/** Functions that create the model of each method; volumes and meshes that it was made from are freed. */
 export const MODELS = {
   deformable: ({ bytes, start, levels, params }: Settings): Promise<ModelWithView> =>
     ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
@@ -52,7 +52,7 @@ export const MODELS = {
   },
 };
 
-/** Creates a model from a volume, with the camera in front of a patient, a little to their left. */
+/** Creates a model from a volume file, with the camera in front of a patient, a little to their left. */
 function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<ModelWithView> {
   const made = async (volume: Volume): Promise<ModelWithView> => {
     const [model, space] = await Promise.all([make(volume), volume.space]);

@@ -21,12 +21,12 @@ export class View {
   );
   readonly #surface = new ThreeSurface(THREE, this.#object);
   readonly #observer = new ResizeObserver(() => this.#resize());
-  /** Whether the user has not moved the camera, so that it may still be adjusted automatically. */
+  /** Whether the user has not moved the camera yet, so that it may still be adjusted automatically. */
   #untouched = true;
   #version = 0;
   #asked = 0;
 
-  /** Throws if WebGL is not available. */
+  /** Creates the view on a canvas; throws if WebGL is not available. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     const light = new THREE.DirectionalLight('#ffffff', 2.4);
@@ -121,7 +121,7 @@ export class View {
   }
 }
 
-/** Camera motion of each key: to the right, up, and closer. */
+/** Camera motion of each key, in steps of −1, 0 or 1: to the right, up, and closer. */
 const KEYS: Record<string, [number, number, number]> = {
   ArrowLeft: [-1, 0, 0],
   ArrowRight: [1, 0, 0],

@@ -13,8 +13,8 @@ use crate::math::{DVec3, Vec2, Vec3};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Returns the milliseconds since the start of the page or process (`performance.now`), for the clocks of the
-    /// methods.
+    /// Returns the milliseconds since the start of the page, worker or process (`performance.now`), for the clocks of
+    /// the methods.
     #[wasm_bindgen(js_namespace = performance)]
     pub fn now() -> f64;
 }
@@ -44,7 +44,7 @@ pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
     copy_array(array.length(), |out| array.copy_to(out))
 }
 
-/// Converts packed xyz to points.
+/// Converts packed xyz to points; an incomplete last triple is dropped, since the TypeScript side checks lengths.
 pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
     Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
 }
@@ -112,7 +112,7 @@ fn property(object: &JsValue, name: &JsValue) -> JsValue {
     Reflect::get(object, name).unwrap_or(JsValue::UNDEFINED)
 }
 
-/// Deserialises an object; an error names `parameter`.
+/// Deserialises an object; the error about a value of the wrong type names `parameter`.
 fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Failure> {
     serde_wasm_bindgen::from_value(object.clone()).map_err(|error| {
         let problem = error.to_string().replace("f64", "a number");

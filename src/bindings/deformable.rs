@@ -23,34 +23,34 @@ pub struct RawStart(Start);
 
 #[wasm_bindgen]
 impl RawStart {
-    /// Starts from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level.
+    /// Returns the start from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level.
     pub fn contour() -> RawStart {
         RawStart(Start::Contour)
     }
 
-    /// Starts from an icosahedron that encloses the object.
+    /// Returns the start from an icosahedron that encloses the object.
     pub fn enclosing() -> RawStart {
         RawStart(Start::Enclosing)
     }
 
-    /// Starts from a grid of `count` × `count` × `count` bubbles.
+    /// Returns the start from a grid of `count` × `count` × `count` bubbles, which are small spheres.
     pub fn bubbles(count: u32) -> RawStart {
         RawStart(Start::Bubbles(count))
     }
 
-    /// Starts from spheres of `radius` at packed world points.
+    /// Returns the start from spheres of `radius`, in world units, at packed world points.
     pub fn seeds(seeds: &Float32Array, radius: f64) -> Result<RawStart, JsValue> {
         let points = points(seeds)?.into_iter().map(|seed| seed.as_dvec3()).collect();
         Ok(RawStart(Start::Seeds { points, radius }))
     }
 
-    /// Starts from the iso-surface of the coarsest pyramid level at intensity `iso`.
+    /// Returns the start from the iso-surface of the coarsest pyramid level at intensity `iso`.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(iso: f64) -> RawStart {
         RawStart(Start::MarchingCubes(iso))
     }
 
-    /// Starts from a copy of a closed mesh.
+    /// Returns the start from a copy of a closed mesh in world space.
     pub fn mesh(mesh: &RawMesh) -> RawStart {
         RawStart(Start::Mesh(Rc::unwrap_or_clone(mesh.triangles())))
     }
@@ -102,13 +102,14 @@ impl RawDeformable {
         Ok(to_js(&report)?)
     }
 
-    /// Adds the parts of the current level's contour that the surface lacks; returns the report.
+    /// Adds the parts of the current level's contour that the surface lacks; returns a report that counts them.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
         let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
-    /// Starts a measurement of how much of the iso-surface the surface covers.
+    /// Starts a measurement of how far the surface and the iso-surface of the volume cover each other; see
+    /// [`Coverage`].
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
         let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
@@ -129,7 +130,7 @@ impl RawDeformable {
         Ok(())
     }
 
-    /// Sets the attractors, packed with five numbers each: x, y, z, strength, radius.
+    /// Replaces the attractors, packed with five numbers each: x, y, z, strength, radius.
     #[wasm_bindgen(js_name = setAttractors)]
     pub fn set_attractors(&self, packed: &Float64Array) -> Result<(), JsValue> {
         let numbers = doubles(packed)?;
@@ -148,12 +149,13 @@ impl RawDeformable {
         self.0.borrow().level()
     }
 
-    /// Returns δ, the least edge length of the sampling, in world units.
+    /// Returns δ of the current level, the lower bound of edge lengths, in world units.
     pub fn delta(&self) -> f64 {
         self.0.borrow().delta()
     }
 
-    /// Returns the speed of each vertex along its normal, in the order of the mesh's arrays.
+    /// Returns the speed of each vertex along its outward normal, negative inwards, in world units per unit of time and
+    /// in the order of the mesh's arrays.
     pub fn speeds(&self) -> Vec<f32> {
         self.0.borrow().speeds()
     }
@@ -163,7 +165,7 @@ impl RawDeformable {
         self.0.borrow().save()
     }
 
-    /// Restores a saved state; the run then continues bit for bit.
+    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -176,12 +178,12 @@ pub struct RawCoverageSurvey(Option<CoverageSurvey>);
 
 #[wasm_bindgen]
 impl RawCoverageSurvey {
-    /// Tests the next `triangles` triangles; returns the fraction of all that have been tested.
+    /// Tests the next `triangles` triangles of the two surfaces; returns the fraction of all triangles tested so far.
     pub fn advance(&mut self, triangles: usize) -> f64 {
         self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
     }
 
-    /// Returns the result, after all triangles have been tested.
+    /// Returns recall, precision and uncovered regions, once all triangles have been tested.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
         let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "already finished"))?;
         Ok(to_js(&CoverageResult::from(survey.finish()))?)

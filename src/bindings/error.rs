@@ -22,12 +22,12 @@ impl Failure {
         Self { code, message: message.into() }
     }
 
-    /// Creates an `invalid-argument` failure, with the parameter's name as the caller knows it.
+    /// Creates an `invalid-argument` failure; `parameter` is the name that the caller knows.
     pub fn invalid(parameter: &str, problem: &str) -> Self {
         Self::new("invalid-argument", format!("{parameter}: {problem}"))
     }
 
-    /// Creates a `too-large` failure: more memory is needed than there is.
+    /// Creates a `too-large` failure: `bytes` bytes of memory are needed, more than is available.
     pub fn too_large(bytes: u64) -> Self {
         Self::new("too-large", format!("{bytes} bytes are needed, more than is available"))
     }

@@ -121,7 +121,8 @@ impl RawImplicit {
         RawMesh(MeshKind::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
     }
 
-    /// Returns a copy of the part of the surface that has been extracted so far.
+    /// Returns a copy of the part of the surface extracted so far, and all of it during colouring; empty in other
+    /// phases.
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
         Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
@@ -154,8 +155,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Sets the manual edits of the points in place of earlier ones: points added and exterior points as packed xyz,
-    /// and the indices of points removed.
+    /// Replaces all manual edits of the points: points added and exterior points as packed xyz, and the indices of
+    /// points removed.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,
@@ -183,30 +184,31 @@ impl RawImplicit {
         packed(&self.0.borrow().edits().exterior)
     }
 
-    /// Returns the values of f at packed points.
+    /// Returns f minus the iso-value at packed points: above 0 inside, below 0 outside.
     pub fn evaluate(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let values = self.0.borrow().evaluate(&points(at)?).map_err(Failure::from)?;
         Ok(values.into_iter().map(|value| value as f32).collect())
     }
 
-    /// Returns the gradients ∇f at packed points, as packed xyz.
+    /// Returns the gradients ∇f at packed points, as packed vectors per unit of length of the points; on the surface
+    /// they point inwards.
     pub fn gradient(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let gradients = self.0.borrow().gradient(&points(at)?).map_err(Failure::from)?;
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
     }
 
-    /// Returns the surface constraints (0) or the exterior constraints (1), as packed xyz.
+    /// Returns the positions of the surface constraints (`which` 0) or of the exterior constraints (1), as packed xyz.
     pub fn constraints(&self, which: usize) -> Vec<f32> {
         self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
     }
 
-    /// Returns the fit of the surface to the original points, as `ImplicitSurface.fitness` documents it.
+    /// Returns the distances of all points, with edits, from the surface and its mean curvature, as a `Fitness` object.
     pub fn fitness(&self) -> Result<JsValue, JsValue> {
         let fitness = self.0.borrow().fitness().map_err(Failure::from)?;
         Ok(to_js(&fitness)?)
     }
 
-    /// Returns f sampled on a grid of `dims` voxels around the object.
+    /// Returns f minus the iso-value, sampled on a grid of `dims` voxels around the points and the surface.
     #[wasm_bindgen(js_name = toVolume)]
     pub fn to_volume(&self, dims: &[u32]) -> Result<RawVolume, JsValue> {
         let dims: [u32; 3] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 integers"))?;
@@ -214,14 +216,14 @@ impl RawImplicit {
         Ok(RawVolume(volume))
     }
 
-    /// Colours the surface from the images of cameras.
+    /// Colours the vertices of the surface from the images of the cameras.
     pub fn colorize(&self, cameras: RawCameras) -> Result<(), JsValue> {
         self.0.borrow_mut().colorize(&cameras.0).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Returns further results: cell size, point spacing, numbers of duplicates and outliers, and a warning about the
-    /// parameters.
+    /// Returns further results: cell size, point spacing, numbers of duplicate points and of spurious components, and a
+    /// warning about the parameters if there is one.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
         Ok(to_js(&Statistics {
@@ -238,7 +240,7 @@ impl RawImplicit {
         self.0.borrow().save()
     }
 
-    /// Restores a saved state; the run then continues bit for bit.
+    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

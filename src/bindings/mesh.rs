@@ -40,8 +40,8 @@ pub(super) trait LiveSurface {
     fn surface(&self) -> TriangleMesh;
     /// Returns the numbers of vertices and triangles.
     fn counts(&self) -> [usize; 2];
-    /// Returns the topology version and the geometry version, which increase when connectivity changes and when a
-    /// vertex moves.
+    /// Returns the topology version, which increases when connectivity changes, and the geometry version, which
+    /// increases when a vertex moves.
     fn versions(&self) -> [u32; 2];
 }
 
@@ -77,7 +77,7 @@ impl LiveSurface for ImplicitSurface {
 #[wasm_bindgen]
 pub struct RawMesh(pub(super) MeshKind);
 
-/// A snapshot of a mesh's arrays, to be copied out.
+/// A snapshot of a mesh's arrays, from which each can be copied to JavaScript.
 #[wasm_bindgen]
 pub struct RawArrays(Rc<TriangleMesh>);
 
@@ -164,7 +164,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns a snapshot of the arrays, with normals.
+    /// Returns a snapshot of the arrays, with vertex normals; at a texture seam, with the texture coordinates of one
+    /// side.
     pub fn arrays(&self) -> RawArrays {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
@@ -179,7 +180,8 @@ impl RawMesh {
         Ok(to_js(&Info::from(measure(&self.triangles())))?)
     }
 
-    /// Tests the mesh independently of the edits that made it; returns a `MeshReport`.
+    /// Checks the triangles of the mesh, independently of the code that edits it: whether it is closed and oriented,
+    /// and the numbers of its defects, as a `MeshReport`.
     pub fn check(&self) -> Result<JsValue, JsValue> {
         let report = report(&self.triangles()).map_err(Failure::from)?;
         Ok(to_js(&Report::from(report))?)
@@ -206,7 +208,7 @@ impl RawMesh {
         self.triangles().components().into_iter().map(|part| RawMesh(triangle_list(part))).collect()
     }
 
-    /// Refines the mesh by one sqrt(3) pass.
+    /// Refines the mesh by one √3-subdivision pass: three triangles for each.
     pub fn refine(&mut self) -> Result<(), JsValue> {
         self.editable()?.refine().map_err(Failure::from)?;
         Ok(())
@@ -246,31 +248,32 @@ impl RawMesh {
         Ok(())
     }
 
-    /// Remeshes to edge lengths in `min..=max`; see [`remesh`].
+    /// Remeshes to edge lengths in `min..=max`, in world units; see [`remesh`].
     pub fn remesh(&mut self, min: f64, max: f64) -> Result<(), JsValue> {
         let bounds = EdgeBounds { min: min as f32, max: max as f32 };
         remesh(self.editable()?, bounds).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Returns the mean curvature at each vertex.
+    /// Returns the mean curvature at each vertex, an inverse length; positive where the surface is convex.
     #[wasm_bindgen(js_name = meanCurvature)]
     pub fn mean_curvature(&self) -> Vec<f32> {
         to_f32(&curvature(&self.triangles()).mean)
     }
 
-    /// Returns the Gaussian curvature at each vertex.
+    /// Returns the Gaussian curvature at each vertex, an inverse area.
     #[wasm_bindgen(js_name = gaussianCurvature)]
     pub fn gaussian_curvature(&self) -> Vec<f32> {
         to_f32(&curvature(&self.triangles()).gaussian)
     }
 
-    /// Returns the geodesic distance of each vertex from vertex `from_vertex`.
+    /// Returns the geodesic distance of each vertex from vertex `from_vertex`, in world units; infinite on other
+    /// components.
     pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
         Ok(to_f32(&geodesic_distances(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
 
-    /// Returns the distances to another surface, per vertex and in summary, as `Mesh.distanceTo` documents them.
+    /// Returns the distances to another surface, per vertex and in summary, as a `SurfaceDistance`.
     #[wasm_bindgen(js_name = distanceTo)]
     pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
         let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
@@ -281,14 +284,14 @@ impl RawMesh {
         Ok(summaries)
     }
 
-    /// Returns the nearest triangle that a ray hits; undefined if it hits none.
+    /// Returns the first intersection of a ray with the mesh as a `MeshHit`; undefined if there is none.
     pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
         let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
         let hit = tree.ray_hit(point(origin)?.as_vec3(), direction_of(direction)?);
         Ok(to_js(&hit.map(Hit::from))?)
     }
 
-    /// Returns the line segments in which a plane cuts the surface, as packed pairs of points.
+    /// Returns the line segments in which the plane through `origin` cuts the surface, as packed pairs of points.
     #[wasm_bindgen(js_name = crossSection)]
     pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
         let (origin, normal) = (point(origin)?.as_vec3(), direction_of(normal)?);
@@ -323,7 +326,7 @@ impl RawMesh {
         mesh
     }
 
-    /// Returns the triangles of the current mesh.
+    /// Returns the triangles of the mesh in its present state.
     pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
         match &self.0 {
             MeshKind::Surface(mesh) => Rc::new(mesh.to_triangles()),
@@ -332,7 +335,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns the mesh for editing. A list of triangles becomes an editable mesh first; an error if it is not closed.
+    /// Returns the mesh for editing; a list of triangles is replaced by an editable mesh first. An error if it is not
+    /// closed, or is the live mesh of a model.
     fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let MeshKind::Triangles(triangles) = &self.0 {
             self.0 = MeshKind::Surface(Box::new(Mesh::from_triangles(triangles)?));
@@ -532,7 +536,7 @@ impl From<Measures> for Info {
     }
 }
 
-/// Normalises a direction of any length but 0.
+/// Returns the unit vector of a direction of any length but 0.
 fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     let given = point(values)?;
     let largest = given.abs().max_element();
@@ -540,7 +544,7 @@ fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     Ok((given / largest).normalize_or_zero().as_vec3())
 }
 
-/// A copy of the triangles of a mesh, for a model to keep.
+/// A copy of the triangles of a mesh, passed to the constructor of a model.
 #[wasm_bindgen]
 pub struct TriangleCopy(pub(super) TriangleMesh);
 

@@ -19,13 +19,14 @@ use crate::methods::multires::{
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
-/// One of the live surfaces of a model.
+/// One of the three surfaces of a model, as the content of a live mesh.
 struct LiveView {
     model: Rc<RefCell<MultiresolutionModel>>,
     surface: Surface,
 }
 
-/// The surfaces of a model: detailed, deformed base, and link mesh.
+/// The surfaces of a model that have a live mesh: the detailed surface, the deformed base, and the link mesh, which is
+/// the map T.
 #[derive(Clone, Copy)]
 enum Surface {
     Detailed,
@@ -87,7 +88,7 @@ impl RawMultires {
         RawMesh(MeshKind::Live(Rc::new(RefCell::new(LiveView { model: Rc::clone(&self.0), surface }))))
     }
 
-    /// Returns the meshes of the multi-level solver, from coarse to fine.
+    /// Returns the meshes of the multi-level solver for the current ellipsoids, from coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
@@ -117,17 +118,18 @@ impl RawMultires {
         Ok(())
     }
 
-    /// Returns the current ellipsoids, packed.
+    /// Returns the current ellipsoids, packed with twelve numbers each: centre and three semi-axes.
     pub fn ellipsoids(&self) -> Vec<f64> {
         packed(&self.0.borrow().ellipsoids())
     }
 
-    /// Returns the target ellipsoids, packed.
+    /// Returns the target ellipsoids, packed with twelve numbers each: centre and three semi-axes.
     pub fn targets(&self) -> Vec<f64> {
         packed(&self.0.borrow().targets())
     }
 
-    /// Returns the distortion of areas (0) or of angles (1) across the base correspondence, per vertex.
+    /// Returns the distortion of areas (`which` 0) or of angles (1) by the map T from the deformed base to the
+    /// undeformed one: a ratio per vertex, 1 without distortion.
     pub fn distortion(&self, which: u32) -> Vec<f32> {
         let found = self.0.borrow().distortion();
         let values = if which == 0 { found.area } else { found.angle };
@@ -166,7 +168,7 @@ impl RawMultires {
         self.0.borrow().save()
     }
 
-    /// Restores a saved state; the run then continues bit for bit.
+    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

@@ -22,7 +22,7 @@ use crate::methods::tracking::{
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
-/// The live surface of the current frame.
+/// The surface of a tracker's current frame, as the content of its live mesh.
 struct CurrentFrame(Rc<RefCell<SurfaceTracker>>);
 
 impl LiveSurface for CurrentFrame {
@@ -43,9 +43,9 @@ impl LiveSurface for CurrentFrame {
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// Creates a tracker of a 4D volume. `corners`: six numbers, the box in world space; `voxels`: six, its first and
-    /// last voxel; `nearest`: a point that selects the surface around it or nearest to it. `params` are written over
-    /// the defaults.
+    /// Creates a tracker of a 4D volume. The box is given by two opposite `corners` in world space, or by its first and
+    /// last voxel, `voxels`: six numbers each. `nearest` is a point that selects the surface around it, or the nearest
+    /// one. `params` are written over the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -104,13 +104,14 @@ impl RawTracker {
         self.0.borrow().frame()
     }
 
-    /// Returns the numbers of frames in the volume, with a boundary, and with a surface.
+    /// Returns three numbers of frames: all in the volume, those whose boundary is found, and those with a surface.
     pub fn counts(&self) -> Vec<u32> {
         let tracker = self.0.borrow();
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
-    /// Returns the boundary points of a frame, packed with five numbers each: x, y, z, t, w.
+    /// Returns the boundary points of a frame, packed with five numbers each: x, y, z in world space, t in frames, and
+    /// the weight.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
         self.0.borrow().boundary(frame).into_iter().flatten().collect()
     }
@@ -120,7 +121,8 @@ impl RawTracker {
         self.0.borrow().volumes()
     }
 
-    /// Returns further results: the image noise, the closure error of a cycle, and the statistics of each frame.
+    /// Returns further results: the standard deviation of the image noise, the cycle closure error once it is known,
+    /// and the statistics of each frame.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
         let statistics = Statistics {
@@ -131,7 +133,7 @@ impl RawTracker {
         Ok(to_js(&statistics)?)
     }
 
-    /// Returns the finished frames as an animated GLB.
+    /// Returns the finished frames as an animated GLB in which each lasts `frame_seconds`.
     #[wasm_bindgen(js_name = toGlb)]
     pub fn to_glb(&self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
         let tracker = self.0.borrow();
@@ -157,7 +159,7 @@ impl RawTracker {
         self.0.borrow().save()
     }
 
-    /// Restores a saved state; the run then continues bit for bit.
+    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

@@ -16,7 +16,7 @@ use crate::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 #[wasm_bindgen]
 pub struct RawVolume(pub(super) Volume);
 
-/// A list of volumes that become the frames of one.
+/// A list of volumes to be joined into one 4D volume.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawFrames(Vec<Volume>);
@@ -90,12 +90,13 @@ impl RawVolume {
         .to_owned()
     }
 
-    /// Returns the smallest and the largest intensity.
+    /// Returns the smallest and the largest intensity of all frames.
     pub fn range(&self) -> Vec<f64> {
         self.0.range().to_vec()
     }
 
-    /// Returns the histogram of a frame, with `bins` equal bins over the intensity range.
+    /// Returns the histogram of a frame: the number of voxels in each of `bins` equal parts of the volume's intensity
+    /// range.
     pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, JsValue> {
         Ok(self.0.histogram(bins, frame).map_err(Failure::from)?)
     }
@@ -105,12 +106,13 @@ impl RawVolume {
         Ok(self.0.sample(point(world)?, frame).map_err(Failure::from)?)
     }
 
-    /// Returns the intensities of one slice across `axis`, row-major.
+    /// Returns the intensities of the slice at `index` along `axis`, row-major; its rows run along the lower one of the
+    /// two other axes.
     pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
     }
 
-    /// Returns all intensities of one frame.
+    /// Returns all intensities of one frame, x fastest.
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.intensities(frame).map_err(Failure::from)?)
     }
@@ -121,7 +123,7 @@ impl RawVolume {
         Ok(levels.into_iter().map(RawVolume).collect())
     }
 
-    /// Returns the seconds between frames; 0 if there is no such time.
+    /// Returns the seconds between frames; 0 if they are not known.
     #[wasm_bindgen(js_name = frameSeconds)]
     pub fn frame_seconds(&self) -> f64 {
         self.0.frame_seconds()
@@ -133,7 +135,8 @@ impl RawVolume {
         Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
     }
 
-    /// Returns the volume with in-between slices, interpolated by optical flow or linearly.
+    /// Returns the volume with in-between slices along the axis of the largest spacing, `factor` slices for each
+    /// original one, interpolated by optical flow if `flow`, else linearly.
     #[wasm_bindgen(js_name = enrichSlices)]
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
         let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
@@ -149,12 +152,13 @@ impl RawFrames {
         Self::default()
     }
 
-    /// Appends a frame. (Clones of a volume share its voxels.)
+    /// Appends a volume, which contributes all its frames. (Clones of a volume share its voxels.)
     pub fn push(&mut self, volume: &RawVolume) {
         self.0.push(volume.0.clone());
     }
 
-    /// Returns the 4D volume of all frames; the list is used up.
+    /// Returns the 4D volume of all frames; the list is used up. Without `frame_seconds`, those of the first volume are
+    /// used.
     pub fn join(self, frame_seconds: Option<f64>) -> Result<RawVolume, JsValue> {
         Ok(RawVolume(Volume::from_frames(&self.0, frame_seconds).map_err(Failure::from)?))
     }
@@ -174,7 +178,7 @@ fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     Err(Failure::invalid("data", "must be a typed array of numbers of at most 32 bits, or of 64-bit floats"))
 }
 
-/// Converts the four dimensions.
+/// Converts an array of four dimensions; an error if it has another length.
 fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
     let dims: [u32; 4] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 or 4 integers"))?;
     Ok(dims.map(|n| n as usize))

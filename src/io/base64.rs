@@ -32,7 +32,7 @@ pub(super) fn decode(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Returns the 6-bit value of a base64 digit.
+/// Returns the 6-bit value of a base64 digit; `None` for any other character.
 fn value(sign: u8) -> Option<u32> {
     Some(match sign {
         b'A'..=b'Z' => u32::from(sign - b'A'),

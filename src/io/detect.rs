@@ -14,7 +14,7 @@ const START: usize = 512;
 /// another file for its voxels (several files are concatenated in order).
 ///
 /// # Errors
-/// [`FormatError`] with the format and the field; for a format that is not supported, one that names it.
+/// [`FormatError`] with the format and the field; the error about an unsupported format names it if it is recognised.
 pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     if is_gzip(bytes) {
         let start = gunzip_start(ANY, bytes, START)?;
@@ -50,7 +50,8 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
     FormatError::unsupported(ANY, "signature", signature(bytes), ACCEPTED)
 }
 
-/// Returns the name of an unsupported format that the first bytes identify, for the error message.
+/// Returns the name of the unsupported format that the first bytes identify, for the error message; "an unknown
+/// signature" if there is none.
 fn signature(bytes: &[u8]) -> &'static str {
     let at = |offset: usize, mark: &[u8]| bytes.get(offset..).is_some_and(|rest| rest.starts_with(mark));
     let line = |mark: &[u8]| bytes.trim_ascii_start().starts_with(mark);

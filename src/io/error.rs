@@ -37,14 +37,14 @@ pub enum FormatError {
         /// Number of bytes present.
         found: u64,
     },
-    /// The content does not fit in memory.
+    /// The content does not fit in memory, or exceeds a limit of the reader.
     #[error("{format}: {field}: needs {needed} bytes, more than is available")]
     TooLarge {
         /// Name of the file format.
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// Number of bytes that would be needed.
+        /// Number of bytes that the content would need.
         needed: u64,
     },
 }

@@ -6,8 +6,9 @@ use crate::math::{Bounds, Vec2, Vec3};
 use crate::mesh::{ImageKind, MeshError, Texture, TriangleMesh};
 use std::sync::Arc;
 
-/// WebGL targets of buffer views: `ARRAY_BUFFER` for vertex attributes, `ELEMENT_ARRAY_BUFFER` for indices.
+/// `target` of a glTF buffer view of vertex attributes: WebGL's `ARRAY_BUFFER`.
 const VERTICES: Option<u32> = Some(34962);
+/// `target` of a glTF buffer view of vertex indices: WebGL's `ELEMENT_ARRAY_BUFFER`.
 const INDICES: Option<u32> = Some(34963);
 
 /// Returns a GLB of one node with one primitive: positions, normals (computed if the mesh has none), and the other
@@ -139,7 +140,8 @@ impl DocumentBuilder {
         self.views.len() - 1
     }
 
-    /// Returns the index of the material with that texture, which is added if it is new: each image is stored once.
+    /// Returns the index of the material with that texture. It is added if no earlier mesh has the same texture, so
+    /// that each image is stored once.
     fn material(&mut self, texture: &Arc<Texture>) -> Result<usize, MeshError> {
         if let Some(known) = self.textures.iter().position(|known| known == texture) {
             return Ok(known);
@@ -156,15 +158,16 @@ impl DocumentBuilder {
         Ok(self.textures.len() - 1)
     }
 
-    /// Reserves memory for `additional` bytes, so that lack of memory is an error instead of a crash.
+    /// Reserves memory for `additional` bytes of the buffer. Returns an error if there is not enough memory, or if the
+    /// buffer would exceed 4 GiB.
     fn reserve(&mut self, additional: usize) -> Result<(), MeshError> {
         let bytes = self.bytes.len() as u64 + additional as u64;
         let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(additional).is_ok();
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// Returns the bytes of the file, with all nodes as roots of one scene; `extra_json` is appended to the members of the
-    /// JSON.
+    /// Returns the bytes of the file, with all nodes as roots of one scene; `extra_json` is appended to the members of
+    /// the JSON.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.

@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Maximum total number of triangle corners: nodes may repeat a mesh, so the size of the file is no bound.
 const CORNER_LIMIT: u64 = 3 << 23;
 
-/// Accepted alternative named in the error about compressed files.
+/// Accepted alternative named in the errors about compressed data and about required extensions that are not supported.
 const UNCOMPRESSED: &str = "files without compression (save the mesh without it)";
 
 /// Minimum number of corners counted for a primitive, so that empty primitives repeated by many nodes also reach
@@ -215,21 +215,22 @@ impl<'a> Document<'a> {
         Ok(View { bytes, stride: unsigned(value, "byteStride")? })
     }
 
-    /// Returns whether a buffer is only a placeholder for data compressed elsewhere by `extension`.
+    /// Returns whether a buffer is only a placeholder without data: the buffer views in it are compressed by
+    /// `extension`, and their compressed bytes are in another buffer.
     fn is_fallback_buffer(&self, buffer: u64, extension: &str) -> bool {
         let buffer = self.entry("buffers", buffer);
         buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
     }
 
-    /// Returns whether an accessor has no buffer view; in a compressed primitive, the data of the extension then hold its
-    /// elements.
+    /// Returns whether an accessor has no buffer view. In a primitive compressed by Draco, its elements are then in the
+    /// compressed data of the primitive's extension only.
     fn lacks_buffer_view(&self, accessor: u64) -> bool {
         self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
     }
 }
 
-/// Returns the extension by which a primitive or buffer view is compressed. Uncompressed data beside it is a fallback
-/// for readers without the extension.
+/// Returns the known extension by which a primitive or buffer view is compressed; `None` if there is none. A file may
+/// hold the same data uncompressed as well, for readers without the extension.
 fn compression(value: &Value) -> Option<&'static str> {
     let known = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
     known.into_iter().find(|name| !value["extensions"][name].is_null())
@@ -241,7 +242,7 @@ pub(super) struct View<'a> {
     stride: Option<u64>,
 }
 
-/// How the order of vertices defines triangles: a list, a strip or a fan.
+/// How consecutive vertices of a primitive form triangles: as a list, a strip or a fan.
 #[derive(Clone, Copy)]
 enum Mode {
     List,
@@ -249,7 +250,8 @@ enum Mode {
     Fan,
 }
 
-/// A triangle primitive of a glTF mesh, its ranges checked.
+/// A triangle primitive of a glTF mesh, with its accessors. Their byte ranges have been checked, but not the vertex
+/// indices.
 struct Primitive<'a> {
     document: Document<'a>,
     attributes: &'a Value,

@@ -39,8 +39,8 @@ pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result
     }
 }
 
-/// Returns the first `count` bytes of a gzip stream's content, or all of it if shorter. Checksums are not verified; see
-/// [`gunzip`].
+/// Returns the first `count` bytes of the content of a gzip stream's first member, or all of it if shorter. Its
+/// checksum is not verified; see [`gunzip`].
 ///
 /// # Errors
 /// A corrupt stream, or one that ends before `count` bytes without its end mark.
@@ -67,10 +67,10 @@ pub(super) fn unzlib(format: &'static str, bytes: &[u8], limit: usize) -> Result
     Ok(out)
 }
 
-/// Result of inflating one deflate stream.
+/// Result of inflating one deflate or zlib stream: the number of input bytes it took, and whether it was too long.
 struct Inflated {
     consumed: usize,
-    /// Whether the content exceeds the limit.
+    /// Whether the content exceeds the limit, so that it is incomplete.
     full: bool,
 }
 
@@ -78,7 +78,8 @@ struct Inflated {
 /// size its header claims.
 const INITIAL_CAPACITY: usize = 1 << 16;
 
-/// Appends the content of one deflate stream to `out`, which never grows beyond `limit` + 1 bytes.
+/// Appends the content of one deflate stream, in a zlib container if `zlib`, to `out`, which becomes at most one byte
+/// longer than `limit`.
 fn inflate(
     format: &'static str,
     input: &[u8],

@@ -42,8 +42,8 @@ impl MeshFormat {
         Self::ALL.into_iter().find(|format| format.extension() == extension)
     }
 
-    /// Returns whether texture coordinate v is measured from the lower edge of the image, not from the upper one as in
-    /// glTF.
+    /// Returns whether the format measures the texture coordinate v from the lower edge of the image upwards; glTF
+    /// measures it from the upper edge downwards.
     fn has_v_upwards(self) -> bool {
         matches!(self, Self::Ply | Self::Obj | Self::Vtp)
     }
@@ -119,7 +119,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     Err(unsupported_format(bytes))
 }
 
-/// Returns whether the first bytes contain no control characters other than those of text.
+/// Returns whether the first 4096 bytes contain no control characters other than whitespace.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     !bytes.iter().take(4096).any(|&b| b < b' ' && !b.is_ascii_whitespace() && b != 0x0b)
 }
@@ -142,9 +142,10 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
     }
 }
 
-/// Returns the bytes of a file with the mesh and those of its attributes that the format supports. All but colours are
-/// stored without loss; colours have 8 bits except in GLB and OBJ. A closed mesh is still closed when it is read back
-/// by [`parse_mesh`] (which does not read VTP and MZ3).
+/// Returns the bytes of a file with the mesh and those of its attributes that the format supports. Attributes are
+/// stored without loss, except that GLB normalises normals and clamps colours to 0..1, and that colours have 8 bits in
+/// PLY, VTP and MZ3. A closed mesh is still closed when it is read back by [`parse_mesh`] (which does not read VTP and
+/// MZ3).
 ///
 /// Only GLB stores the texture. In PLY, OBJ and VTP, where v points up, the texture coordinates of a mesh with a
 /// texture are written with v as 1 − v.
@@ -182,7 +183,7 @@ pub(super) fn color_bytes(color: crate::math::Vec3) -> [u8; 3] {
     color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// Appends numbers as little-endian bytes.
+/// Appends the numbers as little-endian 32-bit floats.
 pub(super) fn push_floats(out: &mut Vec<u8>, values: &[f32]) {
     values.iter().for_each(|x| out.extend(x.to_le_bytes()));
 }

@@ -172,7 +172,7 @@ impl Header {
         decode(DATA, payload(DATA, source, size)?, self.scalar, self.big)
     }
 
-    /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
+    /// Returns the bytes of `source` after the first `HeaderSize` ones; if that is -1, the last `size` bytes.
     fn after_skip<'a>(&self, source: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.skip.unwrap_or_else(|| source.len().saturating_sub(size));
         source.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "HeaderSize", skip, source.len()))
@@ -220,7 +220,8 @@ fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     })
 }
 
-/// Returns the number of bytes before the voxels; `None` for -1.
+/// Returns the number of bytes before the voxels from `HeaderSize`, 0 if it is missing; `None` for -1, which means that
+/// the voxels are the last bytes.
 fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("HeaderSize") else { return Ok(Some(0)) };
     if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }

@@ -14,10 +14,12 @@ use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "NIfTI";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
-/// Header sizes of the two versions in bytes, which are also the first number in the file.
+/// Size of a NIfTI-1 header in bytes, which is also the first number in the file.
 const SIZE_1: usize = 348;
+/// Size of a NIfTI-2 header in bytes, which is also the first number in the file.
 const SIZE_2: usize = 540;
-/// Number of bytes to inflate for the header, including its extension flag.
+/// Size in bytes of the larger header with the extension flag after it: the part of a file that is read or inflated to
+/// parse its header.
 const HEADER_ROOM: usize = SIZE_2 + 4;
 
 /// Returns whether the bytes start like a NIfTI header of either version and byte order.
@@ -254,7 +256,7 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, "bitpix", problem))
     }
 
-    /// Returns the offset of the voxels in bytes. In a single file, 0 stands for the end of the header.
+    /// Returns the offset of the voxels in bytes; in a single file, a stored 0 means the end of the header.
     fn offset(&self, pair: bool) -> Result<usize, FormatError> {
         let least = if self.version == 1 { 352 } else { 544 };
         let stated = self.vox_offset;
@@ -344,7 +346,8 @@ impl Fields {
         Ok(sizes)
     }
 
-    /// Returns the seconds between frames; 0 if there is only one frame or the fourth axis is not time.
+    /// Returns the seconds between frames; 0 if there is only one frame, `pixdim[4]` is not positive, or the fourth
+    /// axis is not time.
     fn frame_seconds(&self, frames: usize) -> Result<f64, FormatError> {
         let step = self.pixdim[4];
         if frames < 2 {
@@ -362,7 +365,7 @@ impl Fields {
         Ok(if step > 0.0 { step * second } else { 0.0 })
     }
 
-    /// Returns the unit of length.
+    /// Returns the unit of length of the world space; unknown if the file gives none.
     fn unit(&self) -> LengthUnit {
         match self.units & 7 {
             1 => LengthUnit::Metre,
@@ -373,8 +376,8 @@ impl Fields {
     }
 }
 
-/// Largest accepted offset of the voxels in bytes: beyond it, a NIfTI-1 header (`f32`) cannot represent every integer,
-/// and no header extension is as long.
+/// Largest accepted offset of the voxels in bytes. A NIfTI-1 header stores it as `f32`, which cannot represent every
+/// larger integer, and no header extension is as long.
 const MAX_OFFSET: f64 = 16_777_216.0;
 /// Tolerance by which the squared length of a quaternion's vector part may exceed 1 through rounding in `f32`; longer
 /// ones are rejected.

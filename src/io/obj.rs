@@ -26,8 +26,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(read(bytes)?.into_mesh())
 }
 
-/// Reads the vertices of an OBJ file as points; the file needs no faces. Normals are those that the faces refer to; if
-/// they refer to none and there are as many as vertices, those of the vertices in order.
+/// Reads the vertices of an OBJ file as points; the file needs no faces. Normals are read if every face corner refers
+/// to one, and averaged per vertex. If no corner does and there are as many normals as vertices, they belong to the
+/// vertices in order.
 pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     Ok(read(bytes)?.into_points())
 }
@@ -158,7 +159,7 @@ impl Reader {
         }
     }
 
-    /// Returns the value of `read` at each corner; `None` if it is missing at any.
+    /// Returns the value of `read` at each corner of the triangles; `None` if it is missing at any.
     fn per_corner<T>(&self, read: impl Fn(&Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
         self.corners.iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
     }

@@ -84,7 +84,8 @@ impl NumberType {
         }
     }
 
-    /// Returns the value of a full colour channel.
+    /// Returns the number that stands for full intensity of a colour channel of this type: 255 or 65535 for unsigned
+    /// integers of 8 or 16 bits, else 1.
     fn full_channel(self) -> f64 {
         match self {
             Self::U8 => 255.0,
@@ -125,8 +126,8 @@ struct Element {
 }
 
 impl Element {
-    /// Returns an error if the rest of the file is too short for the element's count, before memory is allocated for
-    /// it.
+    /// Returns an error if the rest of the file is too short for the element's count; called before memory is allocated
+    /// for it.
     fn check_size(&self, body: &Body) -> Result<(), FormatError> {
         let smallest = |p: &Property| {
             if body.encoding == Encoding::Text { 1 } else { p.length.unwrap_or(p.kind).size() }
@@ -366,7 +367,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the faces with their texture coordinates.
+    /// Reads the faces as triangles, with their texture coordinates.
     fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
             return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));

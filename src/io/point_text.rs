@@ -105,13 +105,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     table.into_points()
 }
 
-/// Returns the announced number of points if the line holds nothing else.
+/// Returns the number of points that a line announces; `None` unless the line is a single integer.
 fn announced(line: &Line) -> Option<u64> {
     line.text.parse().ok()
 }
 
-/// Returns an error if the announced number of points is not that of the lines read. No memory is reserved for it, so a
-/// check at the end suffices.
+/// Returns an error if the number of points announced by `line` is not `rows`, the number of lines read. No memory is
+/// reserved by the announced number, so a check at the end suffices.
 fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     if announced(line) == Some(rows as u64) {
         return Ok(());
@@ -120,8 +120,8 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     Err(line.invalid(FORMAT, &problem))
 }
 
-/// Takes a line of column names, unless the next line consists of numbers. After an announced count, a line that names
-/// no columns is skipped.
+/// Takes the next line unless it consists of numbers, and returns the columns that it names. If it names no columns, it
+/// is skipped after an announced count (`counted`), and an error otherwise.
 fn take_column_names<'a>(
     lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
     counted: bool,
@@ -135,7 +135,8 @@ fn take_column_names<'a>(
     Ok(named)
 }
 
-/// Returns the columns named by the last comment before the content that names `count` columns, if there is one.
+/// Returns the columns named by a comment at the start of the file. Of several comments that name `count` columns, the
+/// last one before the content is used.
 fn named_in_comment(bytes: &[u8], count: usize) -> Option<Columns> {
     let before = lines(bytes).take_while(|line| line.text.is_empty() || comment(&line.text).is_some());
     let named = before.filter_map(|line| Columns::named(comment(&line.text)?));
@@ -148,11 +149,13 @@ struct Columns {
     count: usize,
     /// Indices of the columns that are read, those of the position first.
     read: Vec<usize>,
-    /// Normals and colours among them; `None` if only the values can tell.
+    /// Which of the columns that are read hold normals and colours; `None` in a file without column names, whose values
+    /// decide it.
     extras: Option<Extras>,
 }
 
-/// First column of normals and of colours, counted among the columns that are read.
+/// Index of the first column of normals and of colours, counted among the columns that are read; `None` if there are
+/// none.
 struct Extras {
     normals: Option<usize>,
     colors: Option<usize>,
@@ -254,7 +257,8 @@ impl Table {
         Ok(PointCloud { points: all(0), normals: extras.normals.map(all), colors: extras.colors.map(all) })
     }
 
-    /// Returns which unnamed columns hold normals and colours; normals are recognised by their length.
+    /// Returns which columns of a file without column names hold normals and colours. Normals are recognised by their
+    /// unit length; an error if the values fit neither.
     fn guessed_extras(&self) -> Result<Extras, FormatError> {
         let (normals, colors) = match self.columns.count {
             6 if self.are_normals(3) => (Some(3), None),

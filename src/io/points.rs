@@ -98,7 +98,7 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
     PointCloud { points: mesh.positions, normals: mesh.normals, colors: mesh.colors }
 }
 
-/// Returns the cloud with colours in 0..1, after checking it.
+/// Checks a cloud, and returns it with its colours scaled to 0..1.
 fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
@@ -140,7 +140,8 @@ fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, For
     Ok(colors.into_iter().map(|color| color / full).collect())
 }
 
-/// Returns the value of a full colour channel, 1 or 255; `None` if the values cannot be colours.
+/// Returns the number that stands for full intensity of a colour channel: 1 if all values are within 0..1, 255 if all
+/// are integers up to 255; `None` if they cannot be colours.
 pub(super) fn full_channel(colors: impl Iterator<Item = Vec3> + Clone) -> Option<f32> {
     let all = |fits: fn(f32) -> bool| colors.clone().all(|color| color.to_array().into_iter().all(fits));
     if all(|c| (0.0..=1.0).contains(&c)) {
@@ -165,7 +166,7 @@ mod tests {
         }
     }
 
-    /// The numbers of each point, with colours scaled to `full`.
+    /// Returns one row of numbers per point, x y z, normal and colour, with colours scaled to `full`.
     fn rows(cloud: &PointCloud, full: f32) -> Vec<Vec<f32>> {
         let extras = cloud.normals.iter().flatten().zip(cloud.colors.iter().flatten());
         let row = |(p, (n, c)): (&Vec3, (&Vec3, &Vec3))| {
@@ -330,7 +331,8 @@ mod tests {
         assert!(error.starts_with("point file: format: STL"), "{error}");
     }
 
-    /// Asserts the properties of every cloud that is read without an error.
+    /// Asserts that a cloud, if the bytes are read without an error, has points, one entry per point in each array,
+    /// finite numbers, and colours in 0..1.
     fn assert_sound(bytes: &[u8], context: &str) {
         let Ok(cloud) = parse_points(bytes) else { return };
         let count = cloud.points.len();

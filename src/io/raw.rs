@@ -24,7 +24,7 @@ pub(super) const MAX_PADDING: usize = 512;
 /// Largest integer up to which `f64` represents every integer.
 const MAX_EXACT: u64 = 1 << 53;
 
-/// Format and field of the numbers, for error messages.
+/// Names of the file format and of the header field that voxels belong to, for error messages.
 #[derive(Clone, Copy)]
 pub(super) struct FieldName {
     pub(super) format: &'static str,
@@ -122,7 +122,7 @@ pub(super) fn decode(
     })
 }
 
-/// Decodes all numbers with `read`.
+/// Decodes all numbers in `bytes`, each of `N` bytes, with `read`.
 fn numbers<const N: usize, T>(
     name: FieldName,
     bytes: &[u8],
@@ -195,7 +195,8 @@ fn text_number(name: FieldName, word: &[u8], scalar: Scalar) -> Result<f64, Form
     })
 }
 
-/// Returns whether a number type can represent a value.
+/// Returns whether a value is accepted as a number of the type: for integers, one within their range (at most ±2⁵³ for
+/// 64 bits); for floats, any.
 fn can_represent(scalar: Scalar, v: f64) -> bool {
     let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
     match scalar {

@@ -36,7 +36,7 @@ pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
     FormatError::invalid(FORMAT, "triangle count", problem)
 }
 
-/// Reads a binary file.
+/// Reads the triangles of a binary STL file.
 pub(super) fn parse_binary(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let records = bytes.get(HEADER..).ok_or_else(|| wrong_length(bytes))?;
     Ok(from_corners(
@@ -62,7 +62,7 @@ pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
     starts && bytes.get(5).is_none_or(u8::is_ascii_whitespace) && is_text(bytes)
 }
 
-/// Reads a text file.
+/// Reads the triangles of a text STL file.
 pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let mut corners = Vec::new();
     let mut ended = false;
@@ -93,7 +93,7 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
     }
 }
 
-/// Returns the bytes of a binary file.
+/// Returns the bytes of a binary STL file, with the normals of the triangles.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.

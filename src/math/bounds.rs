@@ -17,7 +17,7 @@ impl Bounds {
     /// The empty box, which contains no point and overlaps no box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// Returns the smallest box that contains the points.
+    /// Returns the smallest box that contains the points; [`Self::EMPTY`] if there are none.
     #[inline]
     pub fn from_points(points: &[Vec3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, &p| b.union(&Self { min: p, max: p }))
@@ -45,7 +45,7 @@ impl Bounds {
         self.overlaps(&Self { min: p, max: p })
     }
 
-    /// Returns whether the boxes share a point.
+    /// Returns whether the boxes share a point; they do even if they only touch.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
         self.min.x <= other.max.x
@@ -63,15 +63,16 @@ impl Bounds {
         low.max(high).max(DVec3::ZERO).length_squared()
     }
 
-    /// Returns the distance along the ray, in lengths of its direction, at which it enters the box; `None` if it
-    /// misses. Zero if it starts inside. Rounded so that a ray in a face of the box is a hit.
+    /// Returns the distance along the ray, in lengths of its direction, at which it enters the box: 0 if it starts
+    /// inside, `None` if it misses. A small tolerance makes a ray in a face of the box a hit.
     #[inline]
     pub fn ray_entry(&self, ray: &Ray) -> Option<f64> {
         self.clip_line(ray, 0.0).map(|(enter, _)| enter)
     }
 
-    /// Returns the distance from the ray's origin, in lengths of its direction, at which the line through it enters the
-    /// box, ahead or behind; `None` if it misses. Zero if the origin is inside. Rounded as [`Self::ray_entry`].
+    /// Returns the distance from the ray's origin, in lengths of its direction, to the nearest point of the box on the
+    /// whole line, ahead or behind: 0 if the origin is inside, `None` if the line misses. The tolerance is that of
+    /// [`Self::ray_entry`].
     #[inline]
     pub fn line_entry(&self, ray: &Ray) -> Option<f64> {
         let (enter, leave) = self.clip_line(ray, f64::NEG_INFINITY)?;
@@ -79,7 +80,8 @@ impl Bounds {
         Some(if near > 0.0 { near } else { 0.0 })
     }
 
-    /// Returns the interval of the line along the ray that is inside the box, from parameter `start` on.
+    /// Returns the parameters at which the ray's line enters and leaves the box, in lengths of its direction from its
+    /// origin, the first at least `start`; `None` if no part of the line beyond `start` is in the box.
     #[inline]
     fn clip_line(&self, ray: &Ray, start: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (start, f64::INFINITY);
@@ -115,8 +117,8 @@ impl Bounds {
     }
 }
 
-/// Relative tolerance of the ray test: each product is within two ulps, and with less a ray could pass between two
-/// boxes that share a face.
+/// Relative tolerance of [`Bounds::ray_entry`] and [`Bounds::line_entry`]: each product is within two ulps, and with
+/// less a ray could pass between two boxes that share a face.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A ray prepared for tests against many boxes.
@@ -135,10 +137,11 @@ impl Ray {
     }
 }
 
-/// Direction components below this are treated as 0: their reciprocal would be close to infinity.
+/// Largest absolute value of a direction's component that is treated as 0: its reciprocal would be close to infinity.
 const MIN_DIRECTION_COMPONENT: f64 = 1e-290;
 
-/// Nodes still to visit with their distances; a tree of a million items needs no allocation.
+/// Indices of tree nodes still to be visited, each with the distance of its box; with a tree of a million items, no
+/// allocation is needed.
 type Stack = SmallVec<[(f64, usize); 24]>;
 
 /// Maximum number of boxes in a leaf: 1 doubles the number of nodes, 16 tests many boxes in vain.
@@ -196,9 +199,9 @@ impl BoxTree {
         }
     }
 
-    /// Visits items in the order of the distances of their boxes from `p`. `visit` receives an item and the current
-    /// bound, and returns the new bound, a squared distance; items whose box is farther are skipped, those exactly at
-    /// the bound are visited.
+    /// Visits items whose boxes are near `p`, roughly from near to far. `visit` receives an item and the current bound,
+    /// a squared distance that is infinite at first, and returns the new bound; items whose boxes are farther are
+    /// skipped, those exactly at the bound are visited.
     pub fn nearest(&self, p: Vec3, mut visit: impl FnMut(u32, f64) -> f64) {
         let mut bound = f64::INFINITY;
         self.descend(
@@ -211,20 +214,21 @@ impl BoxTree {
         );
     }
 
-    /// Visits items whose boxes are within the squared distance `squared` of `p`, until `visit` returns true.
+    /// Visits items whose boxes have a squared distance of at most `squared` from `p`, until `visit` returns true.
     pub fn within(&self, p: Vec3, squared: f64, mut visit: impl FnMut(u32) -> bool) {
         let entry = |bounds: &Bounds| Some(bounds.distance_squared(p));
         self.descend(squared, entry, |item| if visit(item) { -1.0 } else { squared });
     }
 
-    /// Visits items whose boxes the ray enters, nearest entry first. `visit` returns a bound, in lengths of the ray's
-    /// direction; items entered beyond the last bound are skipped.
+    /// Visits items whose boxes the ray enters, roughly nearest entry first. `visit` returns the new bound, a distance
+    /// in lengths of the ray's direction; items whose boxes are entered beyond the bound are skipped.
     pub fn along_ray(&self, ray: &Ray, visit: impl FnMut(u32) -> f64) {
         self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `max_distance` as
-    /// initial bound.
+    /// Visits items whose boxes the whole line meets, ahead of the ray's origin or behind, roughly nearest first. The
+    /// bound is `max_distance` at first, then the last value that `visit` returned: a distance from the origin, in
+    /// lengths of the ray's direction. Items whose boxes are beyond the bound are skipped.
     pub fn along_line(&self, ray: &Ray, max_distance: f64, visit: impl FnMut(u32) -> f64) {
         self.descend(max_distance, |bounds| bounds.line_entry(ray), visit);
     }
@@ -238,8 +242,9 @@ impl BoxTree {
         });
     }
 
-    /// Visits items whose entry value is within the bound that `visit` returned last, nearest node first; `entry`
-    /// returns the distance of a box, or `None` to skip it.
+    /// Visits items for whose boxes `entry` returns a distance within the bound: `bound` at first, then the last value
+    /// that `visit` returned. Boxes for which it returns `None` are skipped. Of two sibling nodes, the nearer is
+    /// visited first.
     fn descend(
         &self,
         mut bound: f64,
@@ -265,7 +270,8 @@ impl BoxTree {
         }
     }
 
-    /// Pushes the children of a node onto the stack, the nearer one on top.
+    /// Pushes those children of node `i` for whose boxes `entry` returns a distance onto the stack, the nearer one on
+    /// top.
     fn push_children(&self, i: usize, entry: &impl Fn(&Bounds) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
         let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
@@ -285,7 +291,7 @@ impl BoxTree {
         if node.count == 0 { &[] } else { &self.items[node.link as usize..(node.link + node.count) as usize] }
     }
 
-    /// Visits the overlapping pairs within a leaf.
+    /// Visits the pairs of items of a leaf whose boxes overlap.
     fn pairs_within(&self, leaf: &Node, visit: &mut impl FnMut(u32, u32)) {
         let items = self.items_of(leaf);
         for (k, (bounds, item)) in items.iter().enumerate() {
@@ -297,7 +303,7 @@ impl BoxTree {
         }
     }
 
-    /// Visits the overlapping pairs of two leaves.
+    /// Visits the pairs of an item of leaf `a` and an item of leaf `b` whose boxes overlap.
     fn pairs_between(&self, a: &Node, b: &Node, visit: &mut impl FnMut(u32, u32)) {
         for (bounds, item) in self.items_of(a) {
             if !bounds.overlaps(&b.bounds) {
@@ -312,7 +318,8 @@ impl BoxTree {
     }
 }
 
-/// Builds the subtree of `items`, split at the median along the widest axis; `first` is the index of the first of them.
+/// Builds the subtree of `items`, which it reorders, and appends its nodes to `nodes`; items are split at the median
+/// along the widest axis. `first` is the index of their first among all items of the tree.
 fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.union(item));
     let at = nodes.len();

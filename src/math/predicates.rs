@@ -1,8 +1,8 @@
 //! Exact predicates on points, segments and triangles: the sign of a determinant is never affected by rounding.
 //!
-//! Coordinates are `f32`, determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation with
-//! an error bound decides nearly all calls, and exact arithmetic only those within the bound. Products of three `f32`
-//! can neither overflow nor underflow in `f64`, so the results hold for all finite coordinates.
+//! Determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation with an error bound decides
+//! nearly all calls, and exact arithmetic only those within the bound. Coordinates are `f32`, except in [`orient2d`]:
+//! products of three `f32` can neither overflow nor underflow in `f64`, so the results hold for all finite coordinates.
 //!
 //! Triangles, segments and boxes are closed sets: if they touch, they intersect.
 
@@ -24,8 +24,8 @@ fn coordinates(p: Vec3) -> Coord3D<f32> {
     Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// Returns twice the signed area of the triangle `a b c` in the plane, with an exact sign: positive if it is
-/// counter-clockwise.
+/// Returns twice the signed area of the triangle `a b c` in the plane, with an exact sign: positive if its corners are
+/// counter-clockwise, zero exactly if they are collinear.
 pub fn orient2d([a, b, c]: [DVec2; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(|p| Coord { x: p.x, y: p.y });
     robust::orient2d(a, b, c)
@@ -119,25 +119,26 @@ fn edge_at_corner_intersects(shared: Vec3, tip: Vec3, b: [Vec3; 2]) -> bool {
         .any(|q| segments_intersect([tip, tip], [shared, q]) || segments_intersect([q, q], [shared, tip]))
 }
 
-/// Returns the side of the triangle's plane on which each of the points is, as the sign of [`orient3d`].
+/// Returns the side of the triangle's plane on which each point is, by the sign of [`orient3d`]: positive behind the
+/// triangle, 0 in its plane.
 fn sides(triangle: [Vec3; 3], points: [Vec3; 3]) -> [f64; 3] {
     points.map(|p| orient3d(triangle[0], triangle[1], triangle[2], p))
 }
 
-/// Returns whether all values are positive, or all negative.
+/// Returns whether all values are positive, or all negative: the points are strictly on one side of a plane or line.
 fn one_side(sides: &[f64]) -> bool {
     sides.iter().all(|&side| side > 0.0) || sides.iter().all(|&side| side < 0.0)
 }
 
-/// Returns whether an edge of one triangle, whose corners `edges` are on `sides` of the other's plane, meets that
-/// triangle.
+/// Returns whether an edge of the triangle with corners `edges` meets `triangle`; `sides` holds [`orient3d`] of
+/// `triangle` with each of these corners.
 fn any_edge_intersects(edges: [Vec3; 3], sides: [f64; 3], triangle: [Vec3; 3]) -> bool {
     [(0, 1), (1, 2), (2, 0)]
         .into_iter()
         .any(|(i, j)| segment_intersects_triangle([edges[i], edges[j]], [sides[i], sides[j]], triangle))
 }
 
-/// Returns whether a segment meets a triangle; `sides` are the sides of the triangle's plane on which its ends are.
+/// Returns whether a segment meets a triangle; `sides` holds [`orient3d`] of the triangle with each end of the segment.
 fn segment_intersects_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [Vec3; 3]) -> bool {
     if one_side(&sides) {
         return false;
@@ -182,7 +183,8 @@ enum Axis {
 impl Axis {
     const ALL: [Self; 3] = [Self::Z, Self::X, Self::Y];
 
-    /// Returns twice the signed area of the triangle projected along the axis, with an exact sign.
+    /// Returns twice the signed area of the triangle projected along the axis, with an exact sign: positive if it is
+    /// counter-clockwise seen from the positive end of the axis.
     fn orient(self, a: Vec3, b: Vec3, c: Vec3) -> f64 {
         let project = |p: Vec3| match self {
             Self::X => Coord { x: p.y, y: p.z },

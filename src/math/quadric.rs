@@ -7,7 +7,7 @@ use std::ops::{Add, AddAssign};
 /// A quadric x ↦ xᵀ A x − 2 b·x + c, with A symmetric and positive semidefinite.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quadric {
-    /// A: xx, yy, zz, then (in `mixed`) xy, yz, zx.
+    /// Diagonal entries of A: xx, yy, zz. The entries xy, yz and zx are in `mixed`.
     diagonal: DVec3,
     mixed: DVec3,
     linear: DVec3,

@@ -25,7 +25,8 @@ pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
     sorted(DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), vectors)
 }
 
-/// Returns the Jacobi rotation in the plane of axes `p` and `q` that zeroes the entry `(p, q)`.
+/// Returns the Jacobi rotation R in the plane of axes `p` and `q`, for which RᵀaR has a zero at `(p, q)`; the identity
+/// if that entry is negligible.
 fn jacobi_rotation(a: &DMat3, p: usize, q: usize) -> DMat3 {
     let off = a.col(q)[p];
     let gap = a.col(q)[q] - a.col(p)[p];
@@ -42,8 +43,8 @@ fn jacobi_rotation(a: &DMat3, p: usize, q: usize) -> DMat3 {
     rotation
 }
 
-/// Returns tangent, cosine and sine of the Jacobi rotation that zeroes the off-diagonal entry `off` of two diagonal
-/// entries that differ by `gap`.
+/// Returns tangent, cosine and sine of the angle of the Jacobi rotation that zeroes the entry `off` at (p, q) of a
+/// symmetric matrix a; `gap` is a(q, q) − a(p, p).
 fn jacobi_angle(off: f64, gap: f64) -> [f64; 3] {
     let ratio = gap / (2.0 * off);
     let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
@@ -52,7 +53,7 @@ fn jacobi_angle(off: f64, gap: f64) -> [f64; 3] {
     [tangent, cosine, tangent * cosine]
 }
 
-/// Returns eigenvalues in ascending order, with their eigenvectors as a right-handed basis.
+/// Returns the eigenvalues in ascending order, with their eigenvectors as the columns of a right-handed basis.
 fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
@@ -60,7 +61,7 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix.
+/// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix; its sign is arbitrary.
 pub fn least_eigenvector<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     let mut vectors = [[0.0; N]; N];
     (0..N).for_each(|k| vectors[k][k] = 1.0);
@@ -79,8 +80,8 @@ pub fn least_eigenvector<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     vectors[least]
 }
 
-/// Zeroes the entry `(p, q)` by a Jacobi rotation; returns false if it is negligible. The rows of `vectors` become the
-/// eigenvectors.
+/// Zeroes the entry `(p, q)` of `a` by a Jacobi rotation, and applies it to the rows of `vectors`, which become the
+/// eigenvectors. Returns false, and does nothing, if the entry is negligible.
 #[inline]
 fn rotate<const N: usize>(a: &mut [[f64; N]; N], vectors: &mut [[f64; N]; N], p: usize, q: usize) -> bool {
     let (off, gap) = (a[p][q], a[q][q] - a[p][p]);

@@ -68,14 +68,15 @@ pub fn closest_barycentric([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
 /// of an edge a point is.
 const SLIVER: f64 = 1e-12;
 
-/// Returns the barycentric coordinates of the first candidate with the least squared distance.
+/// Returns the barycentric coordinates, the first component, of the candidate with the least squared distance, the
+/// second; the first of equals.
 fn nearest<const N: usize>(candidates: [(DVec3, f64); N]) -> DVec3 {
     let nearer = |best: (DVec3, f64), next: (DVec3, f64)| if next.1 < best.1 { next } else { best };
     candidates.into_iter().fold((DVec3::X, f64::INFINITY), nearer).0
 }
 
-/// Returns the closest point of a segment to the origin, as `barycentric` of its fraction along the segment, and its
-/// squared distance.
+/// Returns the barycentric coordinates of the closest point to the origin on the segment from `a` to `b`, and its
+/// squared distance; `barycentric` converts its position, a fraction from `a` to `b`, to these coordinates.
 #[inline]
 fn segment(a: DVec3, b: DVec3, barycentric: impl Fn(f64) -> DVec3) -> (DVec3, f64) {
     let s = closest_segment_parameter(a, b);
@@ -103,11 +104,11 @@ pub struct LineHit {
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     origin: DVec3,
-    /// The two axes across, and the one along the line.
+    /// Indices of the coordinate axes: the two across the line, then the one along it.
     axes: [usize; 3],
-    /// Displacement of the line along the first two axes per unit along the third.
+    /// Displacement of the line along each of the two axes across it, per unit along the third.
     shear: [f64; 2],
-    /// Lengths of the direction per unit along the third axis.
+    /// Distance along the line, in lengths of its direction, per unit along the third of `axes`.
     scale: f64,
 }
 
@@ -139,7 +140,8 @@ impl Line {
         Some(LineHit { distance: along * self.scale, barycentric })
     }
 
-    /// Returns the coordinates of a point across and along the line, after the shear.
+    /// Returns the coordinates of `q` after the shear, relative to the line's origin: two across the line, then the one
+    /// along it.
     #[inline]
     fn sheared(&self, q: Vec3) -> [f64; 3] {
         let p = (q.as_dvec3() - self.origin).to_array();

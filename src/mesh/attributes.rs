@@ -4,18 +4,18 @@ use super::VertexId;
 use crate::math::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// A handle of a vector attribute of a mesh.
+/// A handle of a per-vertex 3D vector attribute, returned by [`Mesh::add_vector`](super::Mesh::add_vector).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VectorKey(usize);
 
-/// A handle of a scalar attribute of a mesh.
+/// A handle of a per-vertex scalar attribute, returned by [`Mesh::add_scalar`](super::Mesh::add_scalar).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScalarKey(usize);
 
-/// The attributes of a mesh, one value per vertex slot.
+/// The attributes of a mesh: one array per attribute, with one value per vertex slot.
 ///
-/// Edits change attributes by three operations only: append a slot, interpolate between two slots, reorder slots. So
-/// their arrays always have the length of the mesh.
+/// Edits append, interpolate and reorder the slots of all arrays together, and a rollback restores and truncates them.
+/// So the arrays always have the length of the mesh.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Attributes {
     vectors: Vec<Vec<Vec3>>,
@@ -62,7 +62,8 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.push(0.0));
     }
 
-    /// Sets the attributes of `target` to those of `a` and `b`, interpolated linearly at `t`.
+    /// Sets the attributes of `target` to those of `a` and `b`, interpolated linearly: those of `a` for `t` = 0, those
+    /// of `b` for `t` = 1.
     pub(super) fn blend(&mut self, target: VertexId, a: VertexId, b: VertexId, t: f32) {
         let (target, a, b) = (target.index(), a.index(), b.index());
         for v in &mut self.vectors {

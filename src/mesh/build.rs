@@ -4,16 +4,19 @@ use super::attributes::Attributes;
 use super::{Mesh, MeshError, Ring, TriangleMesh, VertexId};
 use crate::math::Vec3;
 
-/// The largest valence that is accepted; rings are searched linearly.
+/// The largest valence accepted by [`Mesh::from_triangles`]; rings are searched linearly, so that edits around a vertex
+/// of larger valence would be slow.
 const LARGEST_VALENCE: usize = 4096;
 
 impl Mesh {
-    /// Creates a dynamic mesh from a closed, oriented, manifold triangle list. Unused positions are dropped.
+    /// Creates a dynamic mesh from the positions and triangles of a closed, oriented, manifold triangle list. Unused
+    /// positions are dropped.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] for an invalid index, a position that is not finite or an empty list;
     /// [`MeshError::NotClosed`] for a boundary, an edge with more than two triangles, inconsistent orientation, a
-    /// triangle with two equal corners, surfaces that touch at a vertex, or a vertex with more than 4096 triangles.
+    /// triangle with two equal corners, surfaces that touch at a vertex, or a vertex with fewer than 3 or more than
+    /// 4096 triangles.
     pub fn from_triangles(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         check_indices(mesh)?;
         let corners = Links::sort(mesh);
@@ -123,7 +126,7 @@ impl Mesh {
     }
 }
 
-/// The id of a free slot in a renumbering.
+/// The new id of a free slot in [`Mesh::append`], which copies no vertex from it.
 const NO_ID: VertexId = VertexId(u32::MAX);
 
 /// The largest vertex count of a sphere: as many as fit into a browser's memory with room to work.
@@ -185,7 +188,8 @@ impl Links {
     }
 }
 
-/// Orders the links of vertex `v` into its one-ring, or reports why they are not a single cycle.
+/// Orders the links of vertex `v` into its one-ring, or reports why they are not a single cycle of 3 to
+/// [`LARGEST_VALENCE`] edges.
 fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {

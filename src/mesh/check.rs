@@ -34,7 +34,8 @@ pub enum InvariantViolation {
 }
 
 impl Mesh {
-    /// Tests all invariants of the mesh, listed in the documentation of the [module](super).
+    /// Tests the invariants listed in the documentation of the [module](super), and that the per-vertex arrays, the
+    /// free list and the counters are consistent and all positions and attributes finite.
     ///
     /// # Errors
     /// The first violated invariant found.

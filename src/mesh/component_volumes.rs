@@ -5,7 +5,8 @@ use super::disjoint_sets::DisjointSets;
 use crate::math::DVec3;
 
 impl TriangleMesh {
-    /// Returns the connected components that enclose a volume of at least `volume`, whatever their orientation.
+    /// Returns the mesh without the connected components that enclose a volume below `volume`, in the cubed length unit
+    /// of the mesh, whatever their orientation.
     ///
     /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
     /// shell is removed together with its cavity. Only positions and triangles are kept.
@@ -22,8 +23,8 @@ impl TriangleMesh {
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
 
-    /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use. Only positions and
-    /// triangles are kept.
+    /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use; whole components if
+    /// `keeps` has the same value for all vertices of one. Only positions and triangles are kept.
     pub(crate) fn components_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();

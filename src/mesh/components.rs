@@ -2,8 +2,8 @@
 
 use super::{Mesh, VertexId};
 
-/// The largest limit for which [`Mesh::component_of`] searches linearly instead of marking vertices in an array over
-/// the whole mesh.
+/// The largest limit for which [`Mesh::component_of`] searches the vertices found so far linearly, instead of marking
+/// them in an array over the whole mesh.
 const LINEAR_SEARCH_LIMIT: usize = 64;
 
 impl Mesh {

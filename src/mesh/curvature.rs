@@ -22,8 +22,8 @@ pub struct Curvature {
 /// mixed Voronoi area.
 ///
 /// H is the component of the Laplacian along the vertex normal, so that it has a sign and changes it continuously. All
-/// values are finite. Both are 0 at unused vertices, on the boundary of an open mesh, and where all triangles around a
-/// vertex have area 0; such triangles contribute their angles to K and nothing to H. Indices must be valid, see
+/// values are finite. H and K are 0 at unused vertices, on the boundary of an open mesh, and where all triangles around
+/// a vertex have area 0; such triangles contribute their angles to K and nothing to H. Indices must be valid, see
 /// [`TriangleMesh::validate`].
 pub fn curvature(mesh: &TriangleMesh) -> Curvature {
     let mut sums = vec![Sums::default(); mesh.positions.len()];
@@ -43,11 +43,12 @@ pub fn curvature(mesh: &TriangleMesh) -> Curvature {
 /// The sums over the triangles around a vertex from which its curvature is computed.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    /// The sum of the angles at the vertex.
+    /// The sum of the angles at the vertex, in radians.
     angle: f64,
     /// The mixed Voronoi area.
     area: f64,
-    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y, which is 2 H n times the area.
+    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y of the vertex x, with the angles α and β opposite the edge;
+    /// this is 2 H n times the area.
     laplacian: DVec3,
     /// The sum of the cross products of the triangles, outwards; its length is twice their area if they are coplanar.
     normal: DVec3,
@@ -63,8 +64,8 @@ impl Sums {
         self.per_area(std::f64::consts::TAU - self.angle)
     }
 
-    /// Returns an integral over the mixed area divided by the area, limited to the range of `f32`: a tiny area can give
-    /// any number.
+    /// Returns an integral over the mixed area divided by the area; 0 on a boundary or if the area is 0. The result is
+    /// limited to the range of `f32`: a tiny area can give any number.
     fn per_area(&self, integral: f64) -> f64 {
         let value = integral / self.area;
         if self.on_rim || self.area == 0.0 || value.is_nan() {
@@ -102,7 +103,7 @@ fn add(sums: &mut [Sums], corners: [usize; 3], points: [DVec3; 3]) {
     }
 }
 
-/// Returns the angles of a triangle; they sum to π, even if its area is 0.
+/// Returns the angles of a triangle, in radians; they sum to π, even if its area is 0.
 fn angles(points: [DVec3; 3]) -> [f64; 3] {
     let mut angles = [0, 1, 2].map(|k| {
         let (u, v) = (points[(k + 1) % 3] - points[k], points[(k + 2) % 3] - points[k]);
@@ -118,7 +119,7 @@ fn angles(points: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// Returns the share of each corner in the area of a triangle: its Voronoi region, or, if an angle is obtuse, half of
-/// the area at that corner and a quarter at the others (figure 4 of the paper).
+/// the area at that corner and a quarter at the others (figure 4 of Meyer et al.).
 fn mixed_areas(points: [DVec3; 3], cotangents: [f64; 3], area: f64) -> [f64; 3] {
     if cotangents.iter().any(|&c| c < 0.0) {
         return cotangents.map(|c| if c < 0.0 { 0.5 * area } else { 0.25 * area });
@@ -163,7 +164,7 @@ mod tests {
         values.zip(weights).map(|(v, w)| v * w).sum::<f64>() / weights.iter().sum::<f64>()
     }
 
-    /// Returns the largest and the mean relative error.
+    /// Returns the largest and the area-weighted mean relative error of `values`.
     fn off(values: &[f64], areas: &[f64], expected: f64) -> [f64; 2] {
         let off = |v: &f64| (v / expected - 1.0).abs();
         [values.iter().map(off).fold(0.0, f64::max), mean_of(values.iter().map(off), areas)]
@@ -224,7 +225,7 @@ mod tests {
         }
     }
 
-    /// Returns Σ K A, Σ A and the area of the mesh.
+    /// Returns Σ K A and Σ A over the vertices, with their curvature K and area A, and the area of the mesh.
     fn integrals(mesh: &TriangleMesh) -> [f64; 3] {
         let found = curvature(mesh);
         let total = found.gaussian.iter().zip(&found.areas).map(|(k, a)| k * a).sum();

@@ -30,7 +30,8 @@ impl DisjointSets {
         self.count -= usize::from(i != j);
     }
 
-    /// Merges the sets of the triangles at each edge; the numbers are triangle indices.
+    /// Merges the sets of triangles that share an edge, given the half-edges sorted by edge; the numbers in the sets
+    /// are triangle indices.
     pub(super) fn join_across_edges(&mut self, uses: &[HalfEdge]) {
         for pair in by_edge(uses).flat_map(|edge| edge.windows(2)) {
             self.union(pair[0].triangle as usize, pair[1].triangle as usize);

@@ -37,7 +37,7 @@ pub(super) fn sorted_half_edges(triangles: &[[u32; 3]]) -> Vec<HalfEdge> {
     half_edges
 }
 
-/// Iterates over the edges, each as the slice of its half-edges.
+/// Iterates over the edges of `half_edges`, which are sorted by edge: each edge as the slice of its half-edges.
 pub(super) fn by_edge(half_edges: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
     half_edges.chunk_by(|a, b| a.key == b.key)
 }

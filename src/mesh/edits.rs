@@ -1,4 +1,5 @@
-//! Eulerian edits: split (creation), collapse (deletion), flip (inversion), and removal of components.
+//! Eulerian edits: split (creation), collapse (deletion), flip (inversion; Lachaud & Montanvert, section 3.3), and
+//! removal of components.
 
 use super::{EditError, Mesh, Ring, VertexId};
 use crate::math::Vec3;
@@ -25,7 +26,8 @@ impl Mesh {
         }
     }
 
-    /// Splits the edge `uv` by a new vertex at `position` and returns the vertex (the paper's creation).
+    /// Splits the edge `uv` by a new vertex at `position`, with the mean attributes of `u` and `v`, and returns the
+    /// vertex (creation in Lachaud & Montanvert).
     ///
     /// ```text
     ///      a                a
@@ -54,7 +56,8 @@ impl Mesh {
         Ok(w)
     }
 
-    /// Flips the edge `uv`: replaces it by the edge between its two opposite vertices (the paper's inversion).
+    /// Flips the edge `uv`: replaces it by the edge between its two opposite vertices (inversion in Lachaud &
+    /// Montanvert).
     ///
     /// ```text
     ///      a              a
@@ -65,7 +68,8 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`].
+    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`]
+    /// if `u` or `v` has three neighbours only.
     pub fn flip(&mut self, u: VertexId, v: VertexId) -> Result<(), EditError> {
         let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
         if self.ring(a).contains(b) {
@@ -103,7 +107,8 @@ impl Mesh {
         Ok(opposite)
     }
 
-    /// Collapses the edge `uv`: deletes `v` and moves `u` to `position` (the paper's deletion).
+    /// Collapses the edge `uv`: deletes `v` and moves `u` to `position`, with the mean attributes of both (deletion in
+    /// Lachaud & Montanvert).
     ///
     /// # Errors
     /// [`EditError::NotAnEdge`]; [`EditError::LinkCondition`] if `u` and `v` have more than two common neighbours;

@@ -13,7 +13,8 @@ pub enum MeshError {
         /// The invalid value and the accepted range.
         problem: String,
     },
-    /// The surface has a boundary, a non-manifold edge or vertex, or inconsistently oriented triangles.
+    /// The surface has a boundary, a non-manifold edge or vertex, inconsistently oriented triangles, a triangle with
+    /// two equal corners, or a vertex with too few or too many triangles.
     #[error("the mesh is not a closed surface: {problem}")]
     NotClosed {
         /// The defect and its location.
@@ -25,10 +26,10 @@ pub enum MeshError {
         /// The number of intersecting pairs of triangles.
         pairs: usize,
     },
-    /// The mesh needs more memory than is available.
+    /// The mesh needs more memory, or more vertices, than are available.
     #[error("the mesh needs {bytes} bytes, more than is available")]
     TooLarge {
-        /// The memory required, in bytes.
+        /// The memory required, in bytes, estimated from the number of vertices.
         bytes: u64,
     },
 }
@@ -36,7 +37,7 @@ pub enum MeshError {
 /// The reason why an edit was rejected; the mesh is unmodified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
-    /// The two vertices are not adjacent.
+    /// The two vertices are not adjacent, or one of them is not live.
     #[error("{0:?} and {1:?} are not adjacent")]
     NotAnEdge(VertexId, VertexId),
     /// The two vertices are already adjacent, or are the same vertex.
@@ -49,7 +50,7 @@ pub enum EditError {
     /// pinch a neck (link condition).
     #[error("link condition violated: {0:?} is a common neighbour but not opposite the edge")]
     LinkCondition(VertexId),
-    /// The three edges to cut bound a triangle of the surface.
+    /// The three edges passed to [`Mesh::cut`](super::Mesh::cut) bound a triangle of the surface.
     #[error("the three edges bound a triangle of the surface")]
     IsTriangle,
     /// This vertex is not a corner of a component of four vertices.

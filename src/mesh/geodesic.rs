@@ -53,8 +53,8 @@ struct Front<'a> {
     distances: Vec<f64>,
     /// By vertex, how often it has propagated its distance.
     propagations: Vec<u8>,
-    /// Distances as bits, which are ordered like the positive numbers they represent, and vertices; ties go to the
-    /// lower index.
+    /// The vertices to propagate, nearest first: the distance as bits, which are ordered like the non-negative numbers
+    /// they represent, and the vertex index, the lower one first at equal distances.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
 }
 
@@ -73,7 +73,8 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// Returns the vertex of least distance that has not propagated it yet.
+    /// Takes vertices from the queue up to the nearest one that has not propagated its current distance, and returns
+    /// it; `None` if there is none.
     fn pop(&mut self) -> Option<usize> {
         while let Some(Reverse((bits, v))) = self.queue.pop() {
             let v = v as usize;
@@ -96,7 +97,7 @@ impl<'a> Front<'a> {
     }
 
     /// Returns the distance of `c` by paths along the edges of the triangle `a b c` or through it, from the distances
-    /// of `a` and `b`.
+    /// of `a` and `b`; at least its straight distance from the origin.
     fn path_length(&self, a: usize, b: usize, c: usize) -> f64 {
         let [p, q, r] = [a, b, c].map(|v| self.positions[v].as_dvec3());
         let (to_a, to_b) = (self.distances[a], self.distances[b]);
@@ -179,8 +180,8 @@ mod tests {
         [off.iter().copied().fold(0.0, f64::max), off.iter().sum::<f64>() / off.len() as f64]
     }
 
-    /// Returns the largest and the mean error of geodesic distances on a ball of radius 1, where they are arcs of great
-    /// circles.
+    /// Returns the largest and the mean absolute error of geodesic distances on a ball of radius 1, where they are arcs
+    /// of great circles.
     fn off_on_ball(mesh: &TriangleMesh, from: u32) -> [f64; 2] {
         let start = mesh.positions[from as usize].as_dvec3();
         let arc = |p: &Vec3| libm::atan2(start.cross(p.as_dvec3()).length(), start.dot(p.as_dvec3()));
@@ -199,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Triangles of all shapes, many of them obtuse.
+    /// Tests a ball with triangles of all shapes, many of them obtuse.
     #[test]
     fn great_circles_of_an_uneven_ball() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles();
@@ -290,7 +291,8 @@ mod tests {
         }
     }
 
-    /// Returns whether distances are at least the straight distance and at most the distance along edges.
+    /// Returns whether every distance is at least the straight distance from `from`, and at most the distance of each
+    /// neighbour plus the edge between them.
     fn is_between_bounds(mesh: &TriangleMesh, from: u32, found: &[f64]) -> bool {
         let at = |v: u32| mesh.positions[v as usize].as_dvec3();
         let straight = |v: usize| at(v as u32).distance(at(from));

@@ -8,7 +8,8 @@ use smallvec::SmallVec;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Journal {
     touched: Vec<Touched>,
-    /// The attributes of the touched slots, one slot after the other.
+    /// The attributes of the touched slots before their first change, one slot after the other, in the order of
+    /// `touched`.
     attributes: Vec<f32>,
     /// The changes of the free list, in order.
     slots_taken_and_freed: Vec<SlotChange>,
@@ -59,8 +60,8 @@ impl Mesh {
         self.journal.open = false;
     }
 
-    /// Undoes the edits since [`Mesh::begin`] and stops recording. The version counters are not restored; they
-    /// increase.
+    /// Undoes the edits since [`Mesh::begin`] and stops recording; does nothing if edits are not being recorded. The
+    /// version counters are not restored; they increase.
     pub fn roll_back(&mut self) {
         let journal = std::mem::take(&mut self.journal);
         if !journal.open {

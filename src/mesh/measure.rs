@@ -108,7 +108,8 @@ struct Solid {
 /// it would give an arbitrary centroid.
 const FLAT: f64 = 1e-9;
 
-/// Sums area, volume and moments over the tetrahedra from each triangle to `reference`, which affects only rounding.
+/// Sums area, volume and moments over the tetrahedra from each triangle to `reference`, whose choice affects only
+/// rounding if the mesh is closed, and computes the centroid.
 fn solid(triangles: impl Iterator<Item = [DVec3; 3]>, reference: DVec3) -> Solid {
     let (mut area, mut surface_first) = (0.0, DVec3::ZERO);
     let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
@@ -194,7 +195,8 @@ impl Angle {
         if sine == 0.0 && cosine == 0.0 { Self { sine: 0.0, cosine: 1.0 } } else { Self { sine, cosine } }
     }
 
-    /// Tests sin(other − self) > 0, which decides for all angles from 0 to 180°, except between 0 and 180° themselves.
+    /// Returns whether this angle is smaller: if sin(other − self) > 0, or, where that is 0, if this angle is 0 and the
+    /// other one 180°.
     fn is_less_than(&self, other: &Self) -> bool {
         let turn = self.cosine * other.sine - self.sine * other.cosine;
         turn > 0.0 || (turn == 0.0 && self.cosine > 0.0 && other.cosine < 0.0)

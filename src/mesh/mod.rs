@@ -189,7 +189,8 @@ impl Mesh {
         &self.positions
     }
 
-    /// Returns the positions of all slots, indexed by slot, for modification.
+    /// Returns the positions of all slots, indexed by slot, for modification. Changes are not recorded for
+    /// [`Mesh::roll_back`].
     #[inline]
     pub fn positions_mut(&mut self) -> &mut [Vec3] {
         self.geometry_version = self.geometry_version.wrapping_add(1);
@@ -285,7 +286,7 @@ impl Mesh {
         self.ring(u).as_slice().iter().copied().filter(|&w| other.contains(w)).collect()
     }
 
-    /// Returns a free slot, or appends one; the caller must set its ring.
+    /// Returns a free slot, or appends one, and sets its position; the caller must set its ring.
     fn allocate(&mut self, position: Vec3) -> VertexId {
         self.geometry_version = self.geometry_version.wrapping_add(1);
         if let Some(v) = self.free.pop() {

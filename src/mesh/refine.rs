@@ -4,8 +4,8 @@ use super::{Mesh, MeshError, Ring, VertexId};
 
 impl Mesh {
     /// Subdivides all triangles: inserts a vertex at the centroid of each and replaces each old edge by the edge
-    /// between the new vertices on its two sides (√3 subdivision; section 3.4, figure 6). Edge lengths are divided by
-    /// √3, and the number of vertices is about tripled.
+    /// between the new vertices on its two sides (√3 subdivision; Lachaud & Montanvert, section 3.4, figure 6). Old
+    /// vertices do not move. Edge lengths are divided by about √3, and the number of vertices is about tripled.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the result would have more vertices than there are ids.

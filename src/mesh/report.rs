@@ -12,8 +12,8 @@ use crate::math::predicates::collinear;
 pub struct MeshReport {
     /// Whether no edge belongs to exactly one triangle; true without triangles.
     pub closed: bool,
-    /// Whether the triangles at each edge traverse it equally often in both directions, apart from one unpaired
-    /// triangle.
+    /// Whether, at each edge, equally many triangles traverse it in both directions, apart from one if their number is
+    /// odd.
     pub oriented: bool,
     /// The number of edges with more than two triangles.
     pub non_manifold_edges: usize,

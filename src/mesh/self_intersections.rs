@@ -10,9 +10,9 @@ use crate::math::{Bounds, BoxTree, Vec3};
 /// first, sorted.
 ///
 /// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
-/// two triangles with the same three corners. Triangles with two equal corners, an invalid index or a position that is
-/// not finite are ignored. The list may be quadratic in the number of triangles; [`count_self_intersections`] only
-/// counts.
+/// two triangles with the same three corners, unless these are collinear. Triangles with two equal corners, an invalid
+/// index or a position that is not finite are ignored. The list may be quadratic in the number of triangles;
+/// [`count_self_intersections`] only counts.
 pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     for_each_intersecting_pair(mesh, |s, t| pairs.push([s, t]));
@@ -66,7 +66,8 @@ pub struct Facet {
 }
 
 impl Facet {
-    /// Returns the corners rotated cyclically, so that the one that satisfies `is_first` comes first.
+    /// Returns the corner positions, rotated cyclically so that the corner whose vertex index satisfies `is_first`
+    /// comes first.
     fn rotated(&self, is_first: impl Fn(u32) -> bool) -> [Vec3; 3] {
         let [a, b, c] = self.points;
         match self.corners.map(is_first) {
@@ -80,7 +81,7 @@ impl Facet {
 /// Returns whether two triangles intersect beyond their common corners and edges.
 ///
 /// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
-/// two triangles with the same three corners.
+/// two triangles with the same three corners, unless these are collinear.
 pub fn facets_intersect(s: &Facet, t: &Facet) -> bool {
     let in_s = |v: u32| s.corners.contains(&v);
     let in_t = |v: u32| t.corners.contains(&v);

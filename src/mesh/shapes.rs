@@ -41,7 +41,8 @@ pub fn icosahedron() -> TriangleMesh {
     TriangleMesh { positions: [in_xy, in_yz, in_zx].concat(), triangles: fans.concat(), ..Default::default() }
 }
 
-/// Returns a torus around the z axis with `around` × `along` vertices.
+/// Returns a torus around the z axis: a tube of radius `minor` around a circle of radius `major`, with `around`
+/// vertices along that circle times `along` around the tube.
 pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
     let angle = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
     let point = |i: u32, j: u32| {
@@ -70,7 +71,8 @@ pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
     all
 }
 
-/// Returns random triangles over points with small integer coordinates, which include all kinds of degeneracies.
+/// Returns random triangles over half as many points with integer coordinates from 0 to `range` − 1; if the range is
+/// small, they include all kinds of degeneracies.
 pub fn soup(seed: u64, triangles: usize, range: u64) -> TriangleMesh {
     let mut state = seed;
     let mut next = |limit: u64| {

@@ -8,24 +8,24 @@ use crate::math::Vec3;
 /// The two triangles that cap the surface after [`Mesh::cut`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The original vertices, which bound the left side of the directed cycle.
+    /// The original vertices, which bound the surface to the left of the directed cycle of edges.
     pub kept: [VertexId; 3],
-    /// Their copies, in the same order, which bound the right side.
+    /// The copies of the original vertices, in the same order, which bound the surface to the right of the cycle.
     pub copies: [VertexId; 3],
 }
 
 /// The two rims that [`Mesh::join`] connected by a tube.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TubeRims {
-    /// The vertices of the rim around the first centre, in the order of its ring.
+    /// The vertices of the rim around the first of the two joined vertices, in the order of its ring.
     pub first: Vec<VertexId>,
-    /// The vertices of the rim around the second centre, in the order of its ring.
+    /// The vertices of the rim around the second of the two joined vertices, in the order of its ring.
     pub second: Vec<VertexId>,
 }
 
 impl Mesh {
     /// Cuts the surface along the cycle of edges `u v`, `v o`, `o u` and caps both sides with a triangle (annular
-    /// change, section 3.3, figure 5). χ increases by 2.
+    /// change; Lachaud & Montanvert, section 3.3, figure 5). χ increases by 2.
     ///
     /// The copies have the positions of their originals; the caller moves the two sides apart.
     ///
@@ -73,8 +73,8 @@ impl Mesh {
         *self.ring_mut(copies[k]) = close(copies[previous], &right, copies[next]);
     }
 
-    /// Replaces the discs around `u` and `v` by a tube between them (axial change, section 3.3, figure 4). χ decreases
-    /// by 2.
+    /// Replaces the discs around `u` and `v` by a tube between them (axial change; Lachaud & Montanvert, section 3.3,
+    /// figure 4). χ decreases by 2.
     ///
     /// The rims of the tube are new vertices on the edges around `u` and `v`, at the fraction `reach` of each edge from
     /// the centre (0 < reach < 1). As they are new, the result is simplicial even if `u` and `v` have common
@@ -105,8 +105,8 @@ impl Mesh {
         Ok(TubeRims { first, second })
     }
 
-    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim in
-    /// the order of its ring.
+    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim
+    /// in the order of its ring.
     ///
     /// ```text
     ///   n1-----n0             n1-----n0

@@ -33,7 +33,7 @@ impl TriangleMesh {
     /// texture comes with texture coordinates.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`], which names the array and its first invalid entry.
+    /// [`MeshError::InvalidArgument`], which names the array, and its first invalid entry or its wrong length.
     pub fn validate(&self) -> Result<(), MeshError> {
         let invalid = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
@@ -140,7 +140,8 @@ impl TriangleMesh {
         Self { triangles: renumbered, corner_uvs, ..component }
     }
 
-    /// Returns a mesh of the given vertices with their normals, texture coordinates and colours, without triangles.
+    /// Returns a mesh of the given vertices without triangles, with their normals, texture coordinates per vertex and
+    /// colours, and with the texture.
     pub(super) fn vertex_subset(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
@@ -164,9 +165,9 @@ impl TriangleMesh {
         sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
     }
 
-    /// Returns texture coordinates per vertex, for formats without seams: at a seam those of one side are used, which
-    /// distorts the texture on the triangles of the other sides. [`Self::split_at_seams`] avoids this with more
-    /// vertices.
+    /// Returns texture coordinates per vertex, for formats without seams, or `None` if there are none: at a seam those
+    /// of one side are used, which distorts the texture on the triangles of the other sides. [`Self::split_at_seams`]
+    /// avoids this with more vertices.
     pub fn uvs_ignoring_seams(&self) -> Option<Vec<Vec2>> {
         let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
         let mut uvs = vec![Vec2::ZERO; self.positions.len()];
@@ -177,7 +178,7 @@ impl TriangleMesh {
     }
 
     /// Returns the mesh with vertices on texture seams duplicated, one per distinct texture coordinate, so that `uvs`
-    /// replaces `corner_uvs`. Returns a copy if there are no `corner_uvs`.
+    /// replaces `corner_uvs`. Unused vertices are dropped. Returns a copy if there are no `corner_uvs`.
     pub fn split_at_seams(&self) -> Self {
         let Some(corner_uvs) = &self.corner_uvs else { return self.clone() };
         let mut corners: Vec<([u32; 3], u32)> = Vec::with_capacity(3 * corner_uvs.len());

@@ -12,17 +12,20 @@ pub(super) struct Tube {
 }
 
 impl Tube {
-    /// Returns the corners of the second polygon connected to corner `i` of the first, in the order of the walk.
+    /// Returns the corners of the second polygon connected to corner `i` of the first, in the order of the edges along
+    /// the tube.
     pub(super) fn connected_to_first(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(a, _)| a == i).map(|(_, j)| j)
     }
 
-    /// Returns the corners of the first polygon connected to corner `j` of the second, in the order of the walk.
+    /// Returns the corners of the first polygon connected to corner `j` of the second, in the order of the edges along
+    /// the tube.
     pub(super) fn connected_to_second(&self, j: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(_, b)| b == j).map(|(i, _)| i)
     }
 
-    /// Returns the single cyclic run of pairs that satisfy `holds`, from its start.
+    /// Returns the edges that satisfy `holds`, which must be consecutive in the cyclic sequence, from the first of
+    /// them.
     fn run<'a>(
         &'a self,
         holds: impl Fn(&(usize, usize)) -> bool + Copy + 'a,
@@ -34,8 +37,8 @@ impl Tube {
     }
 }
 
-/// The minimum number of times that a walk switches between the two polygons. With fewer, a whole polygon is connected
-/// to a single corner of the other, and the first and last edge of that fan coincide.
+/// The minimum number of times that a walk around the tube switches from one polygon to the other. With fewer, a whole
+/// polygon is connected to a single corner of the other, and the first and last edge of that fan coincide.
 const MIN_SWITCHES: usize = 4;
 
 /// The largest coordinate for which squared distances, and sums of them, are sure to fit into `f32`. Polygons beyond it
@@ -74,19 +77,20 @@ pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     Tube { pairs: best.map(|(_, pairs)| pairs).unwrap_or_default() }
 }
 
-/// The polygon along which a walk advances.
+/// The polygon along which a walk around the tube advances from one edge to the next.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Step {
     First = 0,
     Second = 1,
 }
 
-/// The table of the dynamic programming: the cheapest walk to each state, for one offset and one first step.
+/// The table of the dynamic programming in [`shortest_tube`]: the cheapest walk to each state, for one offset and one
+/// first step.
 struct WalkTable {
     rows: usize,
     columns: usize,
     first_step: Step,
-    /// By state, the cost and the step and number of switches of its predecessor.
+    /// By state, the cost of the cheapest walk to it, and the step and number of switches of the state before it.
     states: Vec<(f32, u8, u8)>,
 }
 
@@ -108,7 +112,7 @@ impl WalkTable {
         walks
     }
 
-    /// Relaxes the two states that follow each state at (i, j).
+    /// Updates the costs of the states that can follow each state at (i, j).
     fn relax(&mut self, i: usize, j: usize, cost: &impl Fn(usize, usize) -> f32) {
         for last in 0..2 {
             for switches in 0..=MIN_SWITCHES {
@@ -137,8 +141,8 @@ impl WalkTable {
         }
     }
 
-    /// Returns the final step and number of switches of the cheapest closed walk with at least [`MIN_SWITCHES`]
-    /// switches.
+    /// Returns the last step and the number of switches of the cheapest closed walk with at least [`MIN_SWITCHES`]
+    /// switches; a switch between the last and the first step is not in the number. `None` if there is no such walk.
     fn best_end(&self) -> Option<(usize, usize)> {
         let other = 1 - self.first_step as usize;
         let ends =

@@ -3,11 +3,12 @@
 use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 
-/// The shortest mean edge accepted. With shorter ones, areas in single precision are rounded to few digits, or to 0.
+/// The smallest mean edge length accepted of a caller's mesh, in the units of its coordinates. With shorter edges,
+/// areas in single precision are rounded to few digits, or to 0.
 const MIN_MEAN_EDGE: f64 = 1e-12;
 
-/// Converts a caller's mesh to a [`Mesh`] after checking that it is closed, faces outwards and does not intersect
-/// itself. `parameter` is the name used in errors.
+/// Converts a caller's mesh to a [`Mesh`] after checking that it is not empty, closed, faces outwards, does not
+/// intersect itself, and passes [`check_edges`]. `parameter` is the name used in errors.
 pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     if mesh.triangles.is_empty() {
         return Err(MethodError::invalid(parameter, "the mesh is empty; it must be a closed surface"));
@@ -24,7 +25,8 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
     }
 }
 
-/// Checks that the mean edge is long enough for computations in single precision.
+/// Checks that the mean edge of a mesh is at least [`MIN_MEAN_EDGE`], long enough for computations in single precision.
+/// `parameter` is the name used in errors.
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {

@@ -11,13 +11,13 @@ pub enum MethodError {
     InvalidArgument {
         /// The name of the parameter in the public API.
         parameter: &'static str,
-        /// The invalid value and the accepted range.
+        /// The reason, with the accepted range and the invalid value if there is a range.
         problem: String,
     },
-    /// The start mesh cannot be used.
+    /// The caller's mesh is unsuitable, a mesh would intersect itself, or one does not fit into memory.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The volume cannot be used.
+    /// The volume is unsuitable, or data of its size does not fit into memory.
     #[error(transparent)]
     Volume(#[from] VolumeError),
     /// The surface exceeds the largest number of vertices that the image and the sampling allow.

@@ -1,4 +1,4 @@
-//! The binary envelope of saved states: a mark, a checksum, and the serialised state.
+//! The binary envelope of saved states: magic bytes, a checksum, and the serialised state.
 
 use super::MethodError;
 use crate::mesh::Mesh;
@@ -17,17 +17,17 @@ pub fn can_be_checked(mesh: &Mesh) -> bool {
     mesh.rings().iter().all(|ring| ring.valence() <= MAX_VALENCE)
 }
 
-/// Serialises a state of a method, preceded by the mark and a checksum.
+/// Serialises a state of a method, preceded by `magic` and a checksum.
 pub fn encode<T: Serialize>(magic: &Magic, state: &T) -> Vec<u8> {
     // Serialising plain data into memory cannot fail.
     let body = postcard::to_allocvec(state).unwrap_or_default();
     [&magic[..], &Hash::of(&body).to_le_bytes(), &body].concat()
 }
 
-/// Deserialises a state from bytes made by [`encode`] with the same mark.
+/// Deserialises a state from bytes made by [`encode`] with the same `magic`.
 ///
 /// # Errors
-/// [`MethodError::BadState`] if the mark or the checksum differs, or the bytes are not exactly one state.
+/// [`MethodError::BadState`] if `magic` or the checksum differs, or the bytes are not exactly one state.
 pub fn decode<T: DeserializeOwned>(magic: &Magic, bytes: &[u8]) -> Result<T, MethodError> {
     let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
     let Some((sum, body)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk::<8>()) else {

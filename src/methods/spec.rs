@@ -58,7 +58,7 @@ impl ParamSpec {
         choices: None,
     };
 
-    /// Checks that a number is within the accepted range.
+    /// Checks that a number is finite and within the accepted range, ends included.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the parameter and the accepted range.
@@ -107,8 +107,8 @@ pub enum ParamDefault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ParamScale {
-    /// Linearly.
+    /// Equal steps of the slider add equal amounts to the value.
     Linear,
-    /// Logarithmically.
+    /// Equal steps of the slider multiply the value by equal factors.
     Log,
 }

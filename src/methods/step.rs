@@ -11,11 +11,11 @@ pub struct StepReport {
     pub iteration: u32,
     /// Whether the method has finished.
     pub done: bool,
-    /// The current phase as text for the user.
+    /// The current phase as text for the user, such as "level 1".
     pub phase: String,
     /// The progress of the method from 0 to 1, NaN if unknown.
     pub progress: f64,
-    /// The convergence measure of the method.
+    /// The convergence measure of the method, such as the mean energy of a deformable model; NaN if unknown.
     pub residual: f64,
     /// The value below which the residual counts as converged.
     pub tolerance: f64,

@@ -45,7 +45,8 @@ impl Clusters {
         Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
     }
 
-    /// Dissolves clusters with a vertex further than `furthest` from the mean along its normal.
+    /// Dissolves clusters with a vertex further than `furthest` from the mean of its cluster, measured along the vertex
+    /// normal.
     fn dissolve_bent(&mut self, mesh: &TriangleMesh, furthest: f32) {
         let means = self.means(mesh);
         let normals = mesh.vertex_normals();
@@ -74,8 +75,8 @@ impl Clusters {
         self.dissolve(|c| euler[c as usize] != 1);
     }
 
-    /// Dissolves the clusters for which `dissolves` is true, identified by their lowest vertex; returns whether one of
-    /// them had more than one vertex.
+    /// Dissolves into single vertices the clusters for which `dissolves` is true, identified by their lowest vertex;
+    /// returns whether one of them had more than one vertex.
     fn dissolve(&mut self, dissolves: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
         for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && dissolves(**c)) {
@@ -102,8 +103,8 @@ impl Clusters {
         TriangleMesh { positions: self.means(mesh), triangles, ..TriangleMesh::default() }
     }
 
-    /// Dissolves the clusters at edges of more than two triangles, at vertices of fewer than three, and at triangles
-    /// that turn by more than 60°; returns whether there were any.
+    /// Dissolves the clusters at edges of more than two triangles of `merged`, at vertices of fewer than three, and at
+    /// triangles turned by more than 60° against `mesh`; returns whether there were any.
     fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
@@ -148,7 +149,8 @@ fn edges(mesh: &TriangleMesh) -> impl Iterator<Item = [usize; 2]> + '_ {
     directed_edges(mesh).filter(|[u, v]| u < v).map(|edge| edge.map(|v| v as usize))
 }
 
-/// Returns the edges that several triangles contain in the same direction; `valences` are those of the vertices.
+/// Returns the edges that several triangles contain in the same direction; `valences` are the numbers of triangles at
+/// the vertices.
 fn doubled_edges(mesh: &TriangleMesh, valences: &[u32]) -> Vec<[u32; 2]> {
     let mut ends = vec![0u32; directed_edges(mesh).count()];
     // Ends of the edges from each vertex, in one range of `ends` each.
@@ -183,7 +185,7 @@ mod tests {
         p.round().as_ivec3()
     }
 
-    /// Returns the iso-surface of a shape in a grid of 24 voxels along each side.
+    /// Returns the iso-surface at 0 of `depth`, sampled on a grid of 24³ voxels around the origin.
     fn contour(depth: impl Fn(Vec3) -> f32) -> TriangleMesh {
         let n = 24;
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;

@@ -4,9 +4,9 @@ use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
-/// Positions of the rim of a tube along the spokes, as fractions from the centre. Nearer to the centre the tube is thin
-/// and is cut again at once; further out the strip around it is thinner than δ and collapses. The others are tried if
-/// the first would cause a self-intersection.
+/// Positions of the rim of a tube on the edges around a joined vertex, as fractions of the edge from that vertex.
+/// Nearer to it the tube is thin and is cut again at once; further out the strip around it is thinner than δ and
+/// collapses. The others are tried in turn if the first would cause a self-intersection.
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower id first, with their squared distance.
@@ -54,7 +54,8 @@ impl Resolver {
         }
     }
 
-    /// Returns the pairs in contact with at least one marked vertex, nearest first.
+    /// Returns the pairs of vertices in contact, nearest first, of which at least one was marked for the contact query;
+    /// clears the marks.
     fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<ContactPair> {
         let mut dirty = self.take_dirty();
         dirty.retain(|&v| mesh.is_live(v));
@@ -82,8 +83,8 @@ impl Resolver {
         contacts
     }
 
-    /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge, otherwise by a tube.
-    /// `None` if nothing was changed.
+    /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge, otherwise by a tube,
+    /// if `guide` allows it. `None` if nothing was changed.
     fn resolve_contact(
         &mut self,
         mesh: &mut Mesh,

@@ -1,5 +1,5 @@
-//! Decimation: edges are collapsed in the order of their quadric error (Garland & Heckbert, *Surface simplification using quadric error
-//! metrics*, 1997).
+//! Decimation: edges are collapsed in the order of their quadric error (Garland & Heckbert, *Surface simplification
+//! using quadric error metrics*, 1997).
 //!
 //! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns over; no
 //! self-intersections are added, and no component changes sides of another (from inside to outside or back). All of
@@ -21,16 +21,16 @@ const POINT_WEIGHT: f64 = 1e-4;
 /// test is quadratic in it.
 const MAX_NEIGHBOURS: usize = 24;
 
-/// The cosine of the largest angle by which a triangle may turn, 78°.
+/// The cosine of the largest angle by which one collapse may turn a triangle, 78°.
 const MIN_COSINE: f64 = 0.2;
 
 /// The number of times all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds
 /// that free one edge each would make the work quadratic.
 const ROUNDS: usize = 4;
 
-/// The work limit of the intersection tests, in pairs of boxes and triangles, per triangle of the mesh and for any
-/// mesh; 200 to 600 per triangle are common. With five times as much, 42,000 triangles whose boxes all overlap took 48
-/// s.
+/// The work limit of the intersection tests, in boxes visited and pairs of triangles tested: this much per triangle of
+/// the mesh, plus `WORK_AT_LEAST`. 200 to 600 per triangle are common. With five times as much, 42,000 triangles whose
+/// boxes all overlap took 48 s.
 const WORK_PER_TRIANGLE: u64 = 2_000;
 const WORK_AT_LEAST: u64 = 10_000_000;
 
@@ -65,7 +65,7 @@ struct Decimation<'a> {
     quadrics: Vec<Quadric>,
     /// The origin of the quadrics, near the mesh for precision.
     origin: DVec3,
-    /// The number of collapses at each vertex slot, which tells outdated candidates.
+    /// The number of collapses at each vertex slot, by which outdated candidates are recognised.
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
@@ -155,8 +155,8 @@ impl<'a> Decimation<'a> {
         self.stamps[u.index()] + self.stamps[v.index()]
     }
 
-    /// Returns candidate positions for the remaining vertex by increasing error: the minimiser, the midpoint, both
-    /// ends.
+    /// Returns the candidate positions for the remaining vertex by increasing error: the minimiser, if it is in range,
+    /// the midpoint and both ends.
     fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[RatedPosition; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
@@ -170,7 +170,8 @@ impl<'a> Decimation<'a> {
         positions
     }
 
-    /// Returns whether no triangle turns over, degenerates or intersects another after the collapse.
+    /// Returns whether the collapse turns no triangle by more than 78°, degenerates none and makes none intersect
+    /// another, moves no component to the other side of the surface, and leaves a valence of at most 24.
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -193,7 +194,7 @@ impl<'a> Decimation<'a> {
     }
 }
 
-/// Returns whether a triangle may be replaced by another: it keeps its orientation and a nonzero area. A degenerate
+/// Returns whether a triangle may be replaced by another: it turns by at most 78° and has a nonzero area. A degenerate
 /// triangle has no orientation to keep.
 fn may_replace(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));

@@ -5,9 +5,9 @@ use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
 use crate::mesh::{EditError, Mesh, OppositeVertices, VertexId};
 
-/// The longest edge that a collapse may produce, as a factor of the upper bound. While all edges are within bounds,
-/// none exceeds 1.4; in a surface much finer than δ and too crowded for splits, repeated collapses would produce
-/// needles.
+/// The longest edge that a collapse may produce, as a factor of the upper bound, unless it was as long before. While
+/// all edges are within bounds, none exceeds 1.4; in a surface much finer than δ and too crowded for splits, repeated
+/// collapses would produce needles.
 const LENGTHENED: f32 = 1.6;
 
 /// The largest number of edits around one vertex in a call; it is then skipped until it is marked again. Edits of edges
@@ -15,7 +15,8 @@ const LENGTHENED: f32 = 1.6;
 const MAX_EDITS: u8 = 40;
 
 impl Resolver {
-    /// Processes the queue until all edges around its vertices are within bounds.
+    /// Brings the edges around queued vertices within bounds where possible, until the queue is empty or the work limit
+    /// of the call is reached.
     pub(super) fn restore_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
         while self.embedding.effort() < self.max_effort {
             let Some(u) = self.pop() else { return };
@@ -25,7 +26,8 @@ impl Resolver {
         }
     }
 
-    /// Makes a split, flip or collapse at a vertex, and rolls it back if the mesh would intersect itself.
+    /// Makes a split, flip or collapse at a vertex, and rolls it back if triangles would intersect. Outside the tested
+    /// cells, only triangles with a common corner are tested.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -51,7 +53,8 @@ impl Resolver {
         self.edits[u.index()] += 1;
     }
 
-    /// Brings the first edge around `u` that is out of bounds and can be edited within bounds.
+    /// Edits the first edge around `u` that is out of bounds, to bring it within them; if an edit is rejected, tries
+    /// the next such edge.
     fn restore_vertex(
         &mut self,
         mesh: &mut Mesh,
@@ -78,8 +81,8 @@ impl Resolver {
         }
     }
 
-    /// Shortens an edge that is too long: flips it if a new vertex would be too near the opposite ones, otherwise
-    /// splits it.
+    /// Removes an edge that is too long: flips it if a vertex at its midpoint would be too near an opposite one and the
+    /// flip makes it shorter, otherwise splits it. `Ok(false)` at the limit of vertices.
     fn shorten(
         &mut self,
         mesh: &mut Mesh,
@@ -106,8 +109,8 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Removes an edge that is too short: collapses it, cuts the neck that blocks the collapse, or removes an isolated
-    /// tetrahedron.
+    /// Removes an edge that is too short: collapses it if `guide` allows it, cuts the neck that blocks the collapse, or
+    /// removes an isolated tetrahedron. `Ok(false)` if `guide` forbids it.
     fn remove_short(
         &mut self,
         mesh: &mut Mesh,
@@ -127,7 +130,8 @@ impl Resolver {
         }
     }
 
-    /// Collapses the edge into the best position that causes no self-intersection.
+    /// Collapses the edge into the first of [`collapse_positions`] that makes no edge too long and causes no
+    /// self-intersection.
     fn collapse(
         &mut self,
         mesh: &mut Mesh,
@@ -175,7 +179,7 @@ fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     })
 }
 
-/// Returns whether moving `u` turns over a triangle around it that does not contain `v`.
+/// Returns whether moving `u` to `to` turns over a triangle around it that does not contain `v`.
 fn turns_over(mesh: &Mesh, u: VertexId, v: VertexId, to: Vec3) -> bool {
     let from = mesh.position(u);
     mesh.ring(u).pairs().filter(|&(a, b)| a != v && b != v).any(|(a, b)| {

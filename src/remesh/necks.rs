@@ -5,17 +5,18 @@ use crate::math::Vec3;
 use crate::math::order::{rank_f32, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, VertexId};
 
-/// Distances by which the two sides of a cut are moved apart, in δ; the first that causes no self-intersection is used.
-/// At shorter ones the sides are soon in contact again.
+/// Distances in δ by which each side of a cut is moved away from the other; the first that causes no self-intersection
+/// is used. At shorter ones the sides are soon in contact again.
 const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 
-/// The largest displacement of a side, as a share of the distance to the mean of its neighbours: no triangle turns
-/// over.
+/// The largest displacement of a side of a cut, as a share of its distance from the mean of its neighbours along the
+/// axis of the neck, so that no triangle turns over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
 
 impl Resolver {
     /// Cuts the neck along a ring of three edges through the edge `uv` and a common neighbour (annular change): the
-    /// shortest such ring whose cut causes no self-intersection.
+    /// shortest such ring that `guide` allows and whose cut causes no self-intersection. `Ok(false)` if `guide` allows
+    /// none.
     pub(super) fn cut_neck(
         &mut self,
         mesh: &mut Mesh,
@@ -77,7 +78,7 @@ impl Resolver {
     }
 }
 
-/// Moves the two sides of a cut apart along the axis of the neck.
+/// Moves the two sides of a cut apart along the axis of the neck, each by `push` or less (see [`CUT_PUSH_LIMIT`]).
 fn move_apart(mesh: &mut Mesh, cut: Cut, push: f32) {
     let [a, b, c] = cut.kept.map(|v| mesh.position(v));
     let centre = (a + b + c) * (1.0 / 3.0);

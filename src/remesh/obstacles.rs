@@ -4,11 +4,10 @@
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_intersect};
 
-/// A bounding volume hierarchy over the one-rings of all vertices: a balanced tree of boxes in the order of a
-/// space-filling curve.
+/// A bounding volume hierarchy over the one-rings of all vertices, with which decimation tests for intersections: a
+/// balanced tree of boxes in the order of a space-filling curve.
 ///
-/// The tree structure is fixed while vertices are removed, so an update costs O(log n); it is meant for algorithms that
-/// coarsen a mesh.
+/// The tree structure is fixed while vertices are removed, so an update costs O(log n).
 pub(super) struct Obstacles {
     /// Nodes in heap order: node i has the children 2i and 2i + 1, and the leaves are the last half.
     nodes: Vec<Bounds>,
@@ -16,15 +15,15 @@ pub(super) struct Obstacles {
     leaves: Vec<u32>,
     /// The vertex of each leaf.
     vertices: Vec<VertexId>,
-    /// The connected component of each vertex slot.
+    /// The number of the connected component of each vertex slot.
     components: Vec<u32>,
-    /// The remaining work budget, in pairs of a box and a triangle; see [`Self::is_exhausted`].
+    /// The remaining work budget, in boxes visited and pairs of triangles tested; see [`Self::is_exhausted`].
     work_left: u64,
     stack: Vec<u32>,
 }
 
 impl Obstacles {
-    /// Builds the tree of `mesh`, with a work budget of `work` pairs.
+    /// Builds the tree of `mesh`, with a work budget of `work` visited boxes and tested pairs of triangles.
     pub fn new(mesh: &Mesh, work: u64) -> Self {
         let vertices = in_curve_order(mesh);
         let first_leaf = vertices.len().next_power_of_two();
@@ -42,8 +41,8 @@ impl Obstacles {
     }
 
     /// Returns whether the triangles `fresh` may not replace the one-rings of `replaced`: they have more than common
-    /// corners and edges in common with each other or with other triangles of `mesh` (exact, touching included), or a
-    /// whole component would change sides without being touched.
+    /// corners and edges in common with each other or with other triangles of `mesh` (exact, touching included), or
+    /// another component would change from inside to outside or back.
     ///
     /// `mesh` is the mesh before the edit; the first of `replaced` is in the edited component.
     pub fn blocks(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
@@ -101,8 +100,8 @@ impl Obstacles {
         false
     }
 
-    /// Returns whether the work budget is used up: the work is quadratic in the number of triangles whose boxes all
-    /// overlap.
+    /// Returns whether the work budget is used up. The work of testing triangles whose boxes all overlap is quadratic
+    /// in their number.
     pub fn is_exhausted(&self) -> bool {
         self.work_left == 0
     }
@@ -144,7 +143,8 @@ fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
     boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.union(&one))
 }
 
-/// Returns whether `p` is enclosed between the old and the new triangles, and would change sides of the surface.
+/// Returns whether `p`, a vertex of another component, is enclosed between the old and the new triangles, so that it
+/// would change sides of the surface.
 fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     if !edit.around.contains(p) {
         return false;
@@ -162,7 +162,7 @@ fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     (fresh - old).abs() > std::f64::consts::TAU
 }
 
-/// Returns the connected component of each vertex slot.
+/// Returns the number of the connected component of each vertex slot.
 fn components(mesh: &Mesh) -> Vec<u32> {
     let mut components = vec![0; mesh.slots()];
     for (number, members) in (0..).zip(mesh.component_members()) {

@@ -12,10 +12,10 @@ use std::collections::VecDeque;
 /// violated. Hard scenes never needed more than five; the rest stays pending for the next call.
 const PASSES: usize = 8;
 
-/// The work limit of a call in nearby vertices visited, per vertex of the mesh and for any mesh; the rest stays pending
-/// for the next call. An edit visits about 60, and ordinary iterations make less than one edit per ten vertices.
-/// Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the surface
-/// edges cannot be brought within bounds.
+/// The work limit of a call, in nearby vertices visited: this much per vertex of the mesh, plus `MIN_EFFORT`; the rest
+/// stays pending for the next call. An edit visits about 60, and ordinary iterations make less than one edit per ten
+/// vertices. Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the
+/// surface edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
 const MIN_EFFORT: u64 = 100_000;
 
@@ -28,20 +28,20 @@ pub struct Resolver {
     /// The cells in which splits, flips and collapses are tested in full for self-intersections; everywhere if `None`.
     pub(super) tested_cells: Option<CellSet>,
     overflowed: bool,
-    /// The value of [`Embedding::effort`] at which this call ends.
+    /// The value of [`Embedding::effort`] at which the current call ends.
     pub(super) max_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
-    /// Number of edits around each vertex in this call.
+    /// Number of edits made around each vertex in the current call, by slot.
     pub(super) edits: Vec<u8>,
-    /// Vertices moved or created since the last contact query.
+    /// Vertices marked for the next contact query.
     dirty: Vec<VertexId>,
     is_dirty: Vec<bool>,
-    /// Vertices that could not move at all in the last move.
+    /// Vertices that could not move at all in the last move, sorted.
     pub(super) stuck: Vec<VertexId>,
-    /// Components small enough to be removed.
+    /// Components of so few vertices that they may be removed.
     pub(super) small: SmallComponents,
-    /// Vertices created or displaced by the last call.
+    /// Vertices that edits of the last call of [`Self::resolve`] created or displaced.
     pub(super) edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
     pub(super) changes: Changes,
@@ -66,15 +66,16 @@ pub trait TopologyGuide {
     /// Returns whether the mesh may be cut along a ring of three edges (annular change).
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool;
 
-    /// Returns whether a short edge may be collapsed.
+    /// Returns whether a short edge may be collapsed: one that spans a thin wall or gap would merge the two sides.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Returns whether there is foreground inside a small solid component, or background inside a small cavity. If not,
-    /// a crushed component is removed; a cavity would otherwise grow inside the foreground.
+    /// Returns whether there is foreground inside a small solid component, or background inside a small cavity. Those
+    /// without are removed sooner when they are crushed or lose their volume: such a cavity would grow inside the
+    /// foreground.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
-/// A [`TopologyGuide`] that allows every topology change, as in the paper.
+/// A [`TopologyGuide`] that allows every topology change, as in the paper, and finds content in no small component.
 #[derive(Clone, Copy, Debug)]
 pub struct Unguided;
 
@@ -96,7 +97,8 @@ impl TopologyGuide for Unguided {
     }
 }
 
-/// The vertices left pending by the last call, in order; part of a saved run.
+/// The vertices left pending by the last call of [`Resolver::resolve`], in the order of processing; part of a saved
+/// run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pending {
     /// Vertices whose edges have to be checked.
@@ -140,9 +142,9 @@ impl Resolver {
         self.contact_policy = contact;
     }
 
-    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`]
-    /// does; everywhere in full if `None`. Restricting the tests halves the time; the whole mesh has to be tested
-    /// afterwards.
+    /// Restricts the full tests for self-intersections of splits, flips and collapses to `cells`; elsewhere these are
+    /// tested as by [`Embedding::attempt_in_one_rings`]. With `None` all are tested in full. The restriction halves the
+    /// time; the whole mesh has to be tested afterwards.
     pub fn set_tested_cells(&mut self, cells: Option<CellSet>) {
         self.tested_cells = cells;
     }
@@ -163,7 +165,8 @@ impl Resolver {
         self.max_vertices
     }
 
-    /// Returns [`Self::max_vertices`] if the last call left an edge too long because of this limit; reported once.
+    /// Returns [`Self::max_vertices`] if the last call of [`Self::resolve`] left an edge too long because of this
+    /// limit; reported once.
     pub fn take_overflow(&mut self) -> Option<usize> {
         std::mem::take(&mut self.overflowed).then_some(self.max_vertices)
     }
@@ -175,9 +178,11 @@ impl Resolver {
         !self.overflowed
     }
 
-    /// Restores the edge bounds and resolves contacts around the `active` vertices, and returns the changes made.
+    /// Restores the edge bounds and resolves contacts around the `active` vertices and those pending since the last
+    /// call; returns the changes made.
     ///
-    /// Other vertices are processed only if an edit or a contact reaches them.
+    /// Other vertices are processed only if an edit or a contact reaches them. First, components crushed by the last
+    /// move are removed, and necks held in it are cut.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }
@@ -263,7 +268,8 @@ impl Resolver {
         self.embedding.refine(mesh)
     }
 
-    /// Returns the vertices that edits of the last call created or displaced; some may have been deleted since.
+    /// Returns the vertices that edits of the last call of [`Self::resolve`] created or displaced; some may have been
+    /// deleted since.
     pub fn edited(&self) -> &[VertexId] {
         &self.edited
     }
@@ -334,8 +340,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Regression: on a needle pulled out of a sphere, edits undo each other or are rejected, and contacts are everywhere; a single call
-    /// never returned.
+    /// Regression: on a needle pulled out of a sphere, edits undo each other or are rejected, and contacts are
+    /// everywhere; a single call never returned.
     #[test]
     fn a_needle_is_resolved_in_calls_of_bounded_work() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 5.0, 1.5).unwrap();

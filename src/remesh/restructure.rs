@@ -26,8 +26,8 @@ impl EdgeBounds {
     }
 }
 
-/// The largest number of vertices of a result, and the memory in bytes per vertex during remeshing: limits for use in a
-/// browser.
+/// The largest number of vertices of a result: a limit for use in a browser, where each takes about `BYTES_PER_VERTEX`
+/// during remeshing.
 pub(super) const MAX_VERTICES: usize = 8_000_000;
 const BYTES_PER_VERTEX: f64 = 250.0;
 
@@ -60,7 +60,7 @@ impl EdgeBounds {
     }
 }
 
-/// Returns the memory needed for a number of vertices, in bytes.
+/// Returns the memory needed to remesh to a number of vertices, in bytes.
 pub(super) fn bytes(vertices: f64) -> u64 {
     // Saturates beyond the range.
     (vertices * BYTES_PER_VERTEX) as u64
@@ -78,7 +78,7 @@ pub trait EditPolicy {
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError>;
 
-    /// Returns whether `removed` may be collapsed into `kept`, in addition to the tests of the mesh itself.
+    /// Returns whether the second vertex may be collapsed into the first, in addition to the tests of the mesh itself.
     fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
         true
     }
@@ -124,7 +124,7 @@ impl EditPolicy for Embedding {
 /// many edits; with a smaller one, edges on ridges stay out of bounds.
 const MIN_COSINE: f32 = 0.2;
 
-/// The lowest valence after a collapse: a vertex of valence three lies inside a triangle.
+/// The lowest valence after a collapse or flip: a vertex of valence three lies inside a triangle.
 pub(super) const MIN_VALENCE: usize = 4;
 
 /// The highest valence after a collapse: among many short edges it would grow without bound, and rings are searched
@@ -197,7 +197,7 @@ pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, remo
         && [left, right].iter().all(|&w| mesh.ring(w).valence() > MIN_VALENCE)
 }
 
-/// Returns whether collapsing `removed` into `kept` makes no edge too long and turns over no triangle.
+/// Returns whether collapsing `removed` into `kept` makes no edge too long and turns no triangle by more than 78°.
 fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) -> bool {
     let (to, from) = (mesh.position(kept), mesh.position(removed));
     let longest = bounds.max * bounds.max;
@@ -211,7 +211,8 @@ fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) 
     })
 }
 
-/// Returns whether two normals of any positive length differ by less than the angle by which a triangle may turn.
+/// Returns whether two normals, of any positive length, differ by less than 78°, the angle by which a triangle may
+/// turn.
 pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
     // Squares avoid square roots; the comparison is false for NaN.
@@ -276,7 +277,8 @@ pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Ed
     changes
 }
 
-/// Flips the edge if that lowers the valence sum, and marks the vertices of all edges with changed corners as stale.
+/// Flips the edge if that lowers Σ (valence − 6)² and is allowed, and marks as stale the vertices of all edges with
+/// changed corners; returns whether it was flipped.
 fn flip_if_wanted(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -317,8 +319,8 @@ fn wants_flip(
         && edits.may_flip(mesh, [u, v], [left, right])
 }
 
-/// Returns whether a flip is allowed: the new edge is within bounds, or nearer to them than the old one, and neither
-/// triangle turns over.
+/// Returns whether a flip is allowed: the new edge is within bounds, or nearer to them than the old one, and the new
+/// triangles face as the old ones, within 78°.
 pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], across: [VertexId; 2]) -> bool {
     let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
     let (old, new) = (p.distance_squared(q), a.distance_squared(b));

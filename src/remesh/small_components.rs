@@ -5,17 +5,17 @@ use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 
-/// The largest number of vertices of a component that may be removed, whatever its volume; the volume of a cavity is
-/// negative.
+/// The largest number of vertices of a small component. Larger ones are not removed; a small volume alone would not
+/// tell, since that of a cavity is negative.
 const MAX_VERTICES: usize = 32;
 
 /// The volume of an icosahedron with edges of length δ, in δ³: the smallest sphere that can be sampled.
 const SMALLEST_SPHERE: f32 = 2.18;
 
-/// The components of a mesh small enough to be removed.
+/// The small components of a mesh, of at most [`MAX_VERTICES`] vertices, which are removed when they lose their volume.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallComponents {
-    /// A vertex of each component, and whether it is solid, with a positive volume.
+    /// A vertex of each small component, and whether it is solid, with a positive volume.
     components: Vec<(VertexId, bool)>,
     /// The topology version of the mesh for which the list is valid.
     topology_version: Option<u32>,
@@ -29,7 +29,7 @@ impl SmallComponents {
         }
     }
 
-    /// Updates the small components after edits of the components of `edited`.
+    /// Updates the list after edits that created or displaced the vertices `edited`.
     fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
         let known = std::mem::take(&mut self.components);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
@@ -59,8 +59,8 @@ impl Resolver {
     ///
     /// It may have been removed before: the two sides of a cut handle are one component.
     ///
-    /// Such a component has at most 32 vertices and a volume less than δ³. One of negative volume would grow in empty
-    /// space, unless `guide` finds a cavity there.
+    /// A negligible component has at most 32 vertices and a signed volume less than δ³, and is not a cavity of at least
+    /// δ³ that `guide` confirms. Other components of negative volume would grow in empty space.
     pub(super) fn remove_if_negligible(
         &mut self,
         mesh: &mut Mesh,
@@ -86,9 +86,10 @@ impl Resolver {
     /// Removes small components that were crushed or inverted by a move.
     ///
     /// When two sides press against each other, vertices are held, no edge becomes short, and a component would persist
-    /// for ever. So it is removed if it is flat, if none of its vertices could move, or if more than half of them could
-    /// not and `guide` finds it empty. A component this small can also be inverted between two states without
-    /// self-intersections, as when the apex of a tetrahedron passes through its base.
+    /// for ever. So a component with held vertices is removed if it is smaller than the smallest sphere, if none of its
+    /// vertices could move, or if it is solid, more than half of them could not, and `guide` finds it empty. A
+    /// component this small can also be inverted between two states without self-intersections, as when the apex of a
+    /// tetrahedron passes through its base.
     pub(super) fn remove_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -115,8 +116,9 @@ impl Resolver {
         }
     }
 
-    /// Updates the small components after the edits of a call, and removes cavities smaller than the smallest sphere:
-    /// an edit may have inverted a solid, which would grow in empty space.
+    /// Updates the list of small components after the edits of a call, and removes cavities smaller than the smallest
+    /// sphere, except for those of at least δ³ that `guide` confirms: an edit may have inverted a solid, which would
+    /// grow in empty space.
     pub(super) fn update_small_components(
         &mut self,
         mesh: &mut Mesh,
@@ -157,7 +159,7 @@ impl Resolver {
         }
     }
 
-    /// Returns the vertices of other components that lie inside a component.
+    /// Returns the vertices of other components that lie inside the component with the vertices `members`.
     fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
         let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
         let mut found = self.embedding.vertices_in(mesh, &Bounds::from_points(&positions));
@@ -165,7 +167,8 @@ impl Resolver {
         found
     }
 
-    /// Removes all negligibly small components, and returns their number.
+    /// Removes all negligible components, of at most 32 vertices and less than δ³, except for cavities that `guide`
+    /// confirms; returns the number of components removed.
     pub fn remove_negligible(
         &mut self,
         mesh: &mut Mesh,
@@ -180,8 +183,8 @@ impl Resolver {
     }
 }
 
-/// Returns whether a component with stuck vertices is crushed: flat, all stuck, or more than half stuck and empty
-/// according to `guide`.
+/// Returns whether a component with `stuck` vertices that could not move is crushed: smaller than the smallest sphere,
+/// all stuck, or solid, more than half stuck and empty according to `guide`.
 fn is_crushed(
     mesh: &Mesh,
     members: &[VertexId],
@@ -195,8 +198,8 @@ fn is_crushed(
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }
 
-/// Returns the signed volume of a component, as compared with the threshold of removal: positive for a cavity that
-/// `guide` confirms.
+/// Returns the volume of a component to be compared with the thresholds of removal: that of a cavity counts as positive
+/// if `guide` confirms it, otherwise as negative.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
@@ -248,7 +251,8 @@ mod tests {
         resolver.resolve(mesh, sampling, &all)
     }
 
-    /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and split, seed 297).
+    /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and
+    /// split, seed 297).
     #[test]
     fn an_inverted_component_is_removed() {
         let rim = |k: u32| {
@@ -305,7 +309,8 @@ mod tests {
         assert_shrinks_away(component, Sampling::new(1.4), 0.3);
     }
 
-    /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed 10529).
+    /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed
+    /// 10529).
     #[test]
     fn a_crumpled_component_is_removed() {
         let component = mesh(
@@ -380,7 +385,8 @@ mod tests {
         assert_eq!(both.vertex_count(), 12);
     }
 
-    /// Returns a solid in a cavity, and another solid beside them, with the vertices of the cavity.
+    /// Returns three icosahedra, a cavity, a solid inside it and another solid beside it, and the vertices of the
+    /// cavity.
     fn nested() -> (Mesh, Vec<VertexId>) {
         let mut hollow = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
         hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));

@@ -3,7 +3,8 @@
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 
-/// The cells of a regular grid that contain a point of a set or are adjacent to such a cell.
+/// A set of cells of a regular grid: those that contain an added point, and all cells adjacent to them. Quickly rejects
+/// positions that are not near the points.
 #[derive(Clone, Debug)]
 pub struct CellSet {
     side: f32,
@@ -25,7 +26,7 @@ impl CellSet {
         }
     }
 
-    /// Returns whether a point is in one of the cells; always true within distance `side` of an added point.
+    /// Returns whether a point is in a cell of the set; always true within distance `side` of an added point.
     pub fn contains(&self, p: Vec3) -> bool {
         self.cells.contains(&self.cell(p))
     }

@@ -5,30 +5,30 @@ use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::triangle;
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Distances between two surfaces, in the length unit of the meshes. All except `per_vertex` are symmetric, bit for
-/// bit.
+/// Distances between two surfaces, in the length unit of the meshes. All except `per_vertex` are the same, bit for bit,
+/// if the surfaces are exchanged.
 ///
 /// One-way distances are measured from the vertices of one mesh to the surface of the other and weighted by a third of
-/// the area of the triangles around each vertex. Unused vertices are ignored. Between vertices, a surface may be
-/// further away, by at most an edge length.
+/// the area of the triangles around each vertex. Unused vertices are ignored, except in `per_vertex`. Between vertices,
+/// a surface may be further away, by at most an edge length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceDistance {
     /// The unsigned distance of each vertex of the first mesh from the second surface.
     pub per_vertex: Vec<f64>,
-    /// The mean distance: the average of the two one-way means.
+    /// The mean distance: the average of the two area-weighted one-way means.
     pub mean: f64,
-    /// The root mean square of the distances of both ways.
+    /// The root mean square distance: the square root of the average of the two area-weighted one-way mean squares.
     pub rms: f64,
     /// The larger one of the two area-weighted one-way 95th percentiles.
     pub p95: f64,
-    /// The Hausdorff distance, evaluated at the vertices.
+    /// The Hausdorff distance, evaluated at the vertices: the largest one-way distance of a vertex of either mesh.
     pub hausdorff: f64,
 }
 
 /// Measures the distance between two surfaces, from each to the other.
 ///
-/// O(n log n), except for parts equally far from everything: each vertex of a speck at the centre of a sphere visits
-/// every triangle.
+/// O(n log n), unless many triangles are equally near: each vertex of a speck at the centre of a sphere visits every
+/// triangle.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] if either (parameter `mesh` is the first, `other` the second) has no triangle, or if

@@ -19,7 +19,7 @@ pub struct PointGrid {
 }
 
 impl Default for PointGrid {
-    /// Creates an empty grid for a few points about 1 apart.
+    /// Creates an empty grid with cells of side 1, for a few points.
     fn default() -> Self {
         Self::new(1.0, 0)
     }

@@ -26,7 +26,8 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
     segments.filter(|[p, q]| p != q).collect()
 }
 
-/// Returns the index of the corner that is alone on its side of the plane, `None` if all are on the same side.
+/// Returns the index of the corner that is alone on its side of the plane, given whether each is above it; `None` if
+/// all are on the same side.
 fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     match (a == b, b == c) {
         (true, true) => None,

@@ -22,7 +22,8 @@ impl SurfaceWalker {
     /// Creates a walker on a closed, oriented manifold mesh.
     ///
     /// # Errors
-    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] if an edge has only one triangle.
+    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] if an edge has a triangle on one side only, or two of
+    /// inconsistent orientation.
     pub fn new(mesh: TriangleMesh) -> Result<Self, MeshError> {
         mesh.validate()?;
         let across = neighbours(&mesh)?;
@@ -47,7 +48,8 @@ impl SurfaceWalker {
         a * at.barycentric.x + b * at.barycentric.y + c * at.barycentric.z
     }
 
-    /// Returns the closest point to `p` on the whole surface, by a tree query; `None` if `p` is not finite.
+    /// Returns the closest point to `p` on the whole surface, by a tree query; `None` if `p` is not finite or there are
+    /// no triangles.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         self.tree().closest(p)
     }
@@ -58,7 +60,8 @@ impl SurfaceWalker {
         self.tree.get_or_init(|| TriangleTree::new(&self.mesh).unwrap_or_else(|_| TriangleTree::empty()))
     }
 
-    /// Returns the closest point to `p` by testing every triangle, for a single query without building the tree.
+    /// Returns the closest point to `p` by testing every triangle, for a single query without building the tree; `None`
+    /// if `p` is not finite or there are no triangles.
     pub fn closest_brute_force(&self, p: Vec3) -> Option<SurfacePoint> {
         let found = |t: u32| self.nearest_on(t, p);
         (0..self.mesh.triangles.len() as u32)
@@ -77,8 +80,8 @@ impl SurfaceWalker {
         self.point(&here)
     }
 
-    /// Returns the closest point on the triangles that share the edge or corner on which `here` lies, if it is strictly
-    /// closer.
+    /// Returns the closest point to `p` on the triangles that share the edge or corner on which `here` lies; `None` if
+    /// it is not strictly closer, or if `here` lies inside a triangle.
     fn step(&self, here: &TrianglePoint, p: Vec3) -> Option<TrianglePoint> {
         let weights = here.barycentric.to_array();
         let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
@@ -94,7 +97,7 @@ impl SurfaceWalker {
         (best.square < here.square).then_some(best)
     }
 
-    /// Returns the closest point on the triangles around a corner of the triangle `start`.
+    /// Returns the closest point to `p` on the triangles around a corner of the triangle `start`.
     fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> TrianglePoint {
         let hub = self.mesh.triangles[start as usize][corner];
         let mut best = self.nearest_on(start, p);
@@ -133,7 +136,7 @@ impl SurfaceWalker {
     }
 }
 
-/// The closest point on one triangle.
+/// The point of one triangle that is closest to a query point.
 #[derive(Clone, Copy, Debug)]
 struct TrianglePoint {
     triangle: u32,
@@ -143,6 +146,9 @@ struct TrianglePoint {
 }
 
 /// Returns for each triangle the triangles across the edges opposite its corners.
+///
+/// # Errors
+/// [`MeshError::NotClosed`] if there is no triangle across an edge.
 fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     let (first, half_edges) = half_edges_by_start(mesh);
     let across = |from: u32, to: u32| {

@@ -9,30 +9,32 @@
 use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 
-/// The radius bound of the first class, as a multiple of the median radius. If smaller, the few long edges of an
-/// ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
+/// The radius bound of the first size class of balls, as a multiple of the median radius. If smaller, the few long
+/// edges of an ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
 const FIRST_CLASS_BOUND: f32 = 1.6;
 
-/// The ratio of the radius bounds of consecutive classes. If smaller, there are more classes; if larger, more pairs are
-/// tested and rejected.
+/// The ratio of the radius bounds of consecutive size classes. If smaller, there are more classes; if larger, more
+/// pairs are tested and rejected.
 const FACTOR: f32 = 4.0;
 
-/// The width of columns, as a multiple of the search distance of their class; above 1, so that balls in non-adjacent
-/// columns are out of reach in spite of rounding.
+/// The width of columns, the square cells of the xy-plane, as a multiple of the search distance of their size class;
+/// above 1, so that balls in non-adjacent columns are out of reach in spite of rounding.
 const COLUMN_MARGIN: f64 = 1.001;
 
-/// The largest absolute column index, so that adjacent indices do not overflow. At this distance from the origin,
-/// columns are narrower than the spacing of single-precision numbers.
+/// The bound to which column indices are clamped in absolute value, so that adjacent indices do not overflow. At this
+/// distance from the origin, columns are narrower than the spacing of single-precision numbers.
 const MAX_COLUMN: f64 = 1_073_741_824.0;
 
-/// The largest number of columns per ball, including empty ones, for which a counting sort is used.
+/// The largest number of columns per ball in the bounding rectangle of the balls, including empty ones, for which a
+/// counting sort is used.
 const MAX_COLUMNS_PER_BALL: usize = 8;
 
-/// The number of bits of the [`Filter`] per column near a large ball; with fewer, more small balls pass it needlessly.
+/// The number of bits of the [`Filter`] per column that it contains; with fewer, more balls of smaller classes pass it
+/// needlessly.
 const FILTER_BITS: usize = 8;
 
-/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::distance_for`]. The order is
-/// unspecified but deterministic.
+/// Calls `found` once with every pair of `balls` whose centres are no farther apart than [`Proximity::distance_for`]
+/// returns for their radii. The order is unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
@@ -49,7 +51,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// Returns the median radius, but at least the smallest positive normal number.
+/// Returns the median radius, but at least the smallest positive normal number; 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
     let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.radius).collect();
     let half = sizes.len() / 2;
@@ -60,7 +62,7 @@ fn median_radius(balls: &[VertexBall]) -> f32 {
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
-/// Finds the near pairs within a class, and those of its balls with smaller balls.
+/// Finds the near pairs within a size class, and those of its balls with balls of smaller classes.
 fn sweep_class(
     class: &[VertexBall],
     smaller: &[VertexBall],
@@ -107,8 +109,8 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// Returns the indices that sort `columns`, the columns of balls. A counting sort, several times as fast, is used if the
-/// columns are as densely occupied as those of a mesh.
+/// Returns the indices that sort `columns`, which contains the column of each ball. A counting sort, several times as
+/// fast, is used if the columns are as densely occupied as those of a mesh.
 fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
         let of_axis = || columns.iter().map(|column| i64::from(column[axis]));
@@ -141,7 +143,7 @@ fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     order
 }
 
-/// Balls sorted by column, then by height.
+/// Balls sorted by column, then by height (z).
 struct Columns {
     balls: Vec<VertexBall>,
     /// The occupied columns in order, each with the index of its first ball, and a sentinel at the end.
@@ -187,7 +189,7 @@ impl Columns {
         &self.balls[self.columns[k].1..self.columns[k + 1].1]
     }
 
-    /// Visits the pairs in the same or adjacent columns whose heights differ by at most `reach`.
+    /// Calls `test` with the pairs of balls in the same or adjacent columns whose heights differ by at most `reach`.
     fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut row = 0;
         for k in 0..self.count() {
@@ -204,8 +206,8 @@ impl Columns {
         }
     }
 
-    /// Visits the pairs of own balls and balls of `other` in the same or adjacent columns whose heights differ by at
-    /// most `reach`.
+    /// Calls `test` with the pairs of own balls and balls of `other` in the same or adjacent columns whose heights
+    /// differ by at most `reach`.
     fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {
@@ -216,8 +218,9 @@ impl Columns {
         }
     }
 
-    /// Visits the pairs of `balls` with those of the columns `[x, y − 1]` to `[x, y + 1]`. `row` is an index at or
-    /// before the first of these columns and is advanced to it; columns are visited in order.
+    /// Calls `test` with the pairs of `balls` and the balls of the columns `[x, y − 1]` to `[x, y + 1]` whose heights
+    /// differ by at most `reach`. `row` is an index at or before the first of these columns and is advanced to it, so
+    /// successive calls must be in the order of columns.
     fn visit_row_pairs(
         &self,
         balls: &[VertexBall],
@@ -237,7 +240,8 @@ impl Columns {
     }
 }
 
-/// Visits the pairs of two columns whose heights differ by at most `reach`; both columns are sorted by height.
+/// Calls `test` with the pairs of balls of two columns whose heights differ by at most `reach`; both columns are sorted
+/// by height.
 #[inline]
 fn visit_column_pairs(
     balls: &[VertexBall],
@@ -255,7 +259,8 @@ fn visit_column_pairs(
     }
 }
 
-/// A Bloom filter of the columns in or adjacent to a set of columns; it rejects most others.
+/// A Bloom filter of the columns in or adjacent to those of a size class; it rejects most smaller balls that are not
+/// near that class.
 struct Filter {
     bits: Vec<u64>,
     mask: u32,

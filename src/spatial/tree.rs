@@ -20,8 +20,8 @@ pub struct SurfacePoint {
     pub barycentric: Vec3,
     /// The position of the point.
     pub point: Vec3,
-    /// The distance from the query point, or the signed distance from the origin of the ray or line, in the length unit
-    /// of the mesh.
+    /// The distance from the query point, or the signed distance from the origin of the ray or line, negative behind
+    /// it, in the length unit of the mesh.
     pub distance: f64,
 }
 
@@ -76,8 +76,8 @@ impl TriangleTree {
         found
     }
 
-    /// Collects into `found` the distinct labels of all triangles within `distance` of `p`; `label` maps a triangle to
-    /// its label.
+    /// Sets `found` to the distinct labels of all triangles within `distance` of `p`; `label` maps a triangle to its
+    /// label.
     pub fn labels_within(&self, p: Vec3, distance: f64, label: impl Fn(u32) -> u32, found: &mut Vec<u32>) {
         let reach = distance * distance;
         found.clear();
@@ -149,8 +149,8 @@ impl NearestHit {
         Self { max_distance, found: None }
     }
 
-    /// Takes a hit of triangle `item` into account, if there is one; returns the distance up to which nearer hits
-    /// remain possible.
+    /// Takes a hit of triangle `item` into account, if there is one; returns the absolute distance up to which nearer
+    /// hits remain possible.
     #[inline]
     pub fn add(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
         let Some(hit) = hit else { return self.max_distance };
@@ -163,7 +163,8 @@ impl NearestHit {
         self.max_distance
     }
 
-    /// Returns the nearest hit as a surface point; `corners` returns the corner positions of a triangle.
+    /// Returns the nearest hit as a surface point, `None` if there is none; `corners` returns the corner positions of a
+    /// triangle.
     pub fn point(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
         let (item, hit) = self.found?;
         Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))

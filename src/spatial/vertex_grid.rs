@@ -16,7 +16,7 @@ const FACTOR: f32 = 4.0;
 /// such a query visits eight cells.
 const CELL: f32 = 1.5;
 
-/// The mean number of vertices per hash bucket.
+/// The largest mean number of vertices per hash bucket when [`VertexGrid::link_cells`] creates the buckets.
 const LOAD: usize = 2;
 
 /// The level of a vertex that is not in the grid.
@@ -35,21 +35,21 @@ const NONE: u32 = u32::MAX;
 /// [`Self::link_cells`] before the next queries.
 #[derive(Clone, Debug, Default)]
 pub struct VertexGrid {
-    /// The distance that a vertex may have moved since its position was set.
+    /// The distance by which a vertex may have moved since its position was set in the grid.
     max_displacement: f32,
-    /// By level, the largest ball radius assigned to it.
+    /// By level, the largest radius of balls stored on it; the last level also stores larger balls.
     max_radius: [f32; LEVELS],
-    /// By level, the largest radius inserted since the cells were filled.
+    /// By level, the largest ball radius inserted since the cells were linked.
     largest_radius: [f32; LEVELS],
     /// By level, the inverse of the cell side.
     inverse_cell: [f32; LEVELS],
-    /// By level, the number of vertices.
+    /// By level, the number of vertices linked into cells.
     counts: [u32; LEVELS],
     /// The number of buckets, a power of two, minus 1.
     mask: u32,
     /// By bucket, the head of its list: the vertex inserted last.
     heads: Vec<u32>,
-    /// Whether vertices are linked into buckets.
+    /// Whether vertices are linked into the buckets of their cells.
     linked: bool,
     /// By vertex slot, the entry of the vertex.
     entries: Vec<Entry>,
@@ -103,7 +103,7 @@ const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO,
 
 impl VertexGrid {
     /// Creates an empty grid for about `vertices` vertices that may move by `max_displacement` after insertion. It is
-    /// fastest if most longest edges are slightly shorter than `edge`, which must be positive.
+    /// fastest if the longest edge of most vertices is slightly shorter than `edge`, which must be positive.
     pub fn new(edge: f32, max_displacement: f32, vertices: usize) -> Self {
         let mut grid = Self { max_displacement, ..Self::default() };
         let mut bound = edge;
@@ -189,7 +189,7 @@ impl VertexGrid {
         self.entries[v.index()].position
     }
 
-    /// Returns the longest edge last set for `v`, which must be in the grid.
+    /// Returns the length of the longest edge last set for `v`, which must be in the grid.
     #[inline]
     pub fn radius(&self, v: VertexId) -> f32 {
         self.entries[v.index()].radius
@@ -247,8 +247,9 @@ impl VertexGrid {
         self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `own_radius`: all
-    /// whose distance from the box, in each axis, is at most [`Proximity::distance_for`], and some further away.
+    /// Sets `found` to all balls that may be paired with vertices in the box `bounds` whose longest edges are at most
+    /// `own_radius`: those whose centre is within [`Proximity::distance_for`] of the box in each axis, and some further
+    /// away.
     pub fn near_balls(&self, bounds: &Bounds, own_radius: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
         let radius = |other: f32| {
@@ -257,14 +258,15 @@ impl VertexGrid {
         self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
 
-    /// Returns the hash of the cell of `v`, which must be in the grid with cells filled; used to group queries by cell.
+    /// Returns the hash of the cell of `v`, which must be in the grid with its cells linked; used to group queries by
+    /// cell.
     #[inline]
     pub fn cell_key(&self, v: VertexId) -> u32 {
         self.entries[v.index()].key
     }
 
     /// Calls `found` with every vertex that may be within `radius` of the box, in each axis. `radius` is a function of
-    /// the longest edge; with cells filled, it is evaluated only for the largest ball of each level.
+    /// the longest edge; if cells are linked, it is evaluated only for the largest ball of each level.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
         if !self.linked {
@@ -309,8 +311,8 @@ impl VertexGrid {
         }
     }
 
-    /// Calls `found` with the vertices of one cell that are in the box; vertices of other cells in the same bucket are
-    /// skipped, so that none is found twice.
+    /// Calls `found` with the vertices in the box `wide` whose cell has the hash `key`; other vertices in the same
+    /// bucket are skipped. A vertex is found twice only if two cells of a query have the same hash.
     #[inline]
     fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let mut at = self.heads[(key & self.mask) as usize];
@@ -378,8 +380,8 @@ mod tests {
     /// The position and longest edge of each vertex, `None` for removed vertices.
     type Known = Vec<Option<(Vec3, f32)>>;
 
-    /// Inserts, moves and removes vertices at random, with cells filled and empty; most edges are ordinary, some tiny
-    /// or huge. Returns the expected contents.
+    /// Inserts, moves and removes vertices at random, with cells linked and unlinked; most edges are ordinary, some
+    /// tiny or huge. Returns the expected contents.
     fn shuffled(grid: &mut VertexGrid, next: &mut impl FnMut() -> f32) -> Known {
         let mut known: Known = vec![None; 600];
         for _ in 0..3000 {

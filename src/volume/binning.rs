@@ -8,8 +8,9 @@ use crate::math::{DAffine3, DMat3, DVec3};
 const MAX_FACTOR: usize = 16;
 
 impl Volume {
-    /// Returns the volume binned by `factors` along x, y and z: each voxel is the mean of a block, in every frame, and
-    /// keeps the numeric type. Incomplete blocks at the far ends are dropped.
+    /// Returns the volume binned by `factors` along x, y and z: each voxel is the mean of the finite voxels of a block,
+    /// in every frame. The numeric type is kept, so means are rounded for integers. Incomplete blocks at the far ends
+    /// are dropped.
     ///
     /// Images that were interpolated to pixels smaller than measured, as is common in magnetic resonance, hold the same
     /// information in fewer voxels, and windows of a fixed number of voxels then cover a larger region.
@@ -52,7 +53,8 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// Returns the mean of the finite stored values in a block; NaN if there are none.
+    /// Returns the mean of the finite stored values in the block of `size` voxels from voxel `first` in the frame that
+    /// begins at index `start`; NaN if there are none.
     fn block_mean(&self, start: usize, first: [usize; 3], size: [usize; 3]) -> f64 {
         let [nx, ny, _] = self.dims();
         let (mut sum, mut count) = (0.0, 0.0);

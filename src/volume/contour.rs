@@ -49,8 +49,8 @@ pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError
     Ok(marching.mesh)
 }
 
-/// Reserves memory for `additional` elements, growing by at least a quarter: doubling the arrays of a large surface would
-/// take more memory than the rest of a run.
+/// Reserves memory for `additional` elements, growing by at least a quarter of the length: doubling the arrays of a
+/// large surface would take more memory than the rest of a run.
 fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
     if vector.capacity() - vector.len() >= additional {
         return Ok(());
@@ -79,12 +79,12 @@ struct MarchingCubes<'a> {
     cases: &'static [Case],
     /// Number of nodes along x and along y.
     size: [usize; 2],
-    /// For each node of two slices, whether it (bit 0) and the next one in y (bit 1) are inside.
+    /// For each node of two slices, whether it (bit 0) and the next one along y (bit 1) are inside.
     pairs: [Vec<u8>; 2],
-    /// Case of each cube in the current row.
+    /// Marching cubes case of each cube in the current row.
     row: Vec<u8>,
-    /// Vertex on each grid edge, indexed by the node where the edge starts: x edges of an even and an odd slice, y
-    /// edges of an even and an odd slice, z edges between the two.
+    /// Index of the vertex on each grid edge, found by the node where the edge starts: x edges of an even and an odd
+    /// slice, y edges of an even and an odd slice, z edges between the two.
     vertices: Vec<u32>,
     mesh: TriangleMesh,
 }
@@ -117,7 +117,7 @@ impl<'a> MarchingCubes<'a> {
         Ok(())
     }
 
-    /// Fills `pairs` for node slice `z`.
+    /// Classifies the nodes of slice `z` as inside or outside, and stores the result in `pairs`.
     fn classify(&mut self, z: usize) {
         let [width, height] = self.size;
         let pairs = &mut self.pairs[z % 2];

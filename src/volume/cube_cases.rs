@@ -31,7 +31,7 @@ pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
 ];
 
 /// The edges along x, y and z that end in the cube's far corner. When cubes are processed in index order, no earlier
-/// cube contains them, so their vertices are created here.
+/// cube contains them, so their vertices are created with this cube.
 pub(super) const FAR_EDGES: [usize; 3] = [3, 7, 11];
 
 /// The triangles of one marching cubes case, as edge numbers, counter-clockwise seen from outside.
@@ -60,7 +60,7 @@ fn derive(case: usize) -> Case {
     Case { triangles, far_cuts }
 }
 
-/// Returns the corner number of an offset from the cube's origin.
+/// Returns the number of a cube's corner, 0 to 7, from its offset from the cube's origin.
 pub(super) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
     dy | dz << 1 | dx << 2
 }
@@ -108,7 +108,7 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// Returns, for each cut edge, the next cut edge on its loop.
+/// Returns, for each cut edge, the next cut edge on its loop; `None` for edges that are not cut.
 fn next_on_loop(case: usize) -> [Option<usize>; 12] {
     let inside = |corner: usize| case >> corner & 1 == 1;
     let between = edges_between();
@@ -136,8 +136,9 @@ fn share_face(a: usize, b: usize) -> bool {
     (0..3).any(|axis| (0..2).any(|side| on(a, axis, side) && on(b, axis, side)))
 }
 
-/// Triangulates a loop with least area, by dynamic programming over its ranges i..=j: `best[i][j]` is the least area of a
-/// triangulation of the range, closed by the diagonal from i to j, and the vertex k that achieves it.
+/// Triangulates a loop with least area, by dynamic programming over its ranges i..=j: `best[i][j]` is the least area of
+/// a triangulation of the range, closed by the diagonal from i to j, and the vertex k that achieves it. Appends the
+/// triangles to `out`.
 fn triangulate(contour: &[usize], out: &mut Vec<[u8; 3]>) {
     let n = contour.len();
     let mut best = vec![vec![(0.0, 0); n]; n];
@@ -167,7 +168,7 @@ fn collect(contour: &[usize], best: &[Vec<(f64, usize)>], i: usize, j: usize, ou
     out.push([contour[i], contour[k], contour[j]].map(|edge| edge as u8));
 }
 
-/// Returns twice the area of the triangle between the midpoints of three edges.
+/// Returns twice the area of the triangle between the midpoints of three edges of the unit cube.
 fn midpoint_area(edges: [usize; 3]) -> f64 {
     let [a, b, c] = edges.map(|edge| point_on(edge, 0.5));
     (b - a).cross(c - a).length()

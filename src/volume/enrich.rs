@@ -9,14 +9,15 @@ use crate::math::{DAffine3, DVec3};
 /// Interpolation method of [`Volume::enrich_slices`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Enrichment {
-    /// Both neighbours are warped along the optical flow between them and averaged.
+    /// Both neighbouring slices are warped along the optical flow between them, and the results are interpolated
+    /// linearly.
     #[default]
     Flow,
-    /// Linear interpolation between the neighbours.
+    /// Linear interpolation between the two neighbouring slices.
     Linear,
 }
 
-/// Largest factor of slice interpolation: beyond, further slices add no information.
+/// Largest factor of slice interpolation: with a larger one, further slices add no information.
 const MAX_FACTOR: usize = 16;
 
 impl Volume {
@@ -24,8 +25,8 @@ impl Volume {
     /// of the largest spacing.
     ///
     /// The original slices are unchanged and keep their world positions; the numeric type is kept. If `factor` is
-    /// `None`, it is the integer that brings the spacing nearest to the mean of the two others; 1 changes nothing. Each
-    /// frame is interpolated separately.
+    /// `None`, it is the ratio of the largest spacing to the mean of the two others, rounded and limited to 1..=16; 1
+    /// changes nothing. Each frame is interpolated separately.
     ///
     /// # Errors
     /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`].
@@ -66,7 +67,7 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// Returns the axis of the largest spacing; of equal ones z, then the lowest.
+    /// Returns the axis of the largest spacing; of equal ones z, otherwise the lowest.
     fn thick_axis(&self) -> usize {
         let spacing = self.spacing();
         (0..3).fold(2, |axis, other| if spacing[other] > spacing[axis] { other } else { axis })
@@ -130,8 +131,8 @@ impl Volume {
 
 /// Memory layout of the slices perpendicular to one axis.
 struct Slices {
-    /// Number of voxels along the two axes within a slice; `steps` are the memory strides of these two axes and of the
-    /// slice axis.
+    /// Number of voxels along the lower one of the two axes within a slice; `down` is that along the other one, and
+    /// `steps` are the memory strides of these two axes and of the slice axis.
     across: usize,
     down: usize,
     steps: [usize; 3],
@@ -148,7 +149,7 @@ impl Slices {
         }
     }
 
-    /// Returns the voxel indices of a slice, row by row.
+    /// Returns the indices of the voxels of a slice within a frame, row by row.
     fn voxel_indices(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
         let Self { across, down, steps: [step, row, along] } = *self;
         (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
@@ -161,7 +162,7 @@ impl Slices {
     }
 }
 
-/// Scales the flow at each pixel by its confidence: the share of the squared difference between the two images that
+/// Multiplies the flow at each pixel by its confidence: the share of the squared difference between the two images that
 /// warping removes. 1 if the warped images agree, 0 if warping does not reduce the difference.
 fn weighted_by_confidence(before: &Image, after: &Image, mut flow: Flow) -> Result<Flow, VolumeError> {
     let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
@@ -183,7 +184,8 @@ fn squared_differences(one: &Image, other: &Image) -> Result<Image, VolumeError>
     Image { values, ..*one }.window_sums()
 }
 
-/// Returns the image interpolated at fraction `share` from `before` to `after`, along the flow if there is one.
+/// Returns the image interpolated at fraction `share` of the way from `before` to `after`, along the flow if there is
+/// one.
 fn in_between(before: &Image, after: &Image, flow: Option<&Flow>, share: f32) -> Result<Image, VolumeError> {
     let mix = |left: &Image, right: &Image| {
         let mut values = reserve(left.values.len())?;

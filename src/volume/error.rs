@@ -11,10 +11,10 @@ pub enum VolumeError {
         /// The reason, and the accepted values.
         problem: String,
     },
-    /// An allocation failed.
+    /// An allocation failed, or a mesh would have more vertices than `u32` can count.
     #[error("the volume needs {bytes} bytes, more than is available")]
     TooLarge {
-        /// Bytes that the operation would need.
+        /// Memory that the operation would need, in bytes.
         bytes: u64,
     },
 }

@@ -6,23 +6,23 @@
 use super::error::{VolumeError, reserve};
 use super::sampling::locate;
 
-/// Radius of the least-squares window, pixels: one flow vector explains all differences within (2 `RADIUS` + 1)²
+/// Radius of the least-squares window, in pixels: one flow vector explains all differences within (2 `RADIUS` + 1)²
 /// pixels.
 const RADIUS: usize = 5;
 
 /// Number of rows whose running sums are computed together, which hides the latency of dependent additions.
 const ROWS_AT_ONCE: usize = 4;
 
-/// Iterations on each level of the pyramid.
+/// Least-squares iterations on each level of the pyramid.
 const ITERATIONS: usize = 4;
 
-/// Iterations on the finest level if there are coarser ones: they take most of the time and change least.
+/// Least-squares iterations on the finest level if there are coarser ones: they take most of the time and change least.
 const FINEST_ITERATIONS: usize = 2;
 
 /// Largest change of the flow per iteration, in pixels of the level: the gradients are not valid further away.
 const MAX_STEP: f32 = 1.0;
 
-/// Smallest image size of a coarser level, pixels: images are halved only while both sides are at least twice this.
+/// Smallest width and height of a coarser level, in pixels: images are halved only while both are at least twice this.
 const MIN_IMAGE_SIZE: usize = 24;
 
 /// Largest number of pyramid levels: an iteration on the coarsest moves by up to 4 pixels of the finest.
@@ -40,14 +40,14 @@ pub(super) struct Image {
     pub values: Vec<f32>,
 }
 
-/// Optical flow along x and y for each pixel of the midpoint image, pixels.
+/// Optical flow along x and y for each pixel of the midpoint image, in pixels.
 pub(super) struct Flow {
     pub x: Image,
     pub y: Image,
 }
 
 impl Image {
-    /// Returns an image of constant value.
+    /// Returns an image with the same value at every pixel.
     pub fn flat(width: usize, height: usize, value: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(width * height)?;
         values.resize(width * height, value);
@@ -83,7 +83,7 @@ impl Image {
         Ok(Self { values, ..*self })
     }
 
-    /// Returns the image at half the width and height: means of 2 × 2 pixels.
+    /// Returns the image at half the width and height: means of 2 × 2 pixels; an odd last row or column is dropped.
     fn halved(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width / 2, self.height / 2);
         let mut values = reserve(width * height)?;
@@ -167,7 +167,8 @@ fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
     }
 }
 
-/// Computes a quarter of the difference between the two neighbours of each pixel, the border replicated.
+/// Computes a quarter of the difference between the two neighbours of each pixel, the border replicated: the gradient
+/// along x of the mean of two images, from their sum.
 fn row_gradient(row: &[f32], out: &mut [f32]) {
     let last = row.len() - 1;
     for (slope, pair) in out[1..].iter_mut().zip(row.windows(3)) {

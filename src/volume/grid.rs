@@ -10,7 +10,7 @@ use crate::math::Vec3;
 pub struct Grid {
     /// Number of voxels along x, y and z, each at least 1.
     pub dims: [usize; 3],
-    /// One value per voxel.
+    /// One value per voxel, x fastest, then y, z.
     pub values: Vec<f32>,
 }
 
@@ -29,12 +29,12 @@ impl Default for CellCache {
     }
 }
 
-/// A vector field: one vector per voxel, laid out as in [`Grid`].
+/// A vector field: one vector per voxel, x fastest, then y, z. Positions are voxel indices, as in [`Grid`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct VectorGrid {
     /// Number of voxels along x, y and z, each at least 1.
     pub dims: [usize; 3],
-    /// One vector per voxel.
+    /// One vector per voxel, x fastest, then y, z.
     pub values: Vec<Vec3>,
 }
 
@@ -49,7 +49,8 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Returns an error unless the number of values is the product of the dimensions and not 0.
+    /// Returns an error unless the number of values is the product of the dimensions and not 0; used by marching cubes,
+    /// too.
     pub(super) fn check(&self) -> Result<(), VolumeError> {
         let count = self.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
         if count == Some(self.values.len()) && !self.values.is_empty() {
@@ -119,7 +120,7 @@ impl Grid {
         }
     }
 
-    /// Returns the row of voxels (0.., y, z).
+    /// Returns the values of the row of voxels (0.., y, z).
     #[inline]
     pub(super) fn row(&self, y: usize, z: usize) -> &[f32] {
         let start = (z * self.dims[1] + y) * self.dims[0];

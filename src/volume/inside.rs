@@ -26,7 +26,8 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     inside
 }
 
-/// Toggles, for each row of voxels along x that the triangle crosses, the first voxel beyond the triangle.
+/// Toggles in `crossings_parity`, for each row of voxels along x that the triangle crosses, the first voxel beyond the
+/// triangle.
 fn cross_triangle(
     positions: &[Vec3],
     corners: [u32; 3],
@@ -63,8 +64,8 @@ fn projection_contains(positions: &[Vec3], [a, b, c]: [u32; 3], at: DVec2) -> bo
     ab.is_some() && ab == bc && bc == ca
 }
 
-/// Returns whether a point is to the left of a projected edge; `None` if the edge projects to a point. Consistent for
-/// the two triangles that share the edge.
+/// Returns whether a point is to the left of an edge projected along x; `None` if the edge projects to a point.
+/// Consistent for the two triangles that share the edge.
 fn is_left(positions: &[Vec3], [from, to]: [u32; 2], at: DVec2) -> Option<bool> {
     let (low, high) = if from < to { (from, to) } else { (to, from) };
     let [p, q] = [low, high].map(|v| {

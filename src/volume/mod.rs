@@ -61,17 +61,17 @@ pub enum Space {
     Lps,
 }
 
-/// Length of one world unit, if the file states it.
+/// Length of one unit of world coordinates, if the file states it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LengthUnit {
-    /// Not stated.
+    /// The file does not state it.
     #[default]
     Unknown,
-    /// Metre.
+    /// World coordinates are in metres.
     Metre,
-    /// Millimetre.
+    /// World coordinates are in millimetres.
     Millimetre,
-    /// Micrometre.
+    /// World coordinates are in micrometres.
     Micrometre,
 }
 
@@ -86,19 +86,19 @@ pub struct VolumeInit {
     pub affine: DAffine3,
     /// Slope of the map to intensities: intensity = stored value × slope + intercept.
     pub slope: f64,
-    /// Intercept of the same map.
+    /// Intercept of the map to intensities: intensity = stored value × slope + intercept.
     pub intercept: f64,
     /// Time from one frame to the next, in seconds; 0 if the frames have no time step.
     pub frame_seconds: f64,
-    /// Orientation of the world axes.
+    /// Orientation of the world axes relative to the patient.
     pub space: Space,
 }
 
 /// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
 ///
-/// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from the statistics. When
-/// they are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end, so every
-/// sampled intensity is finite.
+/// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from ranges and histograms.
+/// When they are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end, so
+/// every sampled intensity is finite.
 #[derive(Clone, Debug)]
 pub struct Volume {
     voxels: Arc<Voxels>,
@@ -117,10 +117,10 @@ impl Volume {
     /// Creates a volume after validating all fields of `init`.
     ///
     /// # Errors
-    /// [`VolumeError::InvalidArgument`] naming the field when a dimension is 0, the number of voxels is not the product
-    /// of the dimensions, the affine is not finite, not invertible or maps a corner beyond the range of `f32`, the
-    /// slope is 0 or not finite, the frame time is negative, no voxel is a finite number, or an intensity exceeds the
-    /// range of `f32`.
+    /// [`VolumeError::InvalidArgument`] when a dimension is 0, the number of voxels is not the product of the
+    /// dimensions, the affine is not finite, not invertible, has a voxel axis not within 1e-12 to 1e12 or maps a corner
+    /// beyond the range of `f32`, the slope is 0 or not finite, the intercept is not finite, the frame time is negative
+    /// or not finite, no voxel is a finite number, or an intensity exceeds the range of `f32`.
     pub fn new(init: VolumeInit) -> Result<Volume, VolumeError> {
         check_dims(init.dims, init.voxels.len())?;
         check_scale(init.slope, init.intercept)?;
@@ -174,7 +174,7 @@ impl Volume {
         self.inverse
     }
 
-    /// Returns the orientation of the world axes.
+    /// Returns the orientation of the world axes relative to the patient.
     pub fn space(&self) -> Space {
         self.space
     }
@@ -209,7 +209,8 @@ impl Volume {
         self.range
     }
 
-    /// Returns the largest minus the smallest intensity, or 1 if they are equal, so that it is safe to divide by.
+    /// Returns the largest minus the smallest finite intensity over all frames, or 1 if they are equal, so that it is
+    /// safe to divide by.
     pub fn span(&self) -> f64 {
         let [low, high] = self.range;
         if high > low { high - low } else { 1.0 }
@@ -233,7 +234,8 @@ impl Volume {
         Ok(Grid { dims: self.dims(), values: self.intensities(frame)? })
     }
 
-    /// Returns one frame as a grid with intensities scaled from [`Self::range`] to [0, 1].
+    /// Returns one frame as a grid with intensities scaled from [`Self::range`] to [0, 1]; NaN and −∞ become 0, +∞
+    /// becomes 1.
     ///
     /// Values are scaled before they are rounded to `f32`, so small differences between large values are kept.
     ///

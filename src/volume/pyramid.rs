@@ -12,12 +12,12 @@ use super::voxels::Voxels;
 use super::{Grid, Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// The five weights of the Gaussian-like reduction kernel.
+/// The five weights of the Gaussian-like kernel by which pyramid levels are reduced.
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
 impl Volume {
-    /// Returns a pyramid of `levels` volumes: the first is this one, each of the others is coarser than the one before
-    /// by `factor` (ρ) along every axis.
+    /// Returns a pyramid of `levels` volumes: the first is this one, each of the others has ⌊n/ρ⌋ voxels along every
+    /// axis, where the one before has n and ρ is `factor`.
     ///
     /// All frames are kept; levels after the first store `f32` intensities.
     ///
@@ -47,7 +47,7 @@ impl Volume {
     }
 
     /// Returns the largest number of levels, this volume included, of a pyramid with this factor in which every axis
-    /// has at least 2 voxels; at least 1.
+    /// has at least 2 voxels; 1 if this volume has an axis with fewer.
     ///
     /// # Errors
     /// `factor` not in (1, 2].
@@ -101,8 +101,8 @@ impl Grid {
     /// Returns the next coarser level of the pyramid and its spacing: ⌊n/factor⌋ voxels per axis (at least 1) in the
     /// same box.
     ///
-    /// `spacing` is the spacing of this grid, and `unit` (U) the distance between the five samples of the kernel, in
-    /// the same length unit. The next level's unit is `unit * factor`.
+    /// `spacing` is the spacing of this grid, and `unit` (U) the distance between neighbouring ones of the five samples
+    /// of the kernel, in the same length unit. The next level's unit is `unit * factor`.
     ///
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
@@ -133,7 +133,8 @@ impl Grid {
         Ok(Grid { dims: [nx, self.dims[1], self.dims[2]], values })
     }
 
-    /// Resamples along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at once.
+    /// Resamples to `count` voxels along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at
+    /// once.
     fn resample_rows(
         &self,
         taps: &ResamplingWeights,
@@ -175,7 +176,8 @@ struct ResamplingWeights {
 }
 
 impl ResamplingWeights {
-    /// Computes the weights that reduce `source` voxels to `count`; `unit` is the kernel's step in source voxels.
+    /// Computes the weights that reduce `source` voxels to `count`; `unit` is the distance between samples of the
+    /// kernel, in source voxels.
     fn new(source: usize, count: usize, unit: f64) -> Self {
         let mut taps = Self { spans: Vec::with_capacity(count), weights: Vec::new() };
         let mut dense = vec![0.0f64; source];
@@ -186,8 +188,8 @@ impl ResamplingWeights {
         taps
     }
 
-    /// Adds the kernel at `centre` to the zeroed buffer `dense`, stores the nonzero range as the next output voxel's
-    /// weights, and zeroes it again.
+    /// Adds the kernel at `centre` to the zeroed buffer `dense`, stores its nonzero range as the weights of the next
+    /// output voxel, and zeroes the buffer again.
     fn push(&mut self, dense: &mut [f64], centre: f64, unit: f64) {
         let (mut low, mut high) = (usize::MAX, 0);
         for (k, weight) in KERNEL.iter().enumerate() {

@@ -3,8 +3,8 @@
 use crate::math::{DVec3, Vec3};
 use std::ops::{Add, Mul, Sub};
 
-/// The eight voxels around a point, for trilinear interpolation: the index of the lowest voxel, the index step to the
-/// next one along each axis (0 at the last voxel), and the fractional position along each axis.
+/// The eight voxels around a point, for trilinear interpolation: the index of the voxel with the lowest coordinates,
+/// the index step to the next one along each axis (0 at the last voxel), and the fractional position along each axis.
 pub(super) struct Cell {
     base: usize,
     step: [usize; 3],
@@ -61,8 +61,9 @@ fn mix<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(a: T,
     a + (b - a) * fraction
 }
 
-/// Returns the voxel at or below `x` and the fractional position from it to the next one, with `x` clamped to [0, n-1].
-/// Written with comparisons: `f32::clamp` with variable bounds becomes two function calls in wasm.
+/// Returns the voxel at or below `x` on an axis of `n` voxels and the fractional position from it to the next one, with
+/// `x` clamped to [0, n-1]. Written with comparisons: `f32::clamp` with variable bounds becomes two function calls in
+/// wasm.
 #[inline]
 pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     let last = (n - 1) as f32;
@@ -72,7 +73,8 @@ pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     (index, x - index as f32)
 }
 
-/// Interpolates trilinearly at `p`, in `f64`; `value` returns the value of a voxel by its index.
+/// Interpolates trilinearly at `p`, in voxel indices, in `f64`; `value` returns the value of a voxel by its index.
+/// Outside, the border is replicated.
 pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
     let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
     let at = |corner: [usize; 3]| {
@@ -85,7 +87,8 @@ pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64
     mix(along_xy(0), along_xy(1), 2)
 }
 
-/// Returns the two voxels around `x` and the fractional position between them, with `x` clamped to [0, n-1].
+/// Returns the two voxels around `x` on an axis of `n` voxels and the fractional position between them, with `x`
+/// clamped to [0, n-1].
 pub(super) fn locate_f64(x: f64, n: usize) -> ([usize; 2], f64) {
     let last = (n - 1) as f64;
     let x = if x > 0.0 { x } else { 0.0 };

@@ -5,7 +5,8 @@ use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::DVec3;
 
-/// Largest accepted distance between the corners of two frames, in voxels: allows for rounding in file headers only.
+/// Largest accepted distance between corresponding corners of two frames, in voxels: allows for rounding in file
+/// headers only.
 const GRID_TOLERANCE: f64 = 1e-3;
 
 impl Volume {
@@ -40,8 +41,8 @@ impl Volume {
     }
 }
 
-/// Returns the stored values with their common slope and intercept; if frames differ in these or in their type, the
-/// intensities as `f32`.
+/// Returns the stored values of all frames, and their common slope and intercept; if frames differ in these or in their
+/// type, the intensities as `f32`.
 fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
     let (slope, intercept) = (frames[0].slope, frames[0].intercept);
     if frames.iter().all(|f| f.slope == slope && f.intercept == intercept) {

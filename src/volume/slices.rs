@@ -12,7 +12,7 @@ impl Volume {
     /// [`range`](Self::range).
     ///
     /// The range is that of all frames, so the histograms of two frames are comparable. The largest intensity is
-    /// counted in the last bin; NaN and infinite voxels are not counted.
+    /// counted in the last bin, but all of a constant volume in the first; NaN and infinite voxels are not counted.
     ///
     /// # Errors
     /// `bins` not in 1..=65536, `frame` out of range.
@@ -84,7 +84,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Voxel (x, y, z) of frame t holds x + 10y + 100z + 50t.
+    /// Returns a volume in which voxel (x, y, z) of frame t has the value x + 10y + 100z + 50t.
     fn volume() -> Volume {
         let value = |i: usize| (i % 4 + 10 * (i / 4 % 3) + 100 * (i / 12 % 2) + 50 * (i / 24)) as u8;
         Volume::new(VolumeInit {

@@ -51,7 +51,7 @@ impl Voxels {
         self.len() == 0
     }
 
-    /// Returns the stored value at `index`, or `None` past the end.
+    /// Returns the stored value at `index` as `f64`, or `None` past the end.
     pub fn get(&self, index: usize) -> Option<f64> {
         each!(self, values => number_at(values, index))
     }
@@ -61,7 +61,8 @@ impl Voxels {
         each!(self, values => finite_range(values))
     }
 
-    /// Converts `values` to the voxel type of `self`: rounded for integer types and clamped to the range of the type.
+    /// Converts `values` to the voxel type of `self`; for integer types they are rounded and clamped to the range of
+    /// the type, and NaN becomes 0.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -124,7 +125,8 @@ impl Voxels {
         })
     }
 
-    /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ.
+    /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ or there are
+    /// none.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].

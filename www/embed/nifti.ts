@@ -5,9 +5,9 @@ export interface Scan {
   voxels: Uint8Array | Int16Array;
   size: number[];
   spacing: number[];
-  /** Unit vectors along the x, y and z axes of the grid, LPS. */
+  /** Unit direction vectors of the grid's x, y and z axes in world space, LPS. */
   directions: number[][];
-  /** Position of the first voxel, LPS. */
+  /** Centre of the first voxel in world space, LPS. */
   origin: number[];
 }
 

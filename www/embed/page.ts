@@ -8,8 +8,7 @@ function state(name: 'running' | 'done' | 'error', text: string): void {
 }
 
 /**
- * Shows the progress of a step in the status line, and resolves at the next animation frame, so that the browser can
- * draw.
+ * Shows the progress of a step in the status line; resolves at the next animation frame, which lets the browser draw.
  */
 export function shown({ iteration, phase, vertices, components }: StepReport): Promise<unknown> {
   const parts = components === 1 ? '1 component' : `${components} components`;

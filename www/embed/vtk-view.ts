@@ -7,7 +7,10 @@ import { SlicingMode } from '@kitware/vtk.js/Rendering/Core/ImageMapper/Constant
 import vtkImageSlice from '@kitware/vtk.js/Rendering/Core/ImageSlice';
 import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRenderWindow';
 
-/** Shows the middle slice of `image` and `actor` from the front, head up; returns a function that renders the view. */
+/**
+ * Sets up a vtk.js view of the middle slice (along the third axis) of `image` and of `actor`, seen from the front, head
+ * up. Returns a function that renders it.
+ */
 export function sliceAndSurface(image: vtkImageData, actor: vtkActor): () => void {
   const view = document.querySelector('#view') as HTMLElement;
   const generic = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.1], listenWindowResize: false });

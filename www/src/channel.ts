@@ -1,10 +1,7 @@
 import type { Failure } from './protocol';
 import { text } from './texts';
 
-/**
- * A request that a worker could not fulfil. `code` is that of the library's VesicleError, or 'internal' if the engine
- * broke.
- */
+/** A request that a worker could not fulfil. `code` is that of a VesicleError, or 'internal' if the engine broke. */
 export class RequestError extends Error {
   readonly code: string;
 
@@ -26,12 +23,12 @@ interface PendingRequest {
   reject: (error: RequestError) => void;
 }
 
-/** Constraint on a protocol's request table: for each request its name, body and reply. */
+/** Constraint on a protocol's request table: maps the name of each request to the types of its body and reply. */
 type RequestTable<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
-/** A worker started before any channel needed it; see {@link preloadWorker}. */
+/** Worker started before its channel exists; see {@link preloadWorker}. */
 let preloaded: { spawn: () => Worker; worker: Worker } | undefined;
 
 /**
@@ -62,7 +59,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   readonly #pending = new Map<number, PendingRequest>();
   #worker: Worker;
-  /** Failure that broke the worker; every request is rejected with it until the worker is restarted. */
+  /** Failure that broke the worker, if any; every request is rejected with it until the worker is restarted. */
   #failure: Failure | undefined;
   #lastId = 0;
 
@@ -90,7 +87,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     this.#worker.postMessage(message, transfer);
   }
 
-  /** Replaces the worker by a new one. Requests pending at the old one are rejected with `failure`. */
+  /** Replaces the worker by a new one. Requests still pending at the old one are rejected with `failure`. */
   restart(failure: Failure): void {
     this.#worker.terminate();
     this.#fail(failure);

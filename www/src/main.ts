@@ -47,14 +47,16 @@ const LABS: [LabKind, ...LabKind[]] = [
   },
 ];
 
-/** Switches between the labs on the page: one is open at a time, and of the others only their address is kept. */
+/**
+ * Switches between the labs on the page: one is open at a time; of the others only the address is kept, in its link.
+ */
 class Labs {
   readonly #root: HTMLElement;
   readonly #help: HTMLElement;
   readonly #links = new Map<string, HTMLAnchorElement>();
   #kind: LabKind | undefined;
   #lab: Lab | undefined;
-  /** Counts openings, so that a lab is dropped whose code arrives after another one was requested. */
+  /** Number of times a lab was opened; a lab whose code arrives after another was requested is dropped. */
   #turn = 0;
 
   constructor(root: HTMLElement, help: HTMLElement, nav: HTMLElement) {

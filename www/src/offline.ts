@@ -1,9 +1,12 @@
-/** Seconds after the page has loaded before files are cached, so that caching does not slow the first example down. */
+/**
+ * Delay in seconds between loading the page and caching its files, so that caching does not slow down the first
+ * example.
+ */
 const CACHE_DELAY_SECONDS = 3;
 
 /**
- * Registers the service worker that caches the page's files, so that later visits need no network. If the browser does
- * not support or allows no service workers, the page works as before.
+ * Registers the service worker that caches the page's files, so that later visits need no network. Does nothing during
+ * development or if the browser has no service workers; errors are ignored.
  */
 export function workOffline(): void {
   // During development, files must not come from a cache.

@@ -4,7 +4,7 @@ import { EXAMPLES, type Example } from './examples';
 import type { ParamValues } from './protocol';
 import { text } from './texts';
 
-/** Result of a converged run; tests compare the texts of a variant with it. */
+/** Expected result of a converged run of a variant; tests run the variant and compare. */
 export interface Outcome {
   iterations: number;
   vertices: number;
@@ -35,9 +35,9 @@ export interface Preset extends Example {
    * parameters.
    */
   startsOver?: boolean;
-  /** Advice on what else to look at, such as a panel of the page. */
+  /** Advice on what to look at next, such as a panel of the page. */
   hint?: string;
-  /** Whether the figure includes the comparison of a direct with a coarse-to-fine run; opens that panel. */
+  /** Whether the figure compares a direct with a coarse-to-fine run; if so, the panel of that comparison is opened. */
   compares?: boolean;
 }
 
@@ -49,8 +49,8 @@ export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
 /** Base parameters of the presets: the iso force alone, so that each preset lists every other force that acts. */
 const BARE = { ...PAPER, isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
 /**
- * Base parameters without the iso force, for presets that use the gradient force, towards maxima of intensity. It is
- * per voxel here, so that 1 does what 0.1 does in the paper.
+ * Base parameters without the iso force, for presets with the gradient force, which moves the surface towards maxima of
+ * intensity. Gradients are per voxel here, so that a weight of 1 has the effect of 0.1 in the paper.
  */
 const RIDGE = { ...BARE, isoForce: 0 };
 
@@ -282,14 +282,17 @@ export function isPreset(example: Example | undefined): example is Preset {
   return example !== undefined && 'variants' in example;
 }
 
-/** Returns the variant of a figure whose parameters are all in force, if there is one. */
+/**
+ * Returns the first variant of a figure whose parameters, with those of the figure, are all in force; undefined if
+ * there is none. Other parameters are ignored.
+ */
 export function variantInForce(preset: Preset, params: ParamValues): Variant | undefined {
   return preset.variants.find((one) =>
     Object.entries({ ...preset.params, ...one.params }).every(([name, value]) => Object.is(params[name], value)),
   );
 }
 
-/** Returns the suitable start shape: a preset's own, else the contour, for other examples and for files. */
+/** Returns the start shape to use for an example: a preset's own; the contour for other examples and for files. */
 export function defaultStart(example: Example | undefined): Preset['start'] | typeof CONTOUR {
   return isPreset(example) ? example.start : CONTOUR;
 }

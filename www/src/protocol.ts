@@ -36,7 +36,7 @@ export type StartShape =
   | { kind: 'sphere'; center: Vec3; radius: number }
   | { kind: 'isosurface' };
 
-/** Source of a volume: one file, or a header and its data; or a computed shape. */
+/** Source of a volume: its files (one, a header and its data, or a DICOM or TIFF series), or a computed shape. */
 export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 
 /** All that a model is built from, besides the volume. */
@@ -74,7 +74,7 @@ export interface VolumeView {
   dims: Vec3;
   frames: number;
   spacing: Vec3;
-  /** Voxel indices to world coordinates: a 4 × 4 matrix, column-major. */
+  /** 4 × 4 affine matrix from voxel indices to world coordinates, column-major. */
   affine: Float64Array;
   space: 'RAS' | 'LPS';
   /** Smallest and largest intensity. */
@@ -82,7 +82,10 @@ export interface VolumeView {
   histogram: Uint32Array;
   /** The intensities displayed as black and as white. */
   window: [number, number];
-  /** x fastest, 0 = black, 255 = white. Frame after frame if all frames were requested, else the first alone. */
+  /**
+   * Grey values, x fastest: 0 = black, 255 = white. Frame after frame if all frames were requested, else only the
+   * first.
+   */
   voxels: Uint8Array;
 }
 
@@ -103,8 +106,9 @@ export interface SurfaceBuffers {
 
 /** A surface to draw. */
 export interface Surface extends SurfaceBuffers {
-  /** Numbers of vertices and triangles in use; the buffers may be longer. */
+  /** Number of vertices in use; the buffers may be longer. */
   vertices: number;
+  /** Number of triangles in use. */
   triangles: number;
   /** One value per vertex, if a quantity was requested. */
   values?: Float32Array;
@@ -126,7 +130,7 @@ export interface Measures {
 /** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** Edge length at the start of the run, in world units. */
+  /** Mean edge length δ at the start of the run, in world units. */
   delta: number;
 }
 
@@ -138,7 +142,7 @@ export interface MeasuredCoverage extends Coverage {
 /** Result and cost of one of the two runs of a comparison, direct or coarse to fine. */
 export interface ExtractionRun {
   levels: number;
-  /** Number of iterations, and milliseconds per part, of each level; the coarsest first. */
+  /** Number of iterations, and total milliseconds of each part of a step, for each level; the coarsest first. */
   byLevel: { level: number; iterations: number; times: Record<string, number> }[];
   /** Report of the last iteration. */
   report: StepReport;
@@ -164,7 +168,7 @@ export interface Requests {
   /** Sets the planes whose cross-sections with the surface are sent from now on. */
   planes: { body: Plane[]; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
-  /** Replies with this many coarser levels of the volume, the finest first. */
+  /** Replies with `levels` coarser levels of the volume's pyramid, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
   /** Sets the quantity sent for each vertex from now on. */
@@ -176,16 +180,16 @@ export interface Requests {
   /** Runs the same extraction twice, direct and coarse to fine; undefined if cancelled. */
   compare: { body: Setup; reply: { direct: ExtractionRun; coarseToFine: ExtractionRun } | undefined };
   cancelCompare: { body: undefined; reply: undefined };
-  /** Measures how much of the iso-surface the present surface covers, also during a run; undefined if cancelled. */
+  /** Measures how much of the iso-surface the surface covers, also during a run; undefined if cancelled. */
   coverage: { body: undefined; reply: MeasuredCoverage | undefined };
   cancelCoverage: { body: undefined; reply: undefined };
-  /** Adds the parts of the object that the surface misses; replies with the number of seeds. */
+  /** Adds the components and cavities of the object that the surface misses; replies with their number. */
   seed: { body: undefined; reply: number };
 }
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Returns buffers that the page no longer draws; has no reply. */
+/** Returns buffers to the worker when the page no longer draws them; has no reply. */
 export interface ReturnMessage {
   kind: 'return';
   buffers: SurfaceBuffers;
@@ -193,7 +197,10 @@ export interface ReturnMessage {
 export type ToWorker = RequestMessage | ReturnMessage;
 
 export interface Failure {
-  /** Code of a VesicleError; 'internal' if the engine itself broke and has to be restarted. */
+  /**
+   * Code of a VesicleError; 'internal' if the engine broke and has to be restarted, 'page' for an error of the page
+   * itself.
+   */
   code: string;
   message: string;
 }
@@ -202,9 +209,9 @@ export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: numbe
 export interface SnapshotEvent {
   event: 'snapshot';
   surface: Surface;
-  /** Present pyramid level of the model; 0 is the finest. */
+  /** Pyramid level of the model at present; 0 is the finest. */
   level: number;
-  /** Cross-sections with the planes, as pairs of world points. */
+  /** Cross-sections of the surface with the requested planes, each as segments: pairs of world points, packed xyz. */
   sections: Float32Array[];
   /** One report per step since the last snapshot or progress event. */
   reports: StepReport[];
@@ -219,7 +226,10 @@ export interface SectionsEvent {
   event: 'sections';
   sections: Float32Array[];
 }
-/** State of the run: sent when it starts and, after its last snapshot, when it is done or was stopped. */
+/**
+ * State of the run: sent when a run starts and, after its last results, when it is done or was stopped; also after
+ * single steps and, in the Extract lab, after seeding or restoring.
+ */
 export interface StateEvent {
   event: 'state';
   state: 'running' | 'paused' | 'done';

@@ -1,4 +1,4 @@
-/** State of a lab; its element carries it as `data-state`. */
+/** State of a lab; set as `data-state` on the lab's element. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
 /** A value with subscribers. Setting an equal value notifies nobody. */

@@ -37,7 +37,10 @@ function totals(histogram: ArrayLike<number>): { count: number; sum: number } {
   return { count, sum };
 }
 
-/** Returns the variance between the two classes, up to a constant factor. */
+/**
+ * Returns Otsu's between-class variance, up to a constant factor, of a split of `count` values with the sum `sum` into
+ * `below` values with the sum `belowSum` and the rest; 0 if a class is empty.
+ */
 function variance(below: number, belowSum: number, count: number, sum: number): number {
   const above = count - below;
   if (below === 0 || above === 0) return 0;

@@ -70,7 +70,7 @@ class Session {
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
-  /** Pyramid levels the model was built with. */
+  /** Number of pyramid levels the model was built with, above the volume itself. */
   #levels = 0;
   #measuredAt = 0;
   #run: Task | undefined;
@@ -182,8 +182,8 @@ class Session {
   }
 
   /**
-   * Sends reports in batches while snapshots are skipped: a thousand reports in one message cost the page a tenth of a
-   * second.
+   * Sends the reports if there are enough for a batch, while snapshots are skipped: a thousand reports in one message
+   * cost the page a tenth of a second.
    */
   #flushReports(): void {
     if (this.#reports.length < MOST_REPORTS) return;
@@ -245,8 +245,8 @@ class Session {
   }
 
   /**
-   * A state fits only a model with the same number of levels; if necessary, one is built, whose own start is replaced
-   * at once.
+   * Restores a saved run. Its state fits only a model with the same number of levels; if necessary, such a model is
+   * built, whose own start is replaced at once.
    */
   async #restore({ state, levels, iteration, done }: SavedRun): Promise<Ready> {
     await this.#pause();

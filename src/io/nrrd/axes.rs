@@ -53,7 +53,7 @@ impl Axes {
         dims
     }
 
-    /// Returns how many consecutive numbers in the file belong to one frame.
+    /// Returns how many consecutive numbers in the file belong to the same frame.
     pub(super) fn run(&self) -> usize {
         let faster = self.frames.unwrap_or(self.axes.len());
         self.axes[..faster].iter().map(|axis| axis.size).fold(1, usize::saturating_mul)
@@ -84,7 +84,7 @@ impl Axes {
         }
     }
 
-    /// Returns the seconds between frames; 0 if the file does not give the time.
+    /// Returns the seconds between frames; 0 if there is only one frame, or the file does not give a positive time.
     pub(super) fn frame_seconds(&self) -> f64 {
         let Some(axis) = self.frame_axis().filter(|axis| axis.size > 1) else { return 0.0 };
         let step = axis.direction.map_or(axis.spacing, |direction| direction.time);
@@ -176,8 +176,8 @@ fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
     }
 }
 
-/// Returns the columns of the affine for axes parallel to the world's, of the lengths in `spacings`; 1 if missing or
-/// NaN.
+/// Returns the columns of the affine of a file without directions: along the world axes, with the lengths in
+/// `spacings`; 1 if those are missing or NaN.
 fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     let Some(field) = fields.get("spacings") else {
         return match fields.get("axismaxs") {

@@ -13,14 +13,14 @@ pub(super) const KINDS: &str = "domain or space for axes in space, list or time 
 pub(super) struct Axis {
     pub(super) size: usize,
     pub(super) kind: AxisKind,
-    /// NaN if it is unknown.
+    /// Distance between samples along the axis, from `spacings`, in `unit`; NaN if it is unknown.
     pub(super) spacing: f64,
-    /// Empty if the header gives none.
+    /// Unit of the spacing, such as `mm` or `s`; empty if the header gives none.
     pub(super) unit: String,
     pub(super) direction: Option<Vector>,
 }
 
-/// Kind of an axis, in ascending order of how unlikely it is to be spatial.
+/// Kind of an axis; the later a kind is in this order, the less likely is the axis to be spatial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum AxisKind {
     Space,
@@ -120,8 +120,8 @@ fn directions(
     Ok(vectors.into_iter().zip(kinds).map(stated).collect())
 }
 
-/// Returns whether a zero direction means that an axis is not spatial. With three axes it may also mean that the
-/// distance of the slices was unknown; such a file has no position in world space.
+/// Returns whether a zero direction marks an axis of this kind as not spatial, in a file of `rank` axes. With three
+/// axes it may also mean that the distance of the slices was unknown; such a file has no position in world space.
 fn zero_means_none(kind: AxisKind, rank: usize) -> bool {
     kind.counts_frames() || rank == 4 && kind != AxisKind::Space
 }

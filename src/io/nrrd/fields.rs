@@ -69,8 +69,8 @@ impl Fields {
         Ok(fields)
     }
 
-    /// Adds the field on one line. Returns true if it starts a list of data files, which takes up the rest of the
-    /// header.
+    /// Adds the field on one line; a `key:=value` line is ignored. Returns true if the field starts a list of data
+    /// files, which takes up the rest of the header.
     fn add(&mut self, line: &str) -> Result<bool, FormatError> {
         let (name, value) = match (line.find(":="), line.find(": ")) {
             (Some(at), colon) if colon.is_none_or(|colon| at < colon) => return Ok(false),

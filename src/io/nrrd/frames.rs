@@ -45,7 +45,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// 2 × 3 numbers in 4 frames, each number 10 times its index within the frame plus the index of the frame.
+    /// Returns the numbers of 4 frames of 2 × 3 each, as in a file with `run` consecutive numbers per frame. Each
+    /// number is 10 times its index within the frame plus the index of the frame.
     fn alternating(run: usize) -> Vec<u8> {
         let one = |i: usize| 10 * (i / (4 * run) * run + i % run) + i / run % 4;
         (0..24).map(|i| one(i) as u8).collect()

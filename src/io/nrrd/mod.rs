@@ -65,12 +65,12 @@ struct Header {
     scalar: Scalar,
     /// Number of voxels along x, y and z, and of frames.
     dims: [usize; 4],
-    /// Number of consecutive numbers in the file that belong to one frame.
+    /// Number of consecutive numbers in the file that belong to the same frame.
     run: usize,
     encoding: Encoding,
     big: bool,
     line_skip: usize,
-    /// `None` (-1 in the file) if the voxels are the last bytes.
+    /// Number of bytes before the voxels; `None` (-1 in the file) if the voxels are the last bytes.
     byte_skip: Option<usize>,
     affine: DAffine3,
     space: Space,
@@ -114,7 +114,7 @@ impl Header {
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
-    /// Returns the bytes after the lines to skip.
+    /// Returns the bytes of `source` after the first `line_skip` lines.
     fn after_lines<'a>(&self, source: &'a [u8]) -> Result<&'a [u8], FormatError> {
         let mut rest = source;
         for _ in 0..self.line_skip {
@@ -126,7 +126,7 @@ impl Header {
         Ok(rest)
     }
 
-    /// Decodes the voxels in the bytes after the lines to skip.
+    /// Decodes the voxels in the bytes after the skipped lines.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         let count = size / self.scalar.size();
@@ -147,7 +147,7 @@ impl Header {
         decode(DATA, payload(DATA, skipped, size)?, self.scalar, self.big)
     }
 
-    /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
+    /// Returns the bytes after the first `byte_skip` ones; if the header gives -1, the last `size` bytes.
     fn after_bytes<'a>(&self, bytes: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.byte_skip.unwrap_or_else(|| bytes.len().saturating_sub(size));
         bytes.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "byte skip", skip, bytes.len()))
@@ -210,7 +210,8 @@ fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<boo
     }
 }
 
-/// Returns the number of bytes before the voxels; `None` for -1.
+/// Returns the number of bytes before the voxels from the field `byte skip`, 0 if it is missing; `None` for -1, which
+/// means that the voxels are the last bytes.
 fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
     match field.integer(-1)? {

@@ -10,8 +10,8 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 const DIRECTED: &str = "space directions: (2,0,0) (0,3,0) (0,0,4)";
 
-/// A file of 2 × 3 × 4 voxels in 2 frames whose frame axis has index `frames`. Each number is the index at which it
-/// must be read: voxels before it, frame by frame.
+/// Returns a file of 2 × 3 × 4 voxels in 2 frames whose frame axis has index `frames`. Each voxel's value is its index
+/// in the volume after reading: x fastest, then y, z and frames.
 fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     let mut sizes = vec![2, 3, 4];
     sizes.insert(frames, 2);
@@ -32,7 +32,8 @@ fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     [header.into_bytes(), (0..48).map(number).collect()].concat()
 }
 
-/// A field with one word per axis, that of the frame axis at index `frames`.
+/// Returns a header field with one word per axis: `own` for the frame axis, whose index is `frames`, and `others` for
+/// the spatial axes.
 fn with(frames: usize, name: &str, others: [&str; 3], own: &str) -> String {
     let mut words = others.to_vec();
     words.insert(frames, own);
@@ -132,7 +133,8 @@ fn frames_by_kinds_units_and_spacings() {
     assert_eq!(volume.unit(), LengthUnit::Millimetre);
 }
 
-/// Reads a file of 24 numbers: its dimensions, its number of frames and the seconds between them.
+/// Reads a file of 24 numbers with the given header fields; returns its dimensions, its number of frames and the
+/// seconds between them.
 fn grid(fields: &[&str]) -> Result<([usize; 3], usize, f64), FormatError> {
     let fields = fields.join("\n");
     let header = format!("NRRD0004\ntype: uint8\nencoding: raw\n{fields}\n\n");

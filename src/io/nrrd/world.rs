@@ -10,14 +10,14 @@ use crate::volume::Space;
 const SPACES: &str = "right-anterior-superior, left-anterior-superior, left-posterior-superior, scanner-xyz, \
                       3D-right-handed, 3D-left-handed, each also with -time";
 
-/// The world space that a header names, or of which it gives the dimension.
+/// The world space of an NRRD: named in the header, or RAS if the header only gives its dimension or nothing.
 pub(super) struct World {
     pub(super) space: Space,
-    /// Whether the sign of x must be flipped to convert to `space`.
+    /// Whether the sign of x must be flipped to convert the file's coordinates to `space`.
     pub(super) flip_x: bool,
-    /// Whether its name declares time as fourth dimension.
+    /// Whether the name of the space declares time as fourth dimension.
     pub(super) has_time: bool,
-    /// Number of components of a vector, if the header gives it.
+    /// Number of components of each vector in the header, if the header gives it.
     dimension: Option<usize>,
 }
 
@@ -76,7 +76,7 @@ impl Vector {
     }
 }
 
-/// Returns the space with a name, which may have spaces or nothing instead of hyphens, or be abbreviated like RAST.
+/// Parses the name of a space. It may have spaces or nothing in place of hyphens, or be abbreviated like RAST.
 fn parse_space(field: &Field<'_>) -> Result<World, FormatError> {
     let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
     let name: String = letters.flat_map(char::to_lowercase).collect();

@@ -5,7 +5,7 @@
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// The number of still iterations after which a vertex sleeps.
+/// The number of still iterations, those in which a vertex is slower than [`stillness`], after which it sleeps.
 pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
 /// The speed below which a vertex is still, as a share of the speed that each vertex of a surface with the tolerated
@@ -18,9 +18,9 @@ const FEW_ASLEEP: f64 = 0.25;
 /// The vertices awake in an iteration; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Awake {
-    /// The vertices awake, or all vertices: those that move in this iteration.
+    /// The vertices processed in this iteration: those awake, or all.
     pub(super) moving: Vec<VertexId>,
-    /// The moving vertices and their neighbours, of which normals and L are needed.
+    /// The moving vertices and their neighbours, whose normals and L(x) the forces need.
     pub(super) with_neighbours: Vec<VertexId>,
     is_included: Vec<bool>,
 }

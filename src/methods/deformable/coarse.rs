@@ -4,18 +4,18 @@
 use super::image::Pyramid;
 use super::{DeformableParams, Integrator};
 
-/// The offset of the surface from π_I on coarse levels of runs that do not seed, as a share of the difference between
-/// π_I and the mean intensity of the background.
+/// The offset of the iso value from π_I, towards the background, on coarse levels of runs that do not seed, as a share
+/// of the difference between π_I and the mean intensity of the background.
 ///
 /// A wall thinner than the contact distance of a coarse level is pierced and eroded from there, and rigidity keeps it
 /// from growing back on a finer one. At an iso value a little outside, where the blurred wall is thicker, it is kept;
 /// the finer level removes the excess, since the surface comes from outside anyway. On computed tomographies the area
-/// found through one coarse level was 1.2 % to 15 % too small with 0, and is up to 0.9 % off; with 0.4 and more the
-/// finest level takes many iterations.
+/// found through one coarse level was 1.2 % to 15 % too small without the offset, and is up to 0.9 % off with it; with
+/// 0.4 and more the finest level takes many iterations.
 ///
 /// This is right for images of two classes only: in a computed tomography all soft tissue then counts as bone. The mean
 /// intensity next to the boundary was tried instead; it loses 1.7 % of the area of a skull. Runs that seed have no
-/// margin, since parts lost on a coarse level come back.
+/// offset, since parts lost on a coarse level come back.
 const MARGIN: f32 = 0.35;
 
 /// The largest factor on α_I on coarse levels with the integrators of the paper.
@@ -33,20 +33,23 @@ const MIN_RIGIDITY: f32 = 0.025;
 /// surface oscillates.
 const MAX_STIFFNESS: f32 = 1.0;
 
-/// The least steepness of the image at π_I, in ranges of intensity per voxel; if the median is smaller, the implicit
-/// integrator amplifies α_I, up to the factor below. A few voxels much brighter than all others make the object faint;
-/// rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to 0.6.
+/// The least steepness of the image at π_I, in ranges of intensity per voxel of the finest level. If the median is
+/// smaller, α_I is amplified by the ratio in runs with the implicit integrator that adapt to the image. A few voxels
+/// much brighter than all others make the object faint; rigidity would then pull the surface off its contour, slowly.
+/// Computed tomographies have 0.1 to 0.6.
 const MIN_STEEPNESS: f32 = 0.1;
+/// The largest factor by which α_I is amplified in faint images.
 const MAX_AMPLIFICATION: f32 = 1e4;
 
-/// The number of iterations of a level with the full factor on α_I, and the number after which it is halved each time
-/// from then on. A head takes 300. A vertex on an edge steeper than most would oscillate for ever: one on a tooth did,
-/// at an iso value at which the model converges with a factor of 4.
+/// The number of iterations of a level with the full factor on α_I, with the integrators of the paper. A head takes
+/// 300. If the factor did not decay then, a vertex where the image is steeper than usual could oscillate for ever: one
+/// on a tooth did, at an iso value at which the model converges with a factor of 4.
 const FULL_GAIN_ITERATIONS: u32 = 600;
+/// The number of iterations between halvings of the factor on α_I, the first of which follows [`FULL_GAIN_ITERATIONS`].
 const HALVING_ITERATIONS: u32 = 100;
 
-/// Returns the π_I that the surface settles at on a level of a run without seeding, normalised: on coarse levels it is
-/// moved by [`MARGIN`] towards the background.
+/// Returns the normalised π_I of a level in runs without seeding, moved by [`MARGIN`] towards the background on coarse
+/// levels. The enclosing start surface is made around the voxels brighter than it.
 pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) -> f32 {
     let iso = pyramid.normalised(params.iso);
     let outside =
@@ -55,7 +58,8 @@ pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) ->
 }
 
 /// Returns the factor on α_I on a level, at least 1, for the normalised π_I `iso` and the δ `delta` of that level. With
-/// the implicit integrator it makes up for faint images on all levels, with the others it speeds up coarse levels.
+/// the implicit integrator it makes up for faint images on all levels if the model adapts to the image, and is 1
+/// otherwise; with the others it speeds up coarse levels.
 pub(super) fn gain(
     pyramid: &Pyramid,
     params: &DeformableParams,
@@ -75,7 +79,8 @@ pub(super) fn gain(
     [by_stiffness / stiffness, by_rigidity].into_iter().fold(MAX_GAIN, f32::min).max(1.0)
 }
 
-/// Returns the factor on α_I that is left of a level's `gain` after a number of iterations on that level.
+/// Returns the factor on α_I, at least 1, that is left of a level's `gain` after a number of iterations on that level;
+/// used with the integrators of the paper.
 pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
     let times = iterations.saturating_sub(FULL_GAIN_ITERATIONS).div_ceil(HALVING_ITERATIONS);
     // Eight halvings reduce any gain up to 256 to 1.

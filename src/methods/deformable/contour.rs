@@ -13,8 +13,8 @@ use crate::volume::{Grid, marching_cubes};
 /// voxel are too coarse.
 const MIN_SIDE: f32 = 0.7;
 
-/// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound,
-/// a tube of radius 1.2 became a square prism.
+/// The largest distance along its normal, in voxels of the level, between a vertex and the mean of its cluster. Without
+/// this bound, a tube of radius 1.2 became a square prism.
 const FLATNESS: f32 = 0.15;
 
 /// The side of the iso value on which the object is.
@@ -52,7 +52,7 @@ impl ObjectIs {
 
 /// Extracts the iso-surface of a level in model space, closed and facing away from the object. Closed parts, of the
 /// object or around cavities, that enclose less than `smallest_part` voxels of the finest level are left out. Empty if
-/// the image never passes `iso`.
+/// no part remains, or the image never crosses `iso`.
 pub(super) fn contour(
     image: &LevelImage,
     iso: f32,
@@ -71,7 +71,7 @@ pub(super) fn contour(
 }
 
 /// Simplifies a contour by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are
-/// merged. This saves more than half of the edits that bring edges within bounds.
+/// merged. This saves more than half of the edits that bring edges within bounds. Unchanged if δ is below [`MIN_SIDE`].
 pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
     if side < MIN_SIDE {

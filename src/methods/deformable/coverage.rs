@@ -7,10 +7,10 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
-/// The largest distance at which a surface covers a point of the other, in voxels of the finest level.
+/// The largest distance between a covered point and the other surface, in voxels of the finest level.
 const COVERED_DISTANCE: f64 = 1.0;
 
-/// The largest side of the pieces by which triangles are tested, in voxels.
+/// The largest side of the pieces into which triangles are divided for the test, in voxels of the finest level.
 const PIECE: f32 = 1.0;
 
 /// The direction of rays that classify points as inside or outside; along no grid line, so that they rarely hit an
@@ -27,11 +27,11 @@ pub struct Coverage {
     pub recall: f64,
     /// The share of the model's area within one voxel of the iso-surface; 1 if the model is empty.
     pub precision: f64,
-    /// Connected parts of the iso-surface whose triangles are not fully covered, largest first.
+    /// The connected parts formed by the triangles of the iso-surface that are not fully covered, largest first.
     pub uncovered: Vec<UncoveredRegion>,
 }
 
-/// A connected part of the iso-surface that the model does not cover.
+/// A connected part of the iso-surface whose triangles are not fully covered by the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncoveredRegion {
     /// A point on the part near its centroid, in world space.
@@ -45,9 +45,9 @@ pub struct UncoveredRegion {
 /// The kind of part that a model lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// Part of the object is outside the surface.
+    /// Part of the object is missing from the model: it lies outside the surface.
     Matter,
-    /// Part of the background is inside the surface.
+    /// A cavity is missing from the model: part of the background lies inside the surface.
     Cavity,
 }
 
@@ -61,9 +61,10 @@ pub struct CoverageSurvey {
     model_tree: TriangleTree,
     /// The number of triangles tested, first of the iso-surface, then of the model.
     tested: usize,
-    /// Whether each triangle of the iso-surface tested so far is covered.
+    /// Whether all of each triangle of the iso-surface tested so far is covered.
     is_covered: Vec<bool>,
-    /// Covered area and total area of the triangles tested so far, of the iso-surface and of the model.
+    /// Covered area and total area of the triangles tested so far, in square world units, of the iso-surface and of the
+    /// model.
     areas: [[f64; 2]; 2],
 }
 
@@ -118,7 +119,8 @@ impl CoverageSurvey {
         if all == 0 { 1.0 } else { end as f64 / all as f64 }
     }
 
-    /// Adds a triangle to the areas, piece by piece, and returns whether all of its pieces are covered.
+    /// Tests a triangle of the iso-surface (`which` 0) or of the model (1) piece by piece, adds its areas to the sums,
+    /// and returns whether all of its pieces are covered.
     fn test(&mut self, which: usize, t: usize) -> bool {
         let (mesh, other) = [(&self.iso_surface, &self.model_tree), (&self.model, &self.iso_tree)][which];
         let corners = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
@@ -196,7 +198,7 @@ impl CoverageSurvey {
 }
 
 /// Calls `visit` with the centroids of equal pieces of a triangle, whose sides are no longer than [`PIECE`] unless that
-/// takes more than 64 along a side.
+/// takes more than 64 pieces along a side.
 fn for_each_piece([a, b, c]: [Vec3; 3], mut visit: impl FnMut(Vec3)) {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / PIECE).ceil().clamp(1.0, 64.0) as u32;

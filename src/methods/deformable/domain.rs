@@ -5,19 +5,20 @@ use crate::math::{Bounds, Vec3};
 /// The size of the domain as a multiple of the enclosing start surface.
 const DOMAIN_SCALE: f32 = 1.5;
 
-/// 3^(1/4): the half axes of the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the corners of a box, in those of the
-/// box.
+/// 3^(1/4), the ratio of the half axes of the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 to the half sides of a box
+/// through whose corners it passes.
 const THROUGH_CORNERS: f32 = 1.316_074;
 
-/// The largest ratio of the axes of the enclosing start surface. Around flatter images it leaves more room: the flatter
-/// it is, the more its triangles are squashed before they can be resolved; at 33 some of them crossed.
+/// The largest ratio of the longest to the shortest half axis of the enclosing start surface; around flatter images the
+/// short ones are enlarged. The flatter the surface, the more its triangles are squashed before they can be resolved;
+/// at 33 some of them crossed.
 const MAX_ELONGATION: f32 = 6.0;
 
 /// The largest number of vertices of any surface. A vertex takes about 200 bytes, meshes are copied several times, and
 /// wasm32 has 4 GiB.
 const MAX_VERTICES: f64 = 4e6;
 
-/// A box around the image in model space.
+/// A box around the image in model space, in which all vertices must stay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Domain {
     pub(super) centre: Vec3,
@@ -26,8 +27,8 @@ pub(super) struct Domain {
     pub(super) bounds: Bounds,
 }
 
-/// Returns half axes of a rounded box, at least `around`, that is neither too small for a mesh with the sampling
-/// distance `delta` nor too flat.
+/// Returns half axes of a rounded box, at least `around`, neither too short for a mesh with the sampling distance
+/// `delta` nor below the longest divided by [`MAX_ELONGATION`].
 pub(super) fn rounded_axes(around: Vec3, delta: f32) -> Vec3 {
     let least = (4.0 * delta).max(around.max_element() / MAX_ELONGATION);
     around.max(Vec3::splat(least))
@@ -45,8 +46,8 @@ impl Domain {
         }
     }
 
-    /// Returns the approximate number of vertices of the enclosing start surface: one per 2 δ² of the box with its
-    /// axes.
+    /// Returns the approximate number of vertices of the enclosing start surface: one per 2 δ² of the surface of a box
+    /// with the same half axes.
     pub(super) fn enclosing_vertices(&self, delta: f32) -> usize {
         let [a, b, c] = (self.axes / delta).as_dvec3().to_array();
         (4.0 * (a * b + b * c + c * a)) as usize

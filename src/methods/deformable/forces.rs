@@ -27,7 +27,7 @@ const MAX_INSET: f32 = 0.15;
 pub(super) struct LocalAttractor {
     pub(super) point: Vec3,
     pub(super) strength: f32,
-    /// Maps displacements in model space to world space, in radii of the attractor.
+    /// Maps a displacement in model space to world space, divided by the radius of the attractor.
     pub(super) in_radii: Mat3,
 }
 
@@ -95,12 +95,12 @@ pub(super) struct Field<'a> {
 pub(super) struct Forces {
     /// L(x), the vector from a vertex to the mean of its neighbours.
     laplacian: Vec<Vec3>,
-    /// Unit normals, outwards.
+    /// Unit normals of the vertices, outwards.
     pub(super) normal: Vec<Vec3>,
-    /// The absolute difference of Π over one voxel along the normal; the stiffness of the image force is proportional
-    /// to it.
+    /// The absolute difference of Π over one voxel of the finest level along the normal; the stiffness of the image
+    /// force is proportional to it.
     pub(super) slope: Vec<f32>,
-    /// The image cell around each vertex at its last sample.
+    /// The image cell around each vertex at its last sample, which the next sample often reuses.
     cells: Vec<CellCache>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
@@ -179,7 +179,7 @@ impl Forces {
     }
 
     /// Returns f_c = α_c (L(x) − mean of L over the neighbours) (5). Its tangential part fades out as the surface
-    /// settles; its normal part is at most `limit`.
+    /// settles; the length of its normal part is at most `limit`.
     #[inline]
     fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, limit: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
@@ -194,9 +194,9 @@ impl Forces {
         (normal_part + along) * scale.rigidity
     }
 
-    /// Returns the approximate mean position of the triangles at a vertex: with corners on a sphere of radius r,
-    /// triangles of edge l are l²/8r inside, a quarter of L. The image is sampled there, so that the surface encloses
-    /// the volume of the contour; with vertices on the contour the volume would be too small.
+    /// Returns the approximate mean position of the triangles at a vertex. With corners on a sphere of radius r,
+    /// triangles of edge l lie l²/8r inside it, a quarter of the length of L(x). The image is sampled there, so that
+    /// the surface encloses the volume of the contour; with vertices on the contour the volume would be too small.
     #[inline]
     fn mean_of_triangles(&self, v: usize, x: Vec3) -> Vec3 {
         let normal = self.normal[v];
@@ -204,7 +204,7 @@ impl Forces {
         x + normal * inset.clamp(-MAX_INSET, MAX_INSET)
     }
 
-    /// Returns the absolute difference of Π over one voxel along the normal.
+    /// Returns the absolute difference of Π over one voxel of the finest level along the normal.
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
@@ -279,7 +279,7 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     })
 }
 
-/// Returns the force of an attractor: a spring to its point that fades out smoothly at its radius.
+/// Returns the force of an attractor at a position: a spring to its point that fades out smoothly at its radius.
 fn attraction(attractor: &LocalAttractor, x: Vec3) -> Vec3 {
     let offset = attractor.point - x;
     let far = (attractor.in_radii * offset).length_squared();

@@ -13,7 +13,7 @@ pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 /// The bound of the absolute value of normalised intensities; within it no force overflows.
 const MAX_NORMALISED: f64 = 100.0;
 
-/// One level of the pyramid.
+/// One level of the image pyramid, sampled at positions in model space.
 #[derive(Clone, Debug)]
 pub(super) struct LevelImage {
     grid: Grid,
@@ -103,7 +103,7 @@ impl LevelImage {
         *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
     }
 
-    /// Calls `visit` with the difference of each pair of neighbouring voxels on opposite sides of `iso`.
+    /// Calls `visit` with the signed difference of each pair of neighbouring voxels on opposite sides of `iso`.
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
@@ -164,7 +164,7 @@ impl Pyramid {
         Ok(Self { levels, low: volume.range()[0], range: volume.span() })
     }
 
-    /// Normalises an intensity to the range of the volume, 0..1. Values outside are clamped to ±[`MAX_NORMALISED`].
+    /// Maps an intensity such that the range of the volume becomes 0..1. Results are clamped to ±[`MAX_NORMALISED`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
         ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }

@@ -15,20 +15,22 @@ use crate::volume::CellCache;
 /// The positions of the image samples between two vertices in contact, as shares of the distance.
 const SAMPLES: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The least cosine for two vertices to face each other, between the normal of one and the direction to or from the
-/// other; for edges to collapse, between one normal and the reverse of the other.
+/// The cosine above which two vertices face each other: for joins, between the normal of each and the direction to or
+/// from the other; for collapses, between one normal and the reverse of the other.
 const FACING: f32 = 0.3;
 
-/// The largest distance of a settled surface from its contour, in voxels; intensities that differ by no more than over
-/// this distance are no reason to join or cut.
+/// The largest distance of a settled surface from its contour, in voxels of the finest level. The image decides on
+/// joins, cuts and collapses only by intensities that differ from the iso value by more than the image varies over this
+/// distance.
 const MAX_OFFSET: f32 = 0.15;
 
-/// The distance from the vertices of a small component, towards its enclosed side, at which the image is sampled, in
-/// voxels.
+/// The distance from the vertices of a small component, towards its enclosed side, at which the image is sampled to
+/// decide whether the component is kept, in voxels of the finest level.
 const SAMPLE_DEPTH: f32 = 0.35;
 
-/// A topology guide that allows only changes that agree with the image: sheets are joined where all between them is
-/// object (a gap) or background (a wall), and necks are cut where the image separates the parts.
+/// A topology guide that allows only changes that agree with the image. Sheets are joined across a gap if all between
+/// them is object, across a wall if all is background; a strand is cut if its middle is background, a tunnel if its
+/// middle is object.
 #[derive(Clone, Copy)]
 pub(super) struct ImageGuide<'a> {
     pub(super) image: &'a LevelImage,
@@ -46,8 +48,8 @@ impl<'a> ImageGuide<'a> {
         self.object.depth(intensity, self.iso)
     }
 
-    /// Whether all points are in the object, or all in the background, by more than `tolerance`, a difference of
-    /// intensity.
+    /// Whether all points are in the object if `is_object`, else in the background, with intensities that differ from
+    /// the iso value by at least `tolerance`.
     fn are_all(&self, is_object: bool, points: &[Vec3], tolerance: f32) -> bool {
         points.iter().all(|&p| {
             let depth = self.depth(p);
@@ -55,8 +57,8 @@ impl<'a> ImageGuide<'a> {
         })
     }
 
-    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It vanishes
-    /// inside object or background; on the contour it is the tolerance for settled vertices off the contour.
+    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It is 0 in
+    /// uniform object or background; at the contour it makes up for vertices that have settled off it.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
@@ -104,7 +106,7 @@ impl TopologyGuide for ImageGuide<'_> {
     }
 
     /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
-    /// sides would merge, and at a rim the next pair of vertices, too.
+    /// sides would merge, and at a rim the next pair of vertices would follow.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let [m, n] = [u, v].map(|w| mesh.area_normal(w).normalize_or_zero());
         if m.dot(n) >= -FACING {

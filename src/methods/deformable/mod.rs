@@ -122,8 +122,9 @@ const DEFAULT_DELTA: f64 = 0.9;
 /// memory; with more, the mesh misses the object.
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
-/// The largest strength of an attractor, and its largest radius and coordinate in voxels; beyond them, forces overflow.
+/// The largest absolute strength of an attractor; beyond it, forces overflow.
 const MAX_STRENGTH: f64 = 1e3;
+/// The largest radius and absolute coordinate of an attractor, in voxels; beyond it, forces overflow.
 const MAX_ATTRACTOR_DISTANCE: f64 = 1e6;
 
 /// The distance in δ that a vertex travels before its edge bounds and contacts are checked again.
@@ -142,7 +143,7 @@ struct Keys {
     velocity: VectorKey,
     /// The position at the last check of edge bounds and contacts.
     checked_position: VectorKey,
-    /// The number of still iterations in a row; from [`awake::ITERATIONS_TO_SLEEP`] on the vertex sleeps.
+    /// The count of still iterations in a row; from [`awake::ITERATIONS_TO_SLEEP`] on the vertex sleeps.
     still_iterations: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
     since_edit: ScalarKey,
@@ -328,8 +329,9 @@ impl DeformableModel {
         times.add("motion", (self.clock)() - normals - forces - embedding);
     }
 
-    /// Returns the vertices whose bounds have to be checked, and marks them as checked: those that have travelled
-    /// [`CHECK_TRAVEL`] since their last check, and one in [`CHECK_PERIOD`] slots in turn if it has moved at all.
+    /// Returns the vertices whose edge bounds and contacts have to be checked, and marks them as checked: moving ones
+    /// that have travelled [`CHECK_TRAVEL`] since their last check, and in turn one in [`CHECK_PERIOD`] of all if it
+    /// has moved at all.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
@@ -344,7 +346,8 @@ impl DeformableModel {
         active
     }
 
-    /// Restores edge bounds and contacts around `active`, and renumbers the mesh if too few of its slots are live.
+    /// Restores edge bounds and resolves contacts around `active`, wakes the edited vertices and their neighbours, and
+    /// renumbers the mesh if too few of its slots are live.
     fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
@@ -371,7 +374,7 @@ impl DeformableModel {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
 
-    /// Whether each level is searched for parts of its contour that the mesh lacks.
+    /// Whether each level is searched for parts of its contour that the mesh lacks, as the parameter `seeding` tells.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
             Seeding::Auto => self.from_contour,
@@ -516,9 +519,9 @@ impl DeformableModel {
         self.mesh.to_triangles().transformed(&self.to_world)
     }
 
-    /// Returns the speed of each vertex of [`Self::surface`] along its outward normal, negative inwards. The unit is
-    /// world units per unit of time, where Δt passes in one iteration whatever the step of the integrator. New vertices
-    /// have the speed of their neighbourhood.
+    /// Returns the speed of each vertex of [`Self::surface`] along its outward normal, negative inwards, in world units
+    /// per unit of time. An iteration counts as Δt also with the implicit integrator, whose steps are longer. Vertices
+    /// made by edits have speeds interpolated between their neighbours; sleeping vertices and new seeds have 0.
     pub fn speeds(&self) -> Vec<f32> {
         let normals = self.surface().normals.unwrap_or_default();
         let velocities = self.mesh.vector(self.keys.velocity);
@@ -536,7 +539,7 @@ impl DeformableModel {
     }
 }
 
-/// Converts the option `edge`, in world units, to δ on the finest level in voxels.
+/// Converts the option `edge`, in world units, to δ on the finest level in voxels; `None` gives [`DEFAULT_DELTA`].
 fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
     let delta = edge / voxel / MEAN_EDGE;
@@ -550,7 +553,7 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     ))
 }
 
-/// Returns the δ of a level in voxels of the finest level; it grows with the unit of the image (15).
+/// Returns the δ of a level in voxels of the finest level; it grows by [`image::REDUCTION`] with each level (15).
 fn delta_at(finest: f64, level: usize) -> f32 {
     (0..level).fold(finest, |delta, _| delta * image::REDUCTION) as f32
 }

@@ -18,26 +18,30 @@ pub(super) struct SpeedSummary {
     pub(super) fastest: f32,
 }
 
-/// The number of iterations that a vertex needs to return after an edit.
+/// The number of iterations in which a vertex displaced by an edit returns to the surface; until then its speed does
+/// not delay convergence.
 pub(super) const ITERATIONS_AFTER_EDIT: f32 = 6.0;
 
 /// The number of still iterations counted in addition for a vertex that could not move at all: it is pressed against
 /// others and will not move in the next iteration either.
 const STILL_IF_STUCK: f32 = 2.0;
 
-/// The number of still iterations that one long step counts as.
+/// The number of still iterations that a still iteration with the implicit integrator counts as, since its steps are
+/// long.
 const STILL_PER_IMPLICIT_STEP: f32 = 2.0;
 
 /// The speed above which a vertex wakes its neighbours, in multiples of the largest speed of a still vertex. A
 /// neighbour of valence six moves by at most a sixth of the displacement.
 const WAKING_SPEED: f32 = 4.0;
 
-/// The stiffness of f_c and f_e against displacing a vertex of valence 6 from its neighbours, in α_c and α_e.
+/// The stiffness of f_c against displacing a vertex of valence 6 from its neighbours, as a multiple of α_c; the
+/// implicit integrator uses it.
 const BENDING_STIFFNESS: f32 = 1.3;
+/// The stiffness of f_e against displacing a vertex of valence 6 from its neighbours, as a multiple of α_e.
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
-/// The share of its speed that a vertex must keep for a reversal to be counted; weaker oscillations decay by
-/// themselves.
+/// The share of its speed that a vertex must keep after a reversal of its velocity for the reversal to be counted;
+/// weaker oscillations decay by themselves.
 const MIN_KEPT_SPEED: f32 = 0.5;
 
 /// The decrease of the count of reversals in an iteration without one: oscillations with periods of up to eight
@@ -183,7 +187,8 @@ impl Motion {
         self.forces.milliseconds += (context.clock)() - begin;
     }
 
-    /// Shortens displacements that are too long or leave the domain, and scales the velocities accordingly.
+    /// Shortens displacements longer than the parameter `max_move` or out of the domain, and sets the velocities
+    /// accordingly.
     fn clamp_displacements(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
         let &MotionContext { domain, params, delta, .. } = context;
         let limit = params.max_move as f32 * delta;

@@ -12,11 +12,13 @@ pub struct DeformableParams {
     pub iso: f64,
     /// α_I: strength of the image force towards the iso-surface at π_I; negative if the object is brighter than `iso`.
     pub iso_force: f64,
-    /// α_g: attraction to bright ridges along the normal.
+    /// α_g: strength of the gradient force along the normal, which attracts the surface to bright ridges; negative
+    /// values repel it from them.
     pub gradient_normal: f64,
-    /// β_g: attraction to bright ridges along the tangent plane.
+    /// β_g: strength of the gradient force along the tangent plane, which attracts vertices to bright ridges; negative
+    /// values repel them.
     pub gradient_tangent: f64,
-    /// The length to which image gradients are clamped, in ranges of intensity per voxel.
+    /// The length to which longer image gradients are shortened, in ranges of intensity per voxel of the level.
     pub gradient_bound: f64,
     /// α_c: rigidity, the resistance to changes of curvature.
     pub rigidity: f64,
@@ -26,17 +28,17 @@ pub struct DeformableParams {
     pub rest_length: RestLength,
     /// m: the mass of a vertex.
     pub mass: f64,
-    /// γ: the damping.
+    /// γ: the damping coefficient.
     pub damping: f64,
     /// The integrator of the law of motion.
     pub integrator: Integrator,
-    /// Δt: the time step.
+    /// Δt: the time step; one iteration of [`Integrator::Implicit`] takes 16 of them.
     pub time_step: f64,
     /// The largest displacement of a vertex in one iteration, as a fraction of δ.
     pub max_move: f64,
-    /// ε: the mean kinetic energy along the normals below which a level has converged.
+    /// ε: the bound of the mean kinetic energy along the normals, ½ m (v·n)² / δ²; a level converges only below it.
     pub energy_tolerance: f64,
-    /// Whether the mesh adapts its sampling and topology.
+    /// Whether the mesh may change its sampling and topology.
     pub topology: Topology,
     /// The degree of local adaptation to the image. At 0, as in the paper, δ is uniform, and contact is decided by
     /// distance alone; with any larger value the image decides on topology changes and limits rigidity, and edge
@@ -44,8 +46,8 @@ pub struct DeformableParams {
     pub adaptivity: f64,
     /// Whether parts of a level's contour that the mesh lacks are added to it.
     pub seeding: Seeding,
-    /// The least volume, in voxels of the volume, that a closed part or cavity must enclose to be in a contour or be
-    /// seeded.
+    /// The least volume, in voxels of the volume, that a closed part or cavity must enclose to be in a contour. Seeds
+    /// may be pieces of parts, and need only 1/32 of it.
     pub smallest_part: f64,
 }
 
@@ -56,11 +58,11 @@ const IMPLICIT_STEP: f64 = 16.0;
 /// The rest length of the edges as springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RestLength {
-    /// Zero: the surface tends to minimal area.
+    /// No rest length: edges contract, and the surface tends to minimal area.
     Zero,
     /// The mean edge length of the mesh: edges tend to equal length.
     Mean,
-    /// A length in world units.
+    /// A given rest length in world units.
     Given(f64),
 }
 
@@ -82,11 +84,11 @@ pub enum Integrator {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Seeding {
-    /// Only in runs that start from the contour.
+    /// Levels are searched and missing parts added only in runs that start from the contour.
     Auto,
-    /// In all runs.
+    /// Levels are searched and missing parts added in all runs.
     On,
-    /// Never.
+    /// Levels are never searched for missing parts.
     Off,
 }
 
@@ -94,7 +96,7 @@ pub enum Seeding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// Sampling and topology follow the three bounds derived from δ.
+    /// Edges are split and collapsed, parts in contact joined, and necks cut, by the three bounds derived from δ.
     Adaptive,
     /// Vertices move, but the mesh keeps its edges.
     Fixed,
@@ -126,7 +128,7 @@ impl DeformableParams {
         self.iso_force != 0.0 && self.adaptivity > 0.0
     }
 
-    /// Checks every value against its range.
+    /// Checks every numerical value against its range.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and the accepted range.
@@ -135,7 +137,7 @@ impl DeformableParams {
         given.filter_map(|(spec, value)| Some((spec, value?))).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// Returns the numerical values in the order of [`SPECS`], `None` for parameters that are no numbers.
+    /// Returns the numerical values in the order of [`SPECS`], `None` for the other parameters.
     fn numbers(&self) -> [Option<f64>; 18] {
         let rest = if let RestLength::Given(length) = self.rest_length { Some(length) } else { None };
         [

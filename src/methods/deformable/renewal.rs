@@ -24,7 +24,8 @@ pub(super) struct Renewal {
 }
 
 impl DeformableModel {
-    /// Returns the components to replace for the next finer level, empty if the mesh lacks nothing.
+    /// Returns the components to replace for the next finer level; empty if the mesh lacks nothing, the image force is
+    /// 0, or the topology is fixed.
     ///
     /// # Errors
     /// If the contour does not fit into memory.

@@ -7,11 +7,13 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
-/// The number of quiet iterations in a row for convergence: a single one may be a turning point of an oscillation.
+/// The number of quiet iterations in a row, those with energy and speed below their bounds, that convergence needs: a
+/// single one may be a turning point of an oscillation.
 const QUIET_ITERATIONS: f64 = 3.0;
 
-/// The same with the implicit integrator if the speed of the fastest vertex is bounded, too; its long steps are damped
-/// and do not oscillate.
+/// The number of quiet iterations in a row that convergence needs with the implicit integrator on levels that did not
+/// begin on their contour, where the speed of the fastest vertex is bounded, too; long steps are damped and do not
+/// oscillate.
 const QUIET_LONG_STEPS: f64 = 2.0;
 
 /// The largest number of quiet iterations required, whatever the time step and the damping.
@@ -44,7 +46,7 @@ pub(super) struct Convergence {
     /// Whether the surface was on the contour of this level at its beginning, and neither parameters nor attractors
     /// have changed since; there are no moving fronts then, and the fastest vertex does not delay convergence.
     pub(super) began_on_contour: bool,
-    /// The iteration after which this level began.
+    /// The number of iterations done before this level began.
     pub(super) began: u32,
 }
 
@@ -107,8 +109,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Sets sizes on the finest level, or else seeds missing parts; if either changed the mesh, it is no longer quiet.
-    /// Edits wake only the vertices around them.
+    /// Sets sizes on the finest level; if they are set already, seeds missing parts instead. After a change, quiet
+    /// iterations are counted anew. Edits wake only the vertices around them.
     fn size_and_seed(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.set_sizes() {
             self.convergence.quiet = 0;
@@ -128,8 +130,8 @@ impl DeformableModel {
         Ok(found)
     }
 
-    /// Returns the speed, in δ per unit of time, below which the fastest vertex has settled; it also bounds the
-    /// displacement in one step.
+    /// Returns the speed, in δ per unit of time, below which the fastest vertex has settled: at most [`SETTLED_SPEED`],
+    /// and at most [`SETTLED_DISPLACEMENT`] in one iteration.
     fn settled_speed(&self) -> f32 {
         let longest = SETTLED_DISPLACEMENT / self.params.step_length() as f32;
         if longest < SETTLED_SPEED { longest } else { SETTLED_SPEED }
@@ -144,7 +146,8 @@ impl DeformableModel {
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MAX_QUIET_ITERATIONS) as u32
     }
 
-    /// Restores the bounds around all vertices, and removes specks.
+    /// Restores edge bounds and contacts around all vertices, and removes negligibly small components; does nothing if
+    /// the topology is fixed.
     pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
@@ -159,8 +162,8 @@ impl DeformableModel {
         changes
     }
 
-    /// Refines the mesh and descends to the next finer image (figure 13). Components that lack part of the finer
-    /// contour are renewed; if the result would intersect itself, missing parts are seeded instead.
+    /// Refines the mesh and descends to the next finer image (figure 13). In runs that seed, components that lack part
+    /// of the finer contour are renewed; if that fails, missing parts are seeded instead.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
@@ -197,7 +200,7 @@ impl DeformableModel {
     /// Descends with some components replaced by parts of the finer contour, and resolves the whole mesh like a start.
     ///
     /// # Errors
-    /// If the new parts do not fit beside the others, or into memory.
+    /// If there would be too many vertices, the result intersects itself, or memory does not suffice.
     fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
         renewal.removed.iter().for_each(|&v| _ = self.mesh.remove_component(v));
         self.descend_refined()?;

@@ -105,7 +105,8 @@ impl DeformableModel {
         if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
     }
 
-    /// Initialises the attributes of vertices added to the mesh: at rest, awake and checked, with size 1.
+    /// Initialises the attributes of vertices added to the mesh: at rest, awake and checked, with size 1, the uniform
+    /// δ.
     pub(super) fn initialise_attributes(&mut self, added: &[VertexId]) {
         let keys = self.keys;
         for v in added.iter().map(|v| v.index()) {
@@ -136,7 +137,7 @@ impl DeformableModel {
     }
 }
 
-/// The voxels of a level compared between its contour and the mesh.
+/// A comparison of a level's contour with the mesh, voxel by voxel, which finds missing parts.
 struct Comparison<'a> {
     image: &'a LevelImage,
     iso: f32,
@@ -151,7 +152,7 @@ struct Comparison<'a> {
 
 impl Comparison<'_> {
     /// Returns closed surfaces, in model space, around the missing voxels of one kind; each encloses at least
-    /// `smallest`.
+    /// `smallest`, in voxels of the finest level.
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
         let missing = self.missing_voxels(kind)?;
@@ -178,7 +179,7 @@ impl Comparison<'_> {
         self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
-    /// Returns the misplaced voxels that are further from the mesh than [`CLEARANCE`], in order.
+    /// Returns the misplaced voxels that are further from the mesh than [`CLEARANCE`], in ascending order.
     fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
         let mut missing = self.misplaced_voxels(kind);
         if missing.is_empty() {
@@ -192,7 +193,8 @@ impl Comparison<'_> {
         Ok(missing)
     }
 
-    /// Returns the voxels on the wrong side of the mesh whose six neighbours are on that side of it, too, in order.
+    /// Returns the voxels on the wrong side of the mesh whose six neighbours are on that side of the mesh, too, in
+    /// ascending order.
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Cavity;
         let dims = self.image.grid().0.dims;
@@ -205,7 +207,8 @@ impl Comparison<'_> {
         differing.ones().filter(is_misplaced).collect()
     }
 
-    /// Returns the part of the mesh with the triangles that may be within [`CLEARANCE`] of some positions.
+    /// Returns the part of the mesh with the triangles that may be within [`CLEARANCE`] of the positions around which
+    /// `cells` were inserted.
     fn surface_near(&self, cells: &CellSet) -> TriangleMesh {
         let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| cells.contains(p)).collect();
         let near =
@@ -225,8 +228,8 @@ impl Comparison<'_> {
     }
 
     /// Returns the steepness of the image at the contour of some voxels: the root mean square of the differences
-    /// between voxels on that side of the iso value and their neighbours on the other; if there are none, of their
-    /// depths. Above 0.
+    /// between those with positive [`Self::depth`] and their neighbours with negative depth; if there are none, of the
+    /// positive depths alone; 1 if there are none, either.
     fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
         let dims = self.image.grid().0.dims;
         let (mut differences, mut depths) = (Mean::default(), Mean::default());
@@ -245,8 +248,8 @@ impl Comparison<'_> {
         differences.value().or(depths.value()).map_or(1.0, |square| square.sqrt() as f32)
     }
 
-    /// Returns a field on a box around a cluster of missing voxels that is 0 on their contour: on the iso-surface where
-    /// it bounds them, else halfway to the next voxel.
+    /// Returns a field on a box around a cluster of missing voxels, positive inside their contour and negative outside:
+    /// it is 0 on the iso-surface where that bounds them, else halfway to the next voxel.
     fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
         let grid = self.image.grid().0;
         let steepness = self.steepness(kind, missing);

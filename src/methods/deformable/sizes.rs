@@ -21,11 +21,13 @@ const MAX_SAGITTA: f32 = 0.25;
 /// with 0.25, a ball of 7 voxels has 7 % less volume.
 const MIN_SAGITTA: f32 = 0.05;
 
-/// The smallest and the largest size of a vertex, a factor on δ, with full adaptivity.
+/// The smallest size of a vertex, a factor on δ, with full adaptivity.
 const SMALLEST: f32 = 0.7;
+/// The largest size of a vertex, a factor on δ, with full adaptivity.
 const LARGEST: f32 = 1.6;
 
-/// The largest change of size along an edge, per length in edges of size 1; with this, sampling remains isotropic.
+/// The largest difference of size between the ends of an edge of size 1, and in proportion for shorter and longer
+/// edges; with this, sampling remains isotropic.
 const GRADATION: f32 = 0.3;
 
 /// The step of the search for the opposite side of a wall or a gap, in voxels.
@@ -41,8 +43,8 @@ const MEAN_EDGE: f32 = super::MEAN_EDGE as f32;
 const MAX_OFFSET: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex, and returns whether it did: not if sizes were set on this level before, or if the
-    /// model does not adapt to the image. Seeds added later are given sizes separately.
+    /// Sets the size of every vertex by curvature, and returns whether it did: not if sizes were set on this level
+    /// before, or if the model does not adapt to the image. Seeds added later are given sizes separately.
     pub(super) fn set_sizes(&mut self) -> bool {
         if self.convergence.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
@@ -53,7 +55,7 @@ impl DeformableModel {
         true
     }
 
-    /// Sets the sizes of the vertices of whole components.
+    /// Sets the sizes of the vertices of whole components by curvature, with bounded gradation.
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
         for _ in 0..PASSES {
@@ -64,7 +66,8 @@ impl DeformableModel {
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
     }
 
-    /// Returns the smallest size of the edges at each vertex, bounded by the thickness of thin walls and gaps.
+    /// Returns for each vertex, by slot, the smallest size of its edges by curvature. At thin walls and gaps, sizes
+    /// above 1 are bounded by the thickness.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let offsets = self.offsets_from_contour(members);
@@ -117,7 +120,8 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the offset of each vertex from the contour along its normal.
+    /// Returns the offset of each vertex from the contour along its normal, by slot, in voxels; positive inside the
+    /// contour.
     fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
         for &v in members {
@@ -127,7 +131,8 @@ impl DeformableModel {
         offsets
     }
 
-    /// Returns the size of an edge by its sagitta; `offsets` are those of its ends from the contour.
+    /// Returns the size of an edge by its sagitta, infinite if it is straight; `offsets` are those of its ends from the
+    /// contour.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
@@ -146,7 +151,8 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the approximate depth of a point inside the contour along a direction, in voxels; negative outside.
+    /// Returns the approximate depth of a point inside the contour along a direction, in voxels, clamped to
+    /// ±[`MAX_OFFSET`]; negative outside.
     fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let slope = (ahead - behind).abs();

@@ -16,11 +16,11 @@ use crate::volume::marching_cubes;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// The iso-surface at π_I on the coarsest level, outer and inner boundaries, without parts that enclose less than
-    /// [`super::DeformableParams::smallest_part`]. If it is empty, the mesh is empty, too, if finer levels are searched
-    /// for parts; otherwise the enclosing surface is used.
+    /// [`super::DeformableParams::smallest_part`]. If it is empty, the mesh is empty, too, if the model adapts to the
+    /// image and seeds missing parts; otherwise the enclosing surface is used.
     Contour,
-    /// A refined icosahedron around all of the coarsest level that is brighter than its π_I; around the whole image if
-    /// nothing is, or if the object is not the brighter side.
+    /// A rounded box around all voxels of the coarsest level brighter than its π_I; around the whole image if there are
+    /// none, or if α_I is not negative.
     Enclosing,
     /// A grid of n³ small spheres that fills the image.
     Bubbles(u32),
@@ -31,7 +31,7 @@ pub enum Start {
         /// The common radius.
         radius: f64,
     },
-    /// The iso-surface of the coarsest level at this intensity.
+    /// The iso-surface of the coarsest level at this intensity, with the brighter side inside.
     MarchingCubes(f64),
     /// A closed mesh without self-intersections.
     Mesh(TriangleMesh),
@@ -40,10 +40,11 @@ pub enum Start {
 /// The image and the sampling that a start surface is made for.
 pub(super) struct StartContext<'a> {
     pub(super) image: &'a LevelImage,
-    /// The normalised intensity above which voxels are enclosed; `None` if the object is not the brighter side.
+    /// The normalised intensity above which voxels are enclosed by [`Start::Enclosing`]; `None` if α_I is not negative.
     pub(super) brighter_than: Option<f32>,
-    /// π_I, normalised, and the side of it on which the object is.
+    /// π_I, normalised.
     pub(super) iso: f32,
+    /// The side of π_I on which the object is.
     pub(super) object: ObjectIs,
     /// The least volume of a closed part of the contour, in voxels of the finest level.
     pub(super) smallest_part: f64,
@@ -54,7 +55,7 @@ pub(super) struct StartContext<'a> {
     /// The voxel spacing in world units.
     pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
-    /// Whether an empty contour gives an empty start mesh, since parts are seeded on finer levels.
+    /// Whether an empty contour gives an empty start mesh, since missing parts are seeded later.
     pub(super) may_be_empty: bool,
 }
 
@@ -71,15 +72,17 @@ const SMALLEST_RADIUS: f32 = 1.2;
 /// The distance between an object and the surface that encloses it, in δ.
 const OBJECT_MARGIN: f32 = 1.5;
 
-/// The radius of a bubble as a share of its cell; neighbours are further apart than the contact distance.
+/// The radius of a bubble as a share of the smallest side of its cell; neighbours are further apart than the contact
+/// distance.
 const BUBBLE_SHARE: f32 = 0.3;
 
-/// The upper bound of a sphere's edges in δ: well below 2.5, and well above √3, so that one more refinement does not
-/// make edges shorter than the lower bound.
+/// The longest edge of a start sphere in δ: well below the upper edge bound 2.5, and well above √3, so that one more
+/// refinement does not make edges shorter than the lower bound.
 const SPHERE_EDGE: f32 = 2.2;
 
-/// The largest number of bubbles along an axis, and of seeds: with more, memory, not the method, is the limit.
+/// The largest number of bubbles along an axis: with more, memory, not the method, is the limit.
 const MAX_BUBBLES: u32 = 100;
+/// The largest number of start spheres at given points: with more, memory, not the method, is the limit.
 const MAX_SEEDS: usize = 10_000;
 
 /// The side of the cells around self-intersections of a resolved contour in which edits are tested in full, as a
@@ -100,8 +103,9 @@ impl Start {
     /// `iso` normalises intensities.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if a sphere is too small for the sampling, two overlap, or the iso-surface is
-    /// empty; [`MethodError::Mesh`] if the caller's mesh is open, not manifold or intersects itself.
+    /// [`MethodError::InvalidArgument`] if a number is out of range, spheres or the caller's mesh are misplaced, or the
+    /// iso-surface is empty; [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if the caller's mesh is open, not
+    /// manifold or intersects itself.
     pub(super) fn make(
         &self,
         context: &StartContext,
@@ -127,7 +131,7 @@ impl Start {
 }
 
 impl DeformableModel {
-    /// Brings the edges of the mesh, a contour, within bounds, on the finest level with sizes by curvature; used for
+    /// Brings the edges of the mesh, a contour, within bounds, with sizes by curvature on the finest level; used for
     /// the start and for renewed components.
     ///
     /// Edits hardly ever cause self-intersections, so most are tested in one-rings only, and the whole mesh is tested
@@ -248,7 +252,7 @@ fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
 }
 
 /// Returns the centre and the half axes of a rounded box around all of the object, with the proportions of its bounding
-/// box; `None` if there is no object.
+/// box and a margin of [`OBJECT_MARGIN`]; `None` if there is no object.
 fn around_object(context: &StartContext) -> Option<(Vec3, Vec3)> {
     let ends = context.image.ends_of_rows(context.brighter_than?);
     let Bounds { min, max } = Bounds::from_points(&ends);
@@ -357,7 +361,7 @@ fn largest(spacing: [f64; 3]) -> f64 {
 }
 
 /// Makes the simplified contour at π_I of the start level, for [`DeformableModel::resolve_contour`]. If it is empty: an
-/// empty mesh if finer levels are searched for parts, else `None`.
+/// empty mesh if [`StartContext::may_be_empty`], else `None`.
 pub(super) fn contour_mesh(context: &StartContext) -> Result<Option<Mesh>, MethodError> {
     let surface = contour(context.image, context.iso, context.object, context.smallest_part)?;
     if surface.triangles.is_empty() {

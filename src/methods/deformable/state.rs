@@ -122,7 +122,8 @@ impl DeformableModel {
     }
 }
 
-/// Returns a hash of a volume's frame and the number of pyramid levels, by which a saved state is matched to its model.
+/// Returns a hash of a frame of the volume, its dimensions, affine transform and range, and the number of pyramid
+/// levels, by which a saved state is matched to its model.
 pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
     let mut hash = Hash::new();
     volume.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));

@@ -18,7 +18,7 @@ const MIN_SPAN: f64 = 1e-12;
 /// surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Maps world space to (x·depth, y·depth, depth).
+    /// Maps a world point to (x·depth, y·depth, depth), where (x, y) is its position in the image, in pixels.
     to_view: DAffine3,
     /// Inverse of `to_view`; maps the origin to the camera's centre.
     from_view: DAffine3,
@@ -137,7 +137,7 @@ impl Camera {
         self.covers(x, y).then(|| [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)])
     }
 
-    /// Returns red, green, blue and alpha of a pixel, 0..=255; `None` if there is none.
+    /// Returns red, green, blue and alpha, 0..=255, of a pixel that is within the image; `None` without an image.
     pub(super) fn pixel(&self, [column, row]: [usize; 2]) -> Option<[u8; 4]> {
         let image = self.image.as_ref()?;
         image.as_chunks().0.get(row * self.width as usize + column).copied()
@@ -148,13 +148,14 @@ impl Camera {
         self.to_view.transform_point3(p)
     }
 
-    /// Returns the displacements of a world point at depth 1 that move it by one pixel to the right, and by one down.
+    /// Returns the displacements of a world point at depth 1 that move its projection by one pixel to the right, and by
+    /// one down.
     pub(super) fn pixel_axes(&self) -> [DVec3; 2] {
         [self.from_view.matrix3.x_axis, self.from_view.matrix3.y_axis]
     }
 }
 
-/// Accumulates a mean colour of pixels, weighted by their shares and alpha.
+/// Accumulates a mean colour of pixels, each weighted by its share times its alpha.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ColorMean {
     sum: Vec3,
@@ -168,7 +169,8 @@ impl ColorMean {
         self.alpha += share * a;
     }
 
-    /// Returns the mean colour and the summed alpha, above 0; `None` if alpha is 0, as there is no colour then.
+    /// Returns the mean colour, and the sum of alpha times share, above 0; `None` if that sum is 0, as there is no
+    /// colour then.
     pub(super) fn color(self) -> Option<(Vec3, f32)> {
         (self.alpha > 0.0).then(|| (self.sum / self.alpha, self.alpha))
     }
@@ -189,7 +191,8 @@ fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize
     Some(format!("the image must have {expected} bytes, four per pixel of {width} × {height}, got {found}"))
 }
 
-/// Returns the projection with the scale that makes its last coordinate the depth; `None` if it has no centre.
+/// Returns the projection scaled such that its last coordinate is the depth; `None` if its left 3×3 block is singular,
+/// so that the camera has no centre.
 fn normalized_projection(projection: [f64; 12]) -> Option<DAffine3> {
     // Normalised first, as products of extreme entries overflow or underflow.
     let size = projection.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
@@ -206,14 +209,15 @@ fn normalized_projection(projection: [f64; 12]) -> Option<DAffine3> {
     to_view.inverse().is_finite().then_some(to_view)
 }
 
-/// Scales the projection by the positive factor that makes its last row a unit vector (Hartley & Zisserman, *Multiple
-/// view geometry*, section 6.2.3).
+/// Returns the projection scaled by the positive factor that makes its last row a unit vector (Hartley & Zisserman,
+/// *Multiple view geometry*, section 6.2.3).
 fn scaled_to_depth(to_view: DAffine3) -> DAffine3 {
     let factor = to_view.matrix3.row(2).length().recip();
     DAffine3 { matrix3: to_view.matrix3 * factor, translation: to_view.translation * factor }
 }
 
-/// Returns the two of `side` pixels whose centres surround `at`, clamped at the borders, with their linear weights.
+/// Returns the indices of the two of `side` pixels along an axis whose centres surround `at`, with their linear
+/// weights; beyond the outermost centres, `at` is clamped.
 fn linear_weights(at: f64, side: u32) -> [(usize, f32); 2] {
     let at = at.clamp(0.0, f64::from(side - 1));
     let low = at as usize;

@@ -10,24 +10,24 @@ use crate::methods::MethodError;
 pub struct Cloud {
     /// Positions.
     pub points: Vec<Vec3>,
-    /// Unit normals, pointing outwards.
+    /// Normals, pointing outwards, of any length.
     pub normals: Option<Vec<Vec3>>,
-    /// Confidence of each point, in (0, 1]; its λ is divided by it.
+    /// Confidence of each point, in (0, 1]: the regularisation λ of its constraint is divided by it.
     pub confidence: Option<Vec<f32>>,
     /// Red, green and blue of each point, in 0..1.
     pub colors: Option<Vec<Vec3>>,
 }
 
-/// Minimum number of distinct points: fewer span no volume.
+/// Minimum number of distinct points in a cloud: fewer span no volume.
 pub const MIN_POINTS: usize = 4;
-/// Ratio of thickness to length up to which a cloud counts as flat.
+/// Ratio of the least to the largest standard deviation along the principal axes up to which a cloud counts as flat.
 const FLAT: f64 = 1e-6;
 
 impl Cloud {
-    /// Checks the lengths of the arrays and their values.
+    /// Checks that each array has one entry per point, that all values are finite, and that confidences are in (0, 1].
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the array and the first bad entry, or what is wrong with the whole.
+    /// [`MethodError::InvalidArgument`] naming the array, and its first bad entry or its length.
     pub fn validate(&self) -> Result<(), MethodError> {
         let count = self.points.len();
         check_finite("points", &self.points)?;
@@ -86,10 +86,10 @@ impl Cloud {
         if first.len() == self.len() { self.clone() } else { self.select(&first) }
     }
 
-    /// Checks that there are enough points.
+    /// Checks that there are at least [`MIN_POINTS`] points.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for fewer than four.
+    /// [`MethodError::InvalidArgument`] for fewer.
     pub fn check_count(&self) -> Result<(), MethodError> {
         if self.len() >= MIN_POINTS {
             return Ok(());
@@ -98,7 +98,7 @@ impl Cloud {
         Err(MethodError::invalid("points", problem))
     }
 
-    /// Checks that the points, which are in the box, span a volume.
+    /// Checks that the points span a volume.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for points in one plane.
@@ -114,19 +114,20 @@ impl Cloud {
         Ok(())
     }
 
-    /// Returns the cloud with its points in the box. Normals are unchanged, as `map` neither rotates nor mirrors.
+    /// Returns the cloud with its points mapped into the normalised box. Normals are unchanged, as `map` neither
+    /// rotates nor mirrors.
     pub fn mapped(&self, map: &BoxMap) -> Self {
         Self { points: self.points.iter().map(|&p| map.in_box(p)).collect(), ..self.clone() }
     }
 }
 
-/// Maximum number of points in a system: their matrix takes about 2 GB.
+/// Maximum number of points in each list of points for a linear system: the matrix of that many takes about 2 GB.
 pub const MAX_POINTS: usize = 100_000;
 
-/// Checks that `count` points are not too many for a system.
+/// Checks that a list of `count` points has at most [`MAX_POINTS`].
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] with both numbers.
+/// [`MethodError::InvalidArgument`] naming the list, `name`, with both numbers.
 pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodError> {
     if count <= MAX_POINTS {
         return Ok(());
@@ -149,11 +150,12 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
 const MIN_SIZE: f64 = 1e-27;
 /// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
 const MAX_SIZE: f64 = 1e38;
-/// Maximum distance of the points from the origin, in longest sides of their bounding box: a cell of 1/30 of a side is
-/// still as exact as needed there.
+/// Maximum distance of the points from the origin along an axis, in longest sides of their bounding box: a cell of 1/30
+/// of a side is still as exact as needed there.
 const MAX_SIZES_FROM_ORIGIN: f64 = 240.0;
 
-/// Uniform map from world units (those of the input points) into the normalised box, whose longest side is 2, and back.
+/// Uniform map from world units (those of the input points) into the normalised box, which is centred at the origin and
+/// has a longest side of 2, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMap {
     centre: DVec3,
@@ -169,7 +171,7 @@ impl BoxMap {
         Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
     }
 
-    /// Returns an upper bound of the distance of the box from the world's origin, along each axis, in world units.
+    /// Returns an upper bound of the absolute coordinates of the points, in world units.
     pub fn max_coordinate(&self) -> f64 {
         self.centre.abs().max_element() + 1.0 / self.scale
     }
@@ -218,7 +220,7 @@ impl BoxMap {
         p / self.scale + self.centre
     }
 
-    /// Returns the map into the box as an affine transformation.
+    /// Returns the map from world units into the box as an affine transformation.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.centre)
     }
@@ -243,7 +245,7 @@ pub fn mean_spacing(points: &[Vec3]) -> f64 {
     sampled.map(distance).sum::<f64>() / count as f64
 }
 
-/// Number of points, at most, from which the mean spacing is estimated: enough for a hundredth of it.
+/// Maximum number of points from which the mean spacing is estimated: enough for an error of a hundredth.
 const SPACING_SAMPLE: usize = 4000;
 
 /// Returns the indices of the points in the `keep` largest clusters, in ascending order. Points belong to one cluster
@@ -257,8 +259,8 @@ pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     kept
 }
 
-/// Returns the points grouped by connected grid cells, which touch even at a corner; clusters are ordered by their
-/// lowest index.
+/// Returns the indices of the points, grouped into clusters of connected grid cells with edges of length `cell`; cells
+/// are connected if they touch, even at a corner. Clusters are ordered by their lowest index.
 fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     let cell_of = |p: &Vec3| (*p / cell).floor().to_array().map(|x| x as i32 as u32);
     let mut by_cell: Vec<([u32; 3], u32)> = points.iter().map(cell_of).zip(0..).collect();
@@ -283,7 +285,7 @@ fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     found
 }
 
-/// Returns a cell and its 26 neighbours, as the bits of signed coordinates.
+/// Returns a grid cell and its 26 neighbours; coordinates are `i32`, stored as the `u32` with the same bits.
 fn neighbours(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     let [x, y, z] = cell.map(|k| k as i32);
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);

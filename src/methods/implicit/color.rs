@@ -14,7 +14,8 @@ use crate::mesh::TriangleMesh;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Largest side of a depth buffer, in pixels: 16 MB. Larger images get a buffer of lower resolution.
+/// Largest side of a depth buffer, in pixels; one of this size takes 16 MB. Larger images get a buffer of lower
+/// resolution.
 const LARGEST_BUFFER: u32 = 2048;
 
 /// Cosine between normal and direction to the camera below which the depth tolerance no longer grows. With a smaller
@@ -22,9 +23,10 @@ const LARGEST_BUFFER: u32 = 2048;
 /// hide each other. A camera with such an oblique view has next to no weight.
 const GRAZING: f64 = 0.1;
 
-/// Width of a silhouette, in pixels of the image. The surface is never exact, and where it is slightly too large the
-/// image shows the background: on a painted ball too large by half a pixel, colours are off by 0.14 with a width of 0
-/// and by 0.01 with 3. With 4, small parts in small images are nothing but silhouette, and it is 0.07.
+/// Width of a silhouette, in pixels of the image. The surface is never exact, and at a silhouette where it is slightly
+/// too large, the image shows the background: on a painted ball too large by half a pixel, colours are off by 0.14 with
+/// a width of 0 and by 0.01 with 3. With 4, small parts in small images are nothing but silhouette, and colours are off
+/// by 0.07.
 const SILHOUETTE_WIDTH: f64 = 3.0;
 
 /// Factor of the weight of a view at a silhouette: it matters only where no camera has a better view.
@@ -283,7 +285,7 @@ impl DepthBuffer {
     }
 
     /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`SILHOUETTE_WIDTH`]
-    /// pixels beside it in the image.
+    /// pixels to the left or right of it, above or below, in the image.
     fn at_silhouette(&self, camera: &Camera, at: Projected, tolerance: f64) -> bool {
         let [width, height] = camera.size().map(|side| side as usize);
         let beyond = at.depth + (SILHOUETTE_WIDTH + 1.0) * tolerance;
@@ -307,8 +309,8 @@ impl DepthBuffer {
         pixels * depth * camera.pixel_axes().map(change).iter().sum::<f64>()
     }
 
-    /// Returns the least and the greatest depth in the buffer pixels around the centre of an image pixel; only one is
-    /// read if both have the same size. Infinite where there is no surface.
+    /// Returns the least and the greatest depth in the buffer pixels around the centre of an image pixel, or those of a
+    /// single pixel if buffer and image have the same size. Infinite where there is no surface.
     fn depths_at(&self, pixel: [usize; 2]) -> [f64; 2] {
         let [column, row] = pixel.map(|at| at as f64 * self.scale + self.shift());
         let (mut nearest, mut farthest) = (0.0, f32::INFINITY);
@@ -352,7 +354,7 @@ mod tests {
             mesh.to_triangles()
         }
 
-        /// Returns the distance at which a ray of unit length hits the ball, and the colour there.
+        /// Returns the distance at which a ray of unit length hits the ball, and the colour there; `None` if it misses.
         fn hit(&self, from: DVec3, ray: DVec3) -> Option<(f64, [u8; 4])> {
             let (along, off) = ((self.centre - from).dot(ray), from - self.centre);
             let root = along * along - off.length_squared() + self.radius * self.radius;
@@ -414,7 +416,8 @@ mod tests {
         coloring.gathered.iter().map(|gathered| gathered.weight).collect()
     }
 
-    /// Returns the largest difference of the colours from those that the unit ball is painted with.
+    /// Returns the largest difference of a component of `colors` from the colour with which the unit ball is painted
+    /// there.
     fn worst(surface: &TriangleMesh, colors: &[Vec3]) -> f32 {
         let off = |(p, color): (&Vec3, &Vec3)| (*p * 0.4 + 0.5 - *color).abs().max_element();
         surface.positions.iter().zip(colors).map(off).fold(0.0, f32::max)

@@ -20,8 +20,8 @@ pub struct PointEdits {
     pub exterior: Vec<Vec3>,
 }
 
-/// Maximum distance, along each axis, of added points from the centre of the input points' bounding box, in half its
-/// longest side.
+/// Maximum distance, along each axis, from the centre of the input points' bounding box to a point that is added or
+/// marked as outside, in halves of the longest side of that box.
 pub const MAX_ADDED_DISTANCE: f32 = 3.0;
 
 impl PointEdits {
@@ -52,7 +52,7 @@ impl PointEdits {
         }
     }
 
-    /// Checks that no point marked as outside coincides with a point of `surface`, which is in the box.
+    /// Checks that no point marked as outside coincides with a point of `surface`, a cloud in the normalised box.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first point that does.
@@ -67,14 +67,16 @@ impl PointEdits {
         }
     }
 
-    /// Returns a lookup of the removed points by their positions in the box.
+    /// Returns an index of the removed points by their positions in the normalised box; `original` holds all input
+    /// points.
     pub fn removed_positions(&self, original: &[Vec3], map: &BoxMap) -> PositionIndex {
         let positions: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
         PositionIndex::new(&positions)
     }
 
-    /// Returns `cloud`, which is in the box, without the removed points and with the added ones. As added points have
-    /// no normals or colours, the result has neither; their confidence is 1.
+    /// Returns `cloud`, which is in the normalised box, without the removed points, with the added ones, and without
+    /// duplicates; `original` holds all input points. As added points have no normals or colours, the result has
+    /// neither; their confidence is 1.
     pub fn apply_to(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
         let remaining = self.without_removed(cloud, original, map);
         let added = self.added.iter().map(|&p| map.in_box(p));
@@ -86,7 +88,8 @@ impl PointEdits {
         Cloud { points, confidence, ..Cloud::default() }.distinct()
     }
 
-    /// Returns `cloud`, which is in the box, without the removed points.
+    /// Returns `cloud`, which is in the normalised box, without points at the positions of removed ones; `original`
+    /// holds all input points.
     pub fn without_removed(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
         if self.removed.is_empty() {
             return cloud.clone();
@@ -96,10 +99,12 @@ impl PointEdits {
         cloud.select(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
     }
 
-    /// Builds the constraints from the sampled points, the exterior points and these edits.
+    /// Builds the constraints, with λ still 0, from the sampled points, the exterior points and these edits; `original`
+    /// holds all input points.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if too few points remain, or a point is both on the surface and outside.
+    /// [`MethodError::InvalidArgument`] if too few points remain, they lie in one plane, or a point is both on the
+    /// surface and outside.
     pub fn constraints(
         &self,
         samples: &Samples,

@@ -9,15 +9,15 @@ use crate::spatial::PointGrid;
 
 /// Number of exterior points on the bounding sphere, which are always added.
 const SPHERE_POINTS: usize = 16;
-/// Radius of the bounding sphere, in half diagonals of the points' bounding box: near enough to confine the surface,
-/// and outside of it where it bulges between points.
+/// Radius of the bounding sphere, in half diagonals of the points' bounding box: small enough to confine the surface,
+/// and large enough that the surface does not bulge beyond it between points.
 const SPHERE: f64 = 1.2;
 /// Number of surface points per exterior point near the surface.
 const SURFACE_POINTS: usize = 10;
-/// Minimum number of exterior points near the surface, for small clouds.
+/// Minimum number of exterior points near the surface that are aimed at, for small clouds.
 const MIN_POINTS: usize = 30;
-/// Distance of exterior points from the surface, in mean spacings of the points. At 1 they constrain less than noise
-/// does, at 6 they fall into cavities.
+/// Distance of exterior points from the surface, in mean spacings of the points, if no minimum is larger. At 1 they
+/// constrain less than noise does, at 6 they fall into cavities.
 const OFFSET: f32 = 3.0;
 /// Minimum distance of exterior points from the surface, in standard deviations of the noise.
 const NOISE: f32 = 4.0;
@@ -32,15 +32,16 @@ const MIN_CLEARANCE: f32 = 0.8;
 pub struct Exterior {
     /// Points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
-    /// Distance from the surface at which `near` was made; 0 if it was given.
+    /// Distance from the surface at which `near` was made, in box units; 0 if it was given.
     pub offset: f32,
     /// Points on the bounding sphere.
     pub on_sphere: Vec<Vec3>,
 }
 
 impl Exterior {
-    /// Returns those of [`Self::near`] that remain valid after edits: not too near to a point of `added`, and with a
-    /// point left in `surface`, the edited points, from which they may have been made. Given ones are all kept.
+    /// Returns those of [`Self::near`] that remain valid after edits: they are near a point of `surface`, the edited
+    /// points, from which they may have been made, and not too near to a point of `added`. Points given by the caller
+    /// are all kept.
     pub fn valid_after_edits<'a>(
         &'a self,
         surface: &'a [Vec3],
@@ -56,19 +57,20 @@ impl Exterior {
     }
 }
 
-/// Exterior points farther than this many offsets from all surface points are dropped: those they were made from were
-/// removed.
+/// Maximum distance of an exterior point from the nearest surface point, in units of [`Exterior::offset`]: a farther
+/// one is dropped, since the points from which it was made were removed.
 const MAX_OFFSETS: f32 = 1.25;
 
-/// Returns `given` exterior points, in box units, with those on the bounding sphere.
+/// Returns the exterior points `given` by the caller, in box units, and points on a bounding sphere of `cloud`.
 pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
     Exterior { near: given, offset: 0.0, on_sphere: sphere_around(&cloud.points) }
 }
 
-/// Makes exterior points for the surface points `cloud`, of mean distance `spacing`.
+/// Makes exterior points for the surface points `cloud`, whose mean distance to the nearest neighbour is `spacing`.
 ///
-/// They lie towards each camera that sees the surface point; without cameras, along the normals, given or estimated.
-/// Poisson-disc sampling reduces them to one for ten surface points. Those on the bounding sphere are added.
+/// From surface points, they are offset towards each camera that sees the point; without cameras, along the normals,
+/// given or estimated. Poisson-disc sampling reduces them to one for ten surface points, or to 30 if that is more.
+/// Points on the bounding sphere are added.
 pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let target_count = (cloud.len() / SURFACE_POINTS).max(MIN_POINTS);
     // A few more than wanted, as some will be rejected.
@@ -83,7 +85,7 @@ pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: 
     Exterior { near: kept.collect(), offset, on_sphere: sphere_around(&cloud.points) }
 }
 
-/// Directions that lead outwards from surface points.
+/// Directions that lead outwards from surface points, and the noise of the points.
 struct OutwardDirections {
     /// Indices of points, each with a direction; a point may have several, or none.
     directions: Vec<(u32, Vec3)>,
@@ -121,7 +123,8 @@ fn outward_directions(
     OutwardDirections { directions, noise: normals.noise }
 }
 
-/// Minimum number of points whose normals are estimated: with fewer, neighbours on thin parts lie on different sides.
+/// Minimum number of points whose normals are estimated, even if fewer are needed: with fewer, neighbours may lie on
+/// different sides of a thin part.
 const ORIENTED: usize = 3000;
 
 /// Returns the directions from each surface point to the cameras that are on the outer side of its normal and not
@@ -151,7 +154,8 @@ fn towards_cameras(
 /// Cosine between normal and direction to a camera below which the view is too oblique to tell the outer side.
 const GRAZING: f32 = 0.2;
 
-/// Returns points spread evenly on a sphere around the bounding box of `points`, along a spiral.
+/// Returns [`SPHERE_POINTS`] points spread evenly along a spiral on a sphere around the bounding box of `points`; its
+/// radius is [`SPHERE`] half diagonals of that box.
 fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let bounds = Bounds::from_points(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
@@ -166,8 +170,8 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     (0..SPHERE_POINTS).map(point).collect()
 }
 
-/// Edge length of an occlusion voxel, in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs
-/// merge.
+/// Edge length of an occlusion voxel, in mean spacings of the points: with 1.5, rays pass through the gaps of stereo
+/// data; with 6, the legs of an object merge.
 const VOXEL: f32 = 3.5;
 /// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
 const UNTESTED_VOXELS: f32 = 1.5;
@@ -207,7 +211,8 @@ impl OccupancyGrid {
             .then(|| (z * self.dims[1] + y) * self.dims[0] + x)
     }
 
-    /// Returns whether the segment from `p` to `camera` crosses no voxel with points, beyond the neighbourhood of `p`.
+    /// Returns whether the segment from `p` to `camera`, beyond the neighbourhood of `p`, passes no voxel with points;
+    /// it is tested every half voxel.
     fn is_unoccluded(&self, p: Vec3, camera: Vec3) -> bool {
         let length = p.distance(camera);
         let step = (camera - p) / length * (0.5 * self.edge);

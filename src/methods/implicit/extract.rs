@@ -36,12 +36,12 @@ pub struct Extraction {
 
 enum Stage {
     Extract,
-    /// The finished mesh, and the normals computed so far.
+    /// Computing the normals; holds the finished mesh, and the normals computed so far.
     Normals(TriangleMesh, Vec<Vec3>),
 }
 
-/// Returns the default edge length of a cell, in world units, for points of mean distance `spacing` in box units. Far
-/// from the origin it is larger, as single precision is coarser there.
+/// Returns the default edge length of a cell, in world units, for points whose mean distance to the nearest neighbour
+/// is `spacing`, in box units. Far from the origin it is larger, as single precision is coarser there.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
     let around = (f64::from(MAX_ADDED_DISTANCE) + 2.0 * MARGIN) / map.scale();
@@ -57,7 +57,8 @@ impl Extraction {
     /// length of a cell, `cell`, are in world units.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points.
+    /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points; [`MethodError::Volume`]
+    /// if memory cannot be allocated.
     pub fn new(
         field: &Field,
         map: BoxMap,
@@ -81,7 +82,7 @@ impl Extraction {
         Ok(Self { field, map, level, extractor, stage: Stage::Extract })
     }
 
-    /// Does a slice of work. Returns the surface with its normals, once it is finished.
+    /// Does a slice of work. Returns the surface with its outward normals once it is finished, `None` before.
     ///
     /// # Errors
     /// [`MethodError::Volume`] if memory cannot be allocated.

@@ -20,12 +20,12 @@ impl Field {
         Self { table, terms, coefficients: solution.coefficients.clone() }
     }
 
-    /// Returns f at `p`.
+    /// Returns f at `p`, in box units.
     pub fn value(&self, p: DVec3) -> f64 {
         self.terms.iter().map(|term| self.term(term, p)).sum::<f64>() + self.polynomial(p)
     }
 
-    /// Returns f and ∇f at `p`.
+    /// Returns f and ∇f at `p`, in box units.
     pub fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (mut sum, mut gradient) = (self.polynomial(p), self.slopes());
         for term in &self.terms {
@@ -52,7 +52,7 @@ impl Field {
         weight * self.table.value(p.distance_squared(*centre))
     }
 
-    /// Returns the value and the gradient of one term at `p`.
+    /// Returns the value and the gradient of one term, wᵢ φ(|p − cᵢ|), at `p`.
     #[inline]
     pub fn term_and_gradient(&self, (centre, weight): &(DVec3, f64), p: DVec3) -> (f64, DVec3) {
         let away = p - *centre;

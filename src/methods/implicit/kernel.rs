@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 /// A radial basis function φ with its parameters, in units of the normalised box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kernel {
-    /// Equation 6. It decays only as 1/(4πδ²r), to a thousandth at a distance of a hundred units, so it must not be
-    /// truncated.
+    /// The paper's kernel (equation 6). It decays only as 1/(4πδ²r), with the default δ and τ to about two thousandths
+    /// of φ(0) at a distance of a hundred units, so it must not be truncated.
     MultiOrder {
         /// δ, an inverse length: a larger value makes the surface tighter.
         delta: f64,
@@ -46,13 +46,14 @@ impl Kernel {
         }
     }
 
-    /// Returns the number of polynomials that accompany the kernel: 1 for the constant, 4 with x, y and z.
+    /// Returns the number of polynomials that f has besides the kernel's terms: 1, the constant, or 4 for a thin plate,
+    /// with x, y and z.
     pub fn polynomials(&self) -> usize {
         if matches!(self, Self::ThinPlate { .. }) { 4 } else { 1 }
     }
 
     /// Returns whether the kernel is only conditionally positive definite, that is, for weights orthogonal to the
-    /// polynomials. Such a kernel grows with the distance.
+    /// polynomials. The absolute value of such a kernel grows with the distance.
     pub fn is_conditional(&self) -> bool {
         matches!(self, Self::ThinPlate { .. } | Self::Biharmonic { .. })
     }
@@ -89,8 +90,8 @@ impl Kernel {
     }
 }
 
-/// Number of decay lengths, 1/a, below which the closed form suffers from cancellation, and the power series is used;
-/// there it has converged in [`TERMS`].
+/// Distance r, in decay lengths 1/a, below which the closed form suffers from cancellation, and the power series is
+/// used; there it has converged in [`TERMS`] terms.
 const SERIES_BELOW: f64 = 0.5;
 /// Number of terms of the power series: 0.5²⁰/20! is below rounding for all parameters, as |b| is below 2a.
 const TERMS: usize = 20;
@@ -160,7 +161,7 @@ fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2]
 #[derive(Clone, Debug)]
 pub struct KernelTable {
     kernel: Kernel,
-    /// φ and dφ/ds at the centre.
+    /// φ and dφ/ds at r = 0.
     centre: [f64; 2],
     cubics: Vec<[f64; 4]>,
 }
@@ -170,10 +171,11 @@ pub struct KernelTable {
 const PART_BITS: u32 = 5;
 /// Number of low bits of an `f64` that do not affect the choice of its interval.
 const SHIFT: u32 = 52 - PART_BITS;
-/// Lower end of the table, in r²; below it, value and slope at the centre are used. √LEAST is about 1e-6.
+/// Lower end of the table, as a squared distance r² (r is about 1e-6); below it, φ is extrapolated linearly in r² from
+/// 0.
 const TABLE_START: f64 = 1.0 / (1_u64 << 40) as f64;
-/// Upper end of the table, in r²: beyond the distances between any points in the box and around it. Farther away, the
-/// kernel itself is evaluated.
+/// Upper end of the table, as a squared distance r²: r = 16 box units, beyond the distances between any points in the
+/// box and around it. Farther away, the kernel itself is evaluated.
 const TABLE_END: f64 = 256.0;
 
 impl KernelTable {
@@ -191,7 +193,7 @@ impl KernelTable {
         self.kernel
     }
 
-    /// Returns φ at the squared distance `s`.
+    /// Returns φ at the squared distance `s`, from the table.
     #[inline]
     pub fn value(&self, s: f64) -> f64 {
         match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
@@ -203,7 +205,7 @@ impl KernelTable {
         }
     }
 
-    /// Returns φ and dφ/ds at the squared distance `s`.
+    /// Returns φ and dφ/ds at the squared distance `s`, from the table.
     #[inline]
     pub fn value_and_slope(&self, s: f64) -> [f64; 2] {
         match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
@@ -225,8 +227,8 @@ impl KernelTable {
     }
 }
 
-/// Returns the number of the interval that contains `s`, counted from that of 0; it consists of the leading bits of
-/// `s`.
+/// Returns the number of the interval of the table that contains `s`, counted from that of 0; it consists of the
+/// leading bits of `s`.
 #[inline]
 fn interval(s: f64) -> u64 {
     s.to_bits() >> SHIFT
@@ -238,8 +240,8 @@ fn interval_start(s: f64) -> f64 {
     f64::from_bits(s.to_bits() >> SHIFT << SHIFT)
 }
 
-/// Returns the coefficients of the cubic with the given values and slopes at both ends of an interval (Hermite
-/// interpolation).
+/// Returns the coefficients, constant first, of the cubic with the given values and slopes at both ends of an interval
+/// (Hermite interpolation), as a function of the distance from its lower end.
 fn cubic([a, slope_a]: [f64; 2], [b, slope_b]: [f64; 2], width: f64) -> [f64; 4] {
     let rise = (b - a) / width;
     [

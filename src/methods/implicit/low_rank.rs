@@ -15,8 +15,8 @@ pub struct LowRank<T> {
 /// Maximum rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
 const MAX_RANK: usize = 64;
 
-/// Approximates a block of `height` by `width` entries as a low-rank product, to a relative error of about `tolerance`.
-/// `row` and `column` write the entries of a row or column, given its index.
+/// Approximates a block of `height` by `width` entries by a low-rank matrix, to a relative error of about `tolerance`
+/// in the Frobenius norm. `row` and `column` write the entries of a row or column, given its index.
 pub fn cross_approximation<T: MatrixScalar>(
     [height, width]: [usize; 2],
     tolerance: f64,
@@ -60,7 +60,7 @@ pub fn cross_approximation<T: MatrixScalar>(
     LowRank { columns: rounded(&us), rows: rounded(&vs) }
 }
 
-/// Subtracts the approximation so far from a row or column of the block.
+/// Subtracts the approximation so far from a row or column of the block: the sum of `parts`, each times its `weight`.
 fn subtract(values: &mut [f64], parts: &[Vec<f64>], weight: impl Fn(usize) -> f64) {
     for (k, part) in parts.iter().enumerate() {
         let weight = weight(k);

@@ -10,21 +10,22 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Fitness {
-    /// Mean distance.
+    /// Mean distance of the points from the surface.
     pub mean: f64,
-    /// Root mean square distance.
+    /// Root mean square distance of the points from the surface.
     pub rms: f64,
-    /// Largest distance.
+    /// Largest distance of a point from the surface.
     pub max: f64,
-    /// Mean of the absolute mean curvature |H| over the vertices, per unit of length.
+    /// Mean over the vertices of |H|, the absolute mean curvature of the surface, per unit of length.
     pub mean_curvature: f64,
 }
 
 impl Fitness {
-    /// Measures the distances of `points` from `surface`, and the curvature of `surface`.
+    /// Measures the distances of `points` from `surface`, and the mean curvature of `surface`.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if the surface is empty.
+    /// [`MethodError::InvalidArgument`] if the surface is empty or there are no points; an error of
+    /// [`TriangleMesh::validate`] for an invalid surface.
     pub fn of(points: &[Vec3], surface: &TriangleMesh) -> Result<Self, MethodError> {
         let tree = TriangleTree::new(surface)?;
         let distances: Vec<f64> =

@@ -83,9 +83,9 @@ pub struct ImplicitOptions {
     pub cameras: Vec<Camera>,
     /// Maximum number of points that become surface constraints; more are subsampled.
     pub max_points: usize,
-    /// Number of clusters to keep, largest first, which discards outliers; `None` keeps all.
+    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all.
     pub keep_components: Option<usize>,
-    /// Parameters of kernel, regularisation, solver and extraction.
+    /// Initial parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
 }
 
@@ -103,7 +103,7 @@ impl Default for ImplicitOptions {
 
 /// Default of [`ImplicitOptions::max_points`].
 const DEFAULT_POINTS: usize = 20_000;
-/// Largest matrix, in bytes, that is kept after a solve for later edits; a larger one is rebuilt when needed.
+/// Maximum size of a matrix, in bytes, that is kept after a solve for later edits; a larger one is rebuilt when needed.
 const KEPT_BYTES: usize = 256 << 20;
 /// Seed of all random choices.
 const SEED: u64 = 1;
@@ -112,7 +112,7 @@ const SEED: u64 = 1;
 pub struct ImplicitSurface {
     /// The input points, in world units.
     original: Vec<Vec3>,
-    /// The input points without duplicates, in the box.
+    /// The input points without duplicates, in the normalised box.
     cloud: Cloud,
     map: BoxMap,
     options: ImplicitOptions,
@@ -123,12 +123,13 @@ pub struct ImplicitSurface {
     /// The current constraints, from samples, exterior points and edits.
     constraints: Constraints,
     stage: Stage,
-    /// Slices of work done in the stage, if it does not count them itself.
+    /// Slices of work done in the current stage; 0 in a solve, as the solver counts its own.
     slices: u32,
     solved: Option<Solved>,
     /// The edits at the last full solve, whose system later edits revise.
     base_edits: Option<PointEdits>,
-    /// The solver of that system, if it is kept.
+    /// The solver of the last full solve, possibly revised since; `None` before it, and if its matrix is too large to
+    /// keep.
     solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
     /// Counter of changes of the surface or its colours.
@@ -158,7 +159,8 @@ impl Solved {
         Self { centres, solution, kernel, mean, field }
     }
 
-    /// Returns the weights at the centres of `constraints`, 0 at new ones: the start of a revised solve.
+    /// Returns the weights of the solution at the centres of `constraints`, 0 at new ones: the start of a revised
+    /// solve.
     fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
         let known = PositionIndex::new(&self.centres);
         let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
@@ -180,7 +182,7 @@ enum Stage {
 struct ColoringState {
     mesh: TriangleMesh,
     coloring: Coloring,
-    /// Index of the next camera.
+    /// Index of the camera whose image is used next.
     camera: usize,
     /// Interpolation of the points' colours, if no camera saw anything.
     points: Option<PointColors>,
@@ -190,7 +192,8 @@ impl ImplicitSurface {
     /// Creates the reconstruction from `points`, before its first step.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted.
+    /// [`MethodError::InvalidArgument`] naming the array, option or parameter that cannot be used, and what is
+    /// accepted.
     pub fn new(points: Cloud, options: ImplicitOptions) -> Result<Self, MethodError> {
         options.params.validate()?;
         check_options(&options)?;
@@ -234,18 +237,20 @@ impl ImplicitSurface {
         }
     }
 
-    /// Sets the clock for [`StepReport::times`], in milliseconds. The core has none of its own.
+    /// Sets the clock for [`StepReport::times`]: a function that returns the time in milliseconds. The core has no
+    /// clock of its own.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 
     /// Does one slice of the current stage: some ten milliseconds of work with some ten thousand points. Does nothing
-    /// at the end.
+    /// once the surface is complete.
     ///
     /// # Errors
-    /// [`MethodError::Singular`] if the system cannot be solved, [`MethodError::InvalidArgument`] if the cell does not
-    /// suit the points, [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and other
-    /// parameters may be set.
+    /// [`MethodError::Singular`] if the system cannot be solved; [`MethodError::InvalidArgument`] if too few sampled
+    /// points are left, if they lie in one plane or coincide with exterior points, or if the cell does not suit them;
+    /// [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and other parameters may
+    /// be set.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let (phase, start) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
@@ -304,7 +309,7 @@ impl ImplicitSurface {
         Ok(if self.exterior.is_some() { self.begin_solve() } else { first_stage(&self.options) })
     }
 
-    /// Builds the constraints from the samples, if these are selected.
+    /// Builds the constraints from the samples; does nothing before these are selected.
     fn make_constraints(&mut self) -> Result<(), MethodError> {
         let Some(samples) = &self.samples else { return Ok(()) };
         let exterior = match &self.options.exterior {
@@ -329,7 +334,7 @@ impl ImplicitSurface {
         constraints
     }
 
-    /// Starts a full solve.
+    /// Starts a full solve of the current constraints, and returns its stage.
     fn begin_solve(&mut self) -> Stage {
         self.base_edits = Some(self.edits.clone());
         self.solver = None;
@@ -341,7 +346,8 @@ impl ImplicitSurface {
         Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
     }
 
-    /// Starts a solve that revises the system of the last full solve, or a full one if that is impossible.
+    /// Starts a solve that revises the system of the last full solve, or a full one if that is impossible; returns its
+    /// stage.
     fn begin_revision(&mut self) -> Stage {
         self.revised_solver().map_or_else(|| self.begin_solve(), Stage::Solve)
     }
@@ -358,7 +364,8 @@ impl ImplicitSurface {
         is_usable.then_some(solver)
     }
 
-    /// Returns the constraints of the last full solve.
+    /// Returns the constraints of the last full solve, rebuilt from its edits; `None` before the first, or after it
+    /// failed.
     fn base_constraints(&self) -> Option<Constraints> {
         let (edits, samples, exterior) =
             (self.base_edits.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
@@ -444,13 +451,14 @@ impl ImplicitSurface {
         self.version = self.version.wrapping_add(1);
     }
 
-    /// Returns the stage to continue with if the current one fails.
+    /// Returns the stage to continue with if the current one fails: the first one if there is no surface yet, else the
+    /// end.
     fn fallback(&self) -> Stage {
         if self.mesh.triangles.is_empty() { first_stage(&self.options) } else { Stage::Done }
     }
 
-    /// Returns the edge length of an extraction cell, in world units: as set, or derived from the spacing of the
-    /// samples once they are selected.
+    /// Returns the edge length of an extraction cell, in world units: as set, or if that is 0, derived from the spacing
+    /// of the samples; 0 before these are selected.
     pub fn cell(&self) -> f64 {
         match &self.samples {
             Some(samples) if self.params.cell == 0.0 => default_cell(&self.map, samples.spacing),
@@ -467,7 +475,8 @@ impl ImplicitSurface {
     /// not repeated.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the parameter; nothing has changed then.
+    /// [`MethodError::InvalidArgument`] naming the parameter, or [`MethodError::Volume`] if memory cannot be allocated;
+    /// nothing has changed then.
     pub fn set_params(&mut self, params: ImplicitParams) -> Result<(), MethodError> {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
@@ -497,11 +506,11 @@ impl ImplicitSurface {
     }
 
     /// Replaces all edits: points added, removed and marked as outside. The surface stays until the new one is
-    /// complete. After a few edits, the last system is revised: its matrix and its solution are reused.
+    /// complete. If only a few constraints change, the last system is revised: its matrix and its solution are reused.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left; nothing has
-    /// changed then.
+    /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left, or all lie in one
+    /// plane; nothing has changed then.
     pub fn set_edits(&mut self, edits: PointEdits) -> Result<(), MethodError> {
         edits.validate(&self.original, &self.map)?;
         let remaining = edits.apply_to(&self.cloud, &self.original, &self.map);
@@ -525,8 +534,8 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// Returns the last finished surface; empty before the first. It is in world units, with normals from the gradient,
-    /// and colours if there are photographs or coloured points.
+    /// Returns the last finished surface; empty before the first. It is in world units, with outward normals from the
+    /// gradient of f, and colours if an image shows it or points with colours are near.
     pub fn surface(&self) -> &TriangleMesh {
         &self.mesh
     }
@@ -549,7 +558,7 @@ impl ImplicitSurface {
         }
     }
 
-    /// Returns the number of connected components of the last surface that no point is near.
+    /// Returns the number of connected components of the last surface that no surface constraint is near.
     pub fn spurious_components(&self) -> usize {
         self.spurious_components
     }
@@ -559,8 +568,8 @@ impl ImplicitSurface {
         self.original.len() - self.cloud.len()
     }
 
-    /// Returns the mean distance from a sample to its nearest neighbour, in box units; 0 before the samples are
-    /// selected.
+    /// Returns the mean distance from a sample to its nearest neighbour, estimated from at most 4000 samples, in box
+    /// units; 0 before the samples are selected.
     pub fn spacing(&self) -> f64 {
         self.samples.as_ref().map_or(0.0, |samples| samples.spacing)
     }

@@ -8,24 +8,25 @@ use crate::spatial::PointGrid;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Neighbourhood radii that are tried, in mean spacings of the points.
+/// Radii of the neighbourhoods to which planes are fitted, in mean spacings of the points; one of them is chosen.
 const RADII: [f32; 7] = [3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0];
-/// Largest ratio of thickness to width at which a neighbourhood counts as planar; noise is then a tenth of its radius.
+/// Ratio of thickness to width below which a neighbourhood counts as planar; noise is then a tenth of its radius.
 const FLAT: f64 = 0.2;
-/// Number of points, at most, from which the radius is chosen.
+/// Maximum number of points whose neighbourhoods are tested to choose the radius.
 const TRIALS: usize = 200;
-/// Nearest neighbours of a point to which its orientation is propagated.
+/// Number of nearest neighbours of a point that are tested as its neighbours along the surface.
 const NEIGHBOURS: usize = 10;
 
 /// Unit normals at some points of a cloud, and the noise of the cloud.
 pub struct Normals {
     /// One normal per point, outwards as far as can be determined.
     pub directions: Vec<Vec3>,
-    /// Standard deviation of the points from their fitted planes; 0 if normals were given.
+    /// Standard deviation of the points from their fitted planes, in units of the points; 0 if normals were given.
     pub noise: f32,
 }
 
-/// Estimates normals of the surface near `points`, of mean distance `spacing`, at the points with indices `at`.
+/// Estimates normals of the surface near `points`, whose mean distance to the nearest neighbour is `spacing`, at the
+/// points with indices `at`.
 ///
 /// Within each connected component of the neighbour graph, normals are oriented like an already oriented neighbour, the
 /// pair with the smallest angle first; then each component is oriented such that it encloses a positive volume.
@@ -77,8 +78,8 @@ impl Plane {
     }
 }
 
-/// Returns the smallest radius whose median neighbourhood is planar, or else the one whose median neighbourhood is
-/// flattest, and the thickness of that neighbourhood.
+/// Returns the smallest radius of [`RADII`] whose median neighbourhood is planar, or else the one whose median
+/// neighbourhood is flattest, and the thickness of that neighbourhood. Both are in units of the points.
 fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, f64) {
     let step = positions.len().div_ceil(TRIALS);
     let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
@@ -97,8 +98,8 @@ fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, 
     (best.1, best.2)
 }
 
-/// Returns the undirected neighbour graph of `positions`: neighbours along the surface, not across a gap or a thin
-/// wall.
+/// Returns the undirected neighbour graph of `positions`: each is linked to its [`NEIGHBOURS`] nearest ones, except
+/// those on another sheet, across a gap or a thin wall. `radius` is the initial search radius.
 fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     let grid = PointGrid::of(positions, radius);
     let near = |&p: &Vec3| grid.nearest(p, NEIGHBOURS + 1, radius).into_iter().map(|(_, i)| i as usize);
@@ -121,7 +122,8 @@ fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec
     graph
 }
 
-/// Cosine between a normal and the direction to a neighbour from which the neighbour counts as part of another sheet.
+/// Absolute cosine between a normal and the direction to a neighbour: if it is at least this for the normals of both,
+/// they count as parts of different sheets.
 const SAME_SHEET_COSINE: f32 = 0.7;
 
 fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
@@ -142,9 +144,9 @@ fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Returns Σ (p − middle)·n over a connected component. If the points are spread evenly over a closed surface with
-/// outward normals, it is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all
-/// normals point inwards.
+/// Returns Σ (p − middle)·n over the positions p, with normals n, of a connected component. If the points are spread
+/// evenly over a closed surface with outward normals, it is proportional to the enclosed volume (Gauss's theorem); a
+/// negative value shows that all normals point inwards.
 fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
     let position = |i: u32| positions[i as usize].as_dvec3();
     let middle = part.iter().map(|&i| position(i)).sum::<DVec3>() / part.len() as f64;

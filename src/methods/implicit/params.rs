@@ -46,7 +46,7 @@ pub enum KernelKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IsoValue {
-    /// 0, as in the paper.
+    /// The iso-value 0, as in the paper.
     Zero,
     /// The mean of f over the surface constraints, which is a little below 0.
     Mean,
@@ -87,8 +87,8 @@ impl ImplicitParams {
         specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// Returns these parameters with those that affect only the extraction taken from `other`; used to find out whether
-    /// a change needs a new solve.
+    /// Returns these parameters, but with those that affect only the extraction, cell and iso-value, taken from
+    /// `other`; used to find out whether a change needs a new solve.
     pub fn with_extraction_of(&self, other: &Self) -> Self {
         Self { cell: other.cell, level: other.level, ..self.clone() }
     }
@@ -101,7 +101,7 @@ impl ImplicitParams {
     }
 }
 
-/// δ from which surfaces of points with large gaps break up.
+/// δ, per box unit, from which surfaces of points with large gaps break up.
 const LARGE_DELTA: f64 = 25.0;
 
 /// Returns the specifications of all parameters, in the order in which a page should show them.

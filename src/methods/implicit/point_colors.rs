@@ -6,11 +6,12 @@ use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::spatial::PointGrid;
 
-/// Number of nearest points whose colours a vertex blends.
+/// Maximum number of nearest points whose colours a vertex blends.
 const BLENDED: usize = 4;
 /// Search radius for coloured points around a vertex, in mean spacings of the sampled points.
 const SEARCH_RADIUS: f32 = 2.0;
-/// Lower bound of the squared distance that is added in the weights: keeps them finite where points nearly coincide.
+/// Lower bound of the constant c in the weight 1/(d² + c) of a point at a distance d from a vertex, in squared box
+/// units: it keeps weights finite where points nearly coincide.
 const MIN_SQUARED_DISTANCE: f32 = 1e-20;
 /// Vertices coloured in a slice of work: about ten milliseconds.
 const SLICE: usize = 10_000;
@@ -24,16 +25,17 @@ pub struct PointColors {
 }
 
 impl PointColors {
-    /// Prepares the interpolation from `cloud`, in the box, within a radius relative to `spacing`; `None` if it has no
-    /// colours.
+    /// Prepares the interpolation from `cloud`, which is in the normalised box, where `spacing` is the mean spacing of
+    /// the sampled points; `None` if the cloud has no colours.
     pub fn new(cloud: Cloud, spacing: f64) -> Option<Self> {
         let spacing = spacing as f32;
         let grid = PointGrid::of(&cloud.points, SEARCH_RADIUS * spacing);
         Some(Self { grid, colors: cloud.colors?, spacing, next: 0 })
     }
 
-    /// Colours the next slice of vertices by the nearest points, weighted by their inverse squared distance; vertices
-    /// with no point near get no colour. Returns whether all vertices are done.
+    /// Adds the colours of the nearest points to the next slice of vertices in `coloring`, weighted by their inverse
+    /// squared distance plus a constant; vertices with no point near get no colour. Returns whether all vertices are
+    /// done.
     pub fn advance(&mut self, mesh: &TriangleMesh, map: &BoxMap, coloring: &mut Coloring) -> bool {
         // Half a spacing in quadrature with the distance; without it, each point leaves a spot.
         let least = (0.25 * self.spacing * self.spacing).clamp(MIN_SQUARED_DISTANCE, 1.0);

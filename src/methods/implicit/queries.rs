@@ -61,7 +61,7 @@ impl ImplicitSurface {
     }
 
     /// Samples f minus the iso-value on a grid of `dims` voxels that covers points and surface, as input for methods
-    /// that work on volumes: positive inside.
+    /// that work on volumes: positive inside, negative outside.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] before the system is solved, and for fewer than 2 voxels along an axis;
@@ -131,8 +131,8 @@ impl ImplicitSurface {
 /// bounding box: enough for the surface to close.
 const GRID_MARGIN: f64 = 0.1;
 
-/// Returns values at all nodes of a grid, x fastest. `row` writes the values of a row of nodes, given their positions
-/// in voxels.
+/// Returns values at all nodes of a grid of `dims` nodes, x fastest. `row` writes the values of a row of nodes along x,
+/// given their positions in voxels. Fails with [`VolumeError::TooLarge`] if memory cannot be allocated.
 fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
     let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();

@@ -6,13 +6,13 @@ use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
 use crate::spatial::PointGrid;
 
-/// Edge length of the grid cells that join points to clusters, in mean spacings.
+/// Edge length of the grid cells that join points to clusters, in mean spacings of the points.
 const CLUSTER_CELL: f64 = 2.0;
 /// Points visited in a slice of work: about ten milliseconds.
 const SLICE: usize = 50_000;
-/// Maximum number of sampling radii that are tried.
+/// Maximum number of radii that are tried for Poisson-disc sampling.
 const MAX_RADII: u32 = 16;
-/// Share of the wanted number of samples from which a radius is accepted.
+/// Share of the maximum number of samples from which a radius is accepted: fewer samples mean that it is too large.
 const ACCEPTED_SHARE: f64 = 0.97;
 
 /// The sampled points, which become surface constraints.
@@ -20,14 +20,14 @@ const ACCEPTED_SHARE: f64 = 0.97;
 pub struct Samples {
     /// The samples, in random order.
     pub cloud: Cloud,
-    /// Mean distance of a sample from its nearest neighbour, in box units.
+    /// Mean distance of a sample from its nearest neighbour, estimated from at most 4000 samples, in box units.
     pub spacing: f64,
 }
 
 /// Selection of samples from a cloud, slice by slice.
 #[derive(Clone, Debug)]
 pub struct Sampling {
-    /// Number of largest clusters to keep, or all.
+    /// Number of clusters to keep, largest first; `None` keeps all.
     keep: Option<usize>,
     most: usize,
     seed: u64,
@@ -35,7 +35,7 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Starts the selection of at most `most` points from the `keep` largest clusters, or from all.
+    /// Starts the selection of at most `most` points from the `keep` largest clusters of points, or from all if `None`.
     pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
         Self { keep, most, seed, poisson_disc: None }
     }
@@ -76,22 +76,23 @@ impl Sampling {
 }
 
 /// Poisson-disc sampling of at most `most` points: visits the points in random order, and keeps each that is farther
-/// than a radius from all kept before, with the largest radius that leaves nearly `most`. Keeps all points if there are
-/// no more.
+/// than a radius from all kept before. The radius is searched, round by round, such that nearly `most` points are kept.
+/// Keeps all points if there are no more.
 #[derive(Clone, Debug)]
 struct PoissonDisc {
     order: Vec<u32>,
     most: usize,
     round: u32,
     radius: f32,
-    /// Bounds of the search for the radius: the largest known to leave too many points, and the smallest known to leave
-    /// few enough; 0 if there is none.
+    /// Largest radius known to leave more than `most` points; 0 if none is known.
     lower: f32,
+    /// Smallest radius known to leave at most `most` points; 0 if none is known.
     upper: f32,
-    /// The points kept with the smallest radius known to leave few enough.
+    /// Indices of the points kept with the radius `upper`.
     best: Vec<u32>,
-    /// Progress with the current radius: number of points visited, points kept, and the positions of the latter.
+    /// Number of points visited with the current radius.
     visited: usize,
+    /// Indices of the points kept with the current radius; `grid` holds their positions.
     kept: Vec<u32>,
     grid: PointGrid,
 }
@@ -160,9 +161,9 @@ impl PoissonDisc {
         None
     }
 
-    /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
-    /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no
-    /// upper.
+    /// Returns the next radius to try; `count` points were kept with the last one. On a surface the number of samples
+    /// falls with the square of the radius; if the radius predicted by that is outside the bounds, their midpoint is
+    /// used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
         let target_count = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / target_count).sqrt();
@@ -175,7 +176,7 @@ impl PoissonDisc {
         }
     }
 
-    /// Returns the approximate share of the work that is done, as if a handful of rounds were needed.
+    /// Returns the approximate share of the work that is done, below 1, as if a handful of rounds were needed.
     fn progress(&self) -> f64 {
         let rounds = f64::from(self.round) + self.visited as f64 / self.order.len() as f64;
         rounds / (rounds + 2.0)

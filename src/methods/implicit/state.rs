@@ -27,7 +27,7 @@ enum SavedStage {
     Done,
 }
 
-/// The saved form of an [`ImplicitSurface`], without its points and options.
+/// The saved form of an [`ImplicitSurface`], with its parameters and edits, but without its points and other options.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -62,7 +62,8 @@ struct Surface {
 }
 
 impl ImplicitSurface {
-    /// Returns the run as bytes for [`Self::restore`], without points and options.
+    /// Returns the run as bytes for [`Self::restore`], with its parameters and edits, but without points and other
+    /// options.
     pub fn save(&self) -> Vec<u8> {
         let mesh = &self.mesh;
         encode(
@@ -93,9 +94,9 @@ impl ImplicitSurface {
         )
     }
 
-    /// Continues a run from the bytes of [`Self::save`]; `self` must be made from the same points and options. Takes as
-    /// long as the run had spent on choosing constraints and on its current stage; if it was colouring, on the
-    /// extraction, too.
+    /// Continues a run from the bytes of [`Self::save`]; `self` must be made from the same points and options, except
+    /// parameters. Takes as long as the run had spent on choosing constraints and on its current stage; if it was
+    /// colouring, on the extraction, too.
     ///
     /// # Errors
     /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.
@@ -141,7 +142,8 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// Returns a hash of points and options, by which [`Self::restore`] rejects a state of other input.
+    /// Returns a hash of the input points and of all options but the parameters; [`Self::restore`] rejects a state with
+    /// another hash.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |points: &[Vec3]| {
@@ -165,7 +167,8 @@ impl ImplicitSurface {
         Self { clock: self.clock, ..Self::from_parts(original, cloud, self.map, self.options.clone()) }
     }
 
-    /// Recomputes everything up to the stage `saved_stage`, and its first `slices` slices of work.
+    /// Recomputes everything up to the stage `saved_stage`, and that stage up to the slice of work at which it was
+    /// saved: its position in a solve, the first `slices` in other stages.
     fn replay(&mut self, saved_stage: SavedStage, slices: u32) -> Result<(), MethodError> {
         while saved_stage != SavedStage::Subsample && matches!(self.stage, Stage::Subsample(_)) {
             self.advance()?;

@@ -22,11 +22,12 @@ const ROUNDS: usize = 40;
 /// and nostrils account for some.
 const MAX_MISSED: f64 = 0.02;
 
-/// Decomposes `detail` into surfaces from coarse to fine, the base first and `detail` last. Each is a graph over the
-/// one before, except for up to [`MAX_MISSED`] of its normals.
+/// Decomposes `detail` into surfaces from coarse to fine, the base first and `detail` last, by smoothing it over the
+/// ellipsoids. Each is a graph over the one before, except for up to [`MAX_MISSED`] of its normals.
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`].
+/// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`] if
+/// `detail` is not a closed manifold.
 pub(super) fn decomposition(
     detail: TriangleMesh,
     ellipsoids: &[Ellipsoid],

@@ -1,4 +1,4 @@
-//! Tests which ellipsoids are inside a closed surface.
+//! Tests which ellipsoids have their centre inside a closed surface.
 
 use super::ellipsoid::Ellipsoid;
 use crate::math::triangle::Line;
@@ -23,8 +23,8 @@ pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<boo
     inside
 }
 
-/// The direction of the rays, of any length: along this one, a ray seldom hits an edge of a regular mesh, which would
-/// count twice.
+/// The direction of the rays, not normalised. A ray along it seldom hits an edge of a regular mesh, which would count
+/// as two hits.
 const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
 
 /// Two directions perpendicular to the ray.

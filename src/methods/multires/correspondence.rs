@@ -5,14 +5,14 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{SurfacePoint, SurfaceWalker};
 
-/// A point on the base M₀, as a triangle and barycentric coordinates.
+/// A point on a surface of the decomposition, usually the base M₀, as a triangle and barycentric coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BasePoint {
-    /// The triangle of the base.
+    /// The index of a triangle that contains the point.
     pub triangle: u32,
-    /// Barycentric coordinates in it.
+    /// The barycentric coordinates of the point in its triangle.
     pub weights: Vec3,
-    /// The position.
+    /// The position of the point.
     pub point: Vec3,
 }
 
@@ -24,24 +24,26 @@ impl From<SurfacePoint> for BasePoint {
 
 impl BasePoint {
     /// Creates the point of `base` with these barycentric coordinates. Its position has the same bits whenever it is
-    /// computed.
+    /// computed, so that saved runs are restored exactly.
     pub fn at(base: &SurfaceWalker, triangle: u32, weights: Vec3) -> Self {
         let [a, b, c] = base.corners(triangle);
         Self { triangle, weights, point: a * weights.x + b * weights.y + c * weights.z }
     }
 }
 
-/// Converts a closest point on the base to its stored form.
+/// Converts a closest point on the base to a [`BasePoint`], with its position computed as in [`BasePoint::at`].
 fn to_base_point(base: &SurfaceWalker, found: &SurfacePoint) -> BasePoint {
     BasePoint::at(base, found.triangle, found.barycentric)
 }
 
-/// The map T: the point on the base for every vertex of S, by slot.
+/// A point for every vertex, by slot: the map T from the deformed base S to the base M₀, or the points of the finest
+/// surface from which texture coordinates are taken.
 pub(super) type Correspondence = Vec<BasePoint>;
 
 pub(super) const UNSET: BasePoint = BasePoint { triangle: 0, weights: Vec3::ZERO, point: Vec3::ZERO };
 
-/// The surface that the next one is projected onto, with its map T: S_current, moved along with the ellipsoids.
+/// S_current with its map T: the deformed base of the frame before, moved along with the ellipsoids. The next deformed
+/// base is projected onto it.
 pub(super) struct Current<'a> {
     pub walker: &'a SurfaceWalker,
     /// The image of each vertex under T, in the order of the vertices of the surface.
@@ -51,7 +53,8 @@ pub(super) struct Current<'a> {
 /// Operator P: maps each vertex of `mesh` to the closest point of S_current, then by the same barycentric coordinates
 /// to a point near the base, then to the closest point on the base. Returns the map T of `mesh`.
 ///
-/// A closest point farther away than `farthest` is wrong, and is searched again in a tree.
+/// A closest point found by a walk is searched again in a tree if it is farther away than `farthest` or faces the other
+/// way.
 pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, farthest: f64) -> Correspondence {
     let mut correspondence = vec![UNSET; mesh.slots()];
     traverse(mesh, |v, start| {
@@ -63,7 +66,8 @@ pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, fart
 }
 
 /// Returns the closest point on S_current to a vertex of the next surface, by a walk from the triangle `start`. If the
-/// result is farther away than `farthest` or faces the other way, it is searched again in a tree.
+/// result is farther away than `farthest` or faces the other way, it is searched again in a tree. Without `start`, all
+/// triangles are tested.
 fn nearest(
     mesh: &Mesh,
     walker: &SurfaceWalker,
@@ -121,8 +125,8 @@ fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     }
 }
 
-/// Operator D, equation 1: q ← Σ dⱼ qⱼ / Σ dⱼ with the mean length dⱼ of the edges at qⱼ, then back onto the base.
-/// Evens out the map T.
+/// Operator D, equation 1 of the paper: moves the image q of each vertex under T to Σ dⱼ qⱼ / Σ dⱼ over its neighbours,
+/// with the mean length dⱼ of the edges at qⱼ, then back onto the base. Evens out the map T.
 pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, correspondence: &mut Correspondence) {
     let densities: Vec<f32> =
         (0..mesh.slots()).map(|i| density(mesh, correspondence, VertexId::from_index(i))).collect();
@@ -131,14 +135,15 @@ pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, correspondence: &mut
     }
 }
 
-/// Returns dⱼ: the mean length of the edges at a vertex, on the base.
+/// Returns dⱼ of the operator D: the mean distance on the base from the image of a vertex under T to the images of its
+/// neighbours.
 fn density(mesh: &Mesh, correspondence: &Correspondence, v: VertexId) -> f32 {
     let (ring, here) = (mesh.ring(v).as_slice(), correspondence[v.index()].point);
     let sum: f32 = ring.iter().map(|w| here.distance(correspondence[w.index()].point)).sum();
     if ring.is_empty() { 0.0 } else { sum / ring.len() as f32 }
 }
 
-/// Returns the point to which D moves one vertex.
+/// Returns the point of the base to which the operator D moves the image of one vertex.
 fn distributed(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -177,8 +182,8 @@ pub(super) fn folded(
     mesh.triangles().filter(|&corners| is_folded(corners, base, normals, correspondence)).count()
 }
 
-/// Applies D to the corners of folded triangles and their neighbours only, until no triangle is folded, at most
-/// [`UNFOLDINGS`] times.
+/// Applies the operator D only to the corners of folded triangles and their neighbours, at most [`UNFOLDINGS`] times,
+/// until no triangle is folded: flipped or without area on the base.
 pub(super) fn unfold(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -209,7 +214,8 @@ pub(super) fn unfold(
 /// Maximum number of passes that remove folds of T: a fold that remains has a topological cause, such as a cut neck.
 const UNFOLDINGS: usize = 12;
 
-/// Returns the unit normal of the base at a point, interpolated from the vertex normals.
+/// Returns the unit normal of a surface of the decomposition at a point, interpolated from `normals`, its vertex
+/// normals.
 pub(super) fn normal_at(base: &SurfaceWalker, normals: &[Vec3], at: &BasePoint) -> Vec3 {
     let [a, b, c] = base.mesh().triangles[at.triangle as usize].map(|v| normals[v as usize]);
     (a * at.weights.x + b * at.weights.y + c * at.weights.z).normalize_or_zero()

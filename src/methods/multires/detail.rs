@@ -26,14 +26,15 @@ impl Band {
     }
 }
 
-/// The surfaces of a decomposition from coarse to fine, with lookups from each to the next.
+/// The surfaces of a decomposition from coarse to fine, with lookups that find where the normals of each hit the next
+/// finer one.
 #[derive(Clone, Debug)]
 pub(super) struct Bands {
     pub all: Vec<Rc<Band>>,
     lookups: Vec<BandLookup>,
 }
 
-/// The lookup of normals from one surface of a decomposition to the next finer one.
+/// Finds where the normals of one surface of a decomposition hit the next finer one.
 #[derive(Clone, Debug)]
 struct BandLookup {
     /// The largest distance of a hit; farther ones belong to another part of the surface.
@@ -99,8 +100,8 @@ pub(super) struct Detail {
 }
 
 impl Band {
-    /// Returns the closest point to `origin`, and its signed distance along `normal`: the fallback where the normal
-    /// hits nothing.
+    /// Returns the closest point of this surface to `origin`, and its signed distance along `normal`: the fallback
+    /// where the normal hits nothing.
     fn closest_fallback(&self, origin: Vec3, normal: Vec3) -> (f32, BasePoint) {
         match self.walker.closest(origin) {
             Some(found) => ((found.point - origin).dot(normal), found.into()),
@@ -109,7 +110,7 @@ impl Band {
     }
 }
 
-/// Returns the largest distance from a vertex of one surface to the other surface.
+/// Returns the largest distance from a vertex of either surface to the other surface.
 fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
     let one_way = |from: &Band, to: &Band| {
         let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
@@ -118,28 +119,31 @@ fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
     one_way(a, b).max(one_way(b, a))
 }
 
-/// The deformed base with its detail.
+/// The deformed base with its detail, as reconstructed by [`detailed`].
 pub(super) struct Detailed {
     pub mesh: Mesh,
     /// The corresponding point on the finest surface for each vertex, by slot; for texture coordinates.
     pub points: Correspondence,
-    /// Number of vertices whose normal hit no surface.
+    /// Number of vertices whose normal missed a finer surface, so that the closest point was used instead.
     pub unmatched_vertices: usize,
-    /// Number of vertices that moved by less than their displacement, to avoid self-intersections.
+    /// Number of vertices that moved by less than their displacement, to avoid self-intersections, summed over the
+    /// bands.
     pub held_vertices: usize,
 }
 
 /// How finely the deformed base is sampled for the detail.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DetailSampling {
-    /// Longer edges of the detailed surface are split.
+    /// Edges longer than this with their detail are split, in units of the mesh; so are shorter ones, see
+    /// [`MAX_DEVIATION`].
     pub longest: f32,
-    /// How often an edge of the deformed base may be halved.
+    /// How often an edge of the deformed base may be halved; 0 adds no vertices.
     pub rounds: u32,
 }
 
-/// Reconstructs the detail on the deformed base `surface`, band by band, along the normals of the result so far.
-/// Vertices move only as far as no triangles intersect.
+/// Reconstructs the detail on the deformed base `surface`, refined according to `sampling`: band by band, along the
+/// normals of the result so far. Vertices move only as far as no triangles intersect. If the refinement itself causes
+/// intersections, it is left out.
 pub(super) fn detailed(
     surface: &Mesh,
     correspondence: &Correspondence,
@@ -187,13 +191,13 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
     }
 }
 
-/// Number of one-rings around a held-back vertex that are moved back partly as well; without them, the surface has a
-/// crease around it.
+/// Number of rings of neighbours around a held-back vertex that are moved back partly as well; without them, the
+/// surface has a crease around it.
 const SOFT_RINGS: usize = 4;
 
 /// Returns corrections, by slot, that move the neighbours of held-back vertices back as well, less with every ring.
-/// `displacements` are the intended displacements of all vertices, and `held_back` the share of it that each held-back
-/// vertex moved by.
+/// `displacements` are the intended displacements of all vertices, and `held_back` the share of its displacement by
+/// which each held-back vertex moved.
 fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId, f32)]) -> Vec<Vec3> {
     let mut missing = vec![0.0_f32; mesh.slots()];
     held_back.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
@@ -251,7 +255,8 @@ impl DetailSamples {
         p + normal * detail.lambdas.iter().sum::<f32>()
     }
 
-    /// Halves edges that are too long with their detail, or off it at their midpoint, longest first.
+    /// Splits edges at their midpoint, longest first: those longer than `longest` with their detail, and those whose
+    /// detail at the midpoint deviates by more than [`MAX_DEVIATION`].
     fn refine(&mut self, bands: &Bands, longest: f32) {
         let mut splits: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
         for (u, v) in self.mesh.edges() {
@@ -297,7 +302,7 @@ struct Sample {
     detail: Detail,
 }
 
-/// The entry of a free slot.
+/// The detail of a free slot.
 const NOTHING: Detail = Detail { lambdas: [0.0; MAX_BANDS], is_missed: false, last: UNSET };
 
 #[cfg(test)]

@@ -4,14 +4,15 @@ use super::correspondence::Correspondence;
 use crate::math::{DVec3, triangle};
 use crate::mesh::{Mesh, VertexId};
 
-/// Distortion of the map T from the deformed base to the base M₀, by live vertex of the deformed base.
+/// Distortion of the map T from the deformed base to the base M₀: one value for each live vertex of the deformed base,
+/// in slot order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Distortion {
     /// Area of the adjacent triangles on the base M₀, divided by their area on the deformed base; 1 where area is
     /// preserved.
     pub area: Vec<f64>,
-    /// Ratio of the largest to the smallest stretch, as an area-weighted mean over the adjacent triangles; 1 where
-    /// angles are preserved.
+    /// Ratio of the largest to the smallest stretch, at most 1000, as an area-weighted mean over the adjacent
+    /// triangles; 1 where angles are preserved.
     pub angle: Vec<f64>,
 }
 

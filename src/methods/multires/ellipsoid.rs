@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct ControlEllipsoid {
     /// The centre, in units of the mesh.
     pub center: [f64; 3],
-    /// Three orthogonal semi-axes as vectors.
+    /// Three orthogonal semi-axes as vectors, in units of the mesh.
     pub axes: [[f64; 3]; 3],
 }
 
@@ -20,12 +20,14 @@ const ORTHOGONAL: f64 = 1e-3;
 /// Largest ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
 const MAX_AXIS_RATIO: f64 = 1e3;
 
-/// Accepted range of semi-axes, in units of the mesh: squares and cubes stay within the range of `f32`.
+/// Shortest accepted semi-axis, in units of the mesh: squares and cubes of lengths stay within the range of `f32`.
 const SHORTEST: f64 = 1e-9;
+/// Longest accepted semi-axis and largest accepted coordinate of a centre, in units of the mesh.
 const LONGEST: f64 = 1e9;
 
 impl ControlEllipsoid {
-    /// Checks that the axes span an ellipsoid.
+    /// Checks that the centre is in range, and that the axes span an ellipsoid: their lengths, the ratio of lengths and
+    /// the angles.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming `ellipsoids`, and the one at fault by its `index`.
@@ -118,8 +120,8 @@ impl std::ops::Deref for Ellipsoid {
 /// anywhere 60.
 const STEPS: usize = 100;
 
-/// Newton's method stops at a relative step as small as this: convergence is quadratic, so twice as many digits are
-/// right then.
+/// Newton's method stops after a relative step of at most this: convergence is quadratic, so that the result has twice
+/// as many correct digits.
 const LAST_STEP: f64 = 1e-5;
 
 impl Ellipsoid {
@@ -139,31 +141,32 @@ impl Ellipsoid {
         Shape { lengths: self.lengths * factor, ..self.shape }.into()
     }
 
-    /// Converts the ellipsoid back to the caller's form.
+    /// Converts the ellipsoid back to a [`ControlEllipsoid`].
     pub fn control(&self) -> ControlEllipsoid {
         let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
         ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
     }
 
-    /// Returns `p` relative to the centre, in coordinates along the axes.
+    /// Returns the coordinates of `p` along the axes, relative to the centre.
     #[inline]
     fn local(&self, p: DVec3) -> DVec3 {
         self.rotation.transpose() * (p - self.center)
     }
 
+    /// Maps coordinates along the axes, relative to the centre, back to the world.
     #[inline]
     fn world(&self, local: DVec3) -> DVec3 {
         self.center + self.rotation * local
     }
 
-    /// Maps a point in coordinates along the axes back to the world.
+    /// Maps `p` to the frame in which the ellipsoid is the unit ball: the length of the result is 1 on the surface,
+    /// less inside.
     #[inline]
     pub fn unit(&self, p: DVec3) -> DVec3 {
         self.to_unit * (p - self.center)
     }
 
-    /// Maps `p` to the frame in which the ellipsoid is the unit ball: the length of the result is 1 on the surface,
-    /// less inside.
+    /// Returns whether `p` is inside the ellipsoid; false on the surface, and within rounding of it.
     #[inline]
     pub fn contains(&self, p: DVec3) -> bool {
         let seen = p - self.center;
@@ -187,18 +190,18 @@ impl Ellipsoid {
         self.shortest_axis() * self.shortest_axis() / self.lengths.max_element()
     }
 
-    /// Returns the distance from `p` to the surface along the ray to the centre, an upper bound of the distance; 0
-    /// inside.
+    /// Returns the distance from `p` to the surface along the ray from `p` to the centre, an upper bound of the
+    /// distance to the ellipsoid; 0 inside.
     pub fn ray_distance(&self, p: DVec3) -> f64 {
         let size = self.unit(p).length();
         if size > 1.0 { p.distance(self.center) * (1.0 - 1.0 / size) } else { 0.0 }
     }
 
-    /// Returns the point of the surface closest to `p`, from inside or outside. For the centre, it is an end of the
-    /// shortest axis.
+    /// Returns the point of the surface closest to `p`, which may be inside or outside. For the centre, it is an end of
+    /// the shortest axis.
     ///
-    /// The surface normal at this point passes through p. With local coordinates y of p and semi-axes a, it is a²y/(a²
-    /// + t) for the largest root t of Σ (a y/(a² + t))² = 1.
+    /// The surface normal at this point passes through p. With local coordinates y of p and semi-axes a, the point is
+    /// a²y/(a² + t) for the largest root t of Σ (a y/(a² + t))² = 1.
     pub fn nearest(&self, p: DVec3) -> DVec3 {
         if self.lengths.min_element() == self.lengths.max_element() {
             return self.center + self.shortest_axis() * (p - self.center).normalize_or(self.rotation.x_axis);
@@ -221,8 +224,8 @@ impl Ellipsoid {
     }
 }
 
-/// Returns the largest t with Σ (w / (s + t))² = 1, by Newton's method; the sum is decreasing and convex from −`least`
-/// on.
+/// Returns the largest t with Σ (w / (s + t))² = 1, for the weights w and squares s, by Newton's method; the sum is
+/// decreasing and convex from −`least` on, `least` being the smallest s.
 fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
     // A lower bound of the root: no single term may exceed 1.
     let floor = (0..3).map(|k| weights[k].abs() - squares[k]).fold(-least, f64::max);
@@ -267,8 +270,8 @@ const MAX_EDGE_PER_RADIUS: f64 = 1.6;
 /// is outside of all.
 ///
 /// Leaving the first ellipsoid that contains it would not be enough, as that may lead into another. In the crease
-/// between two, pushes alternate by ever shorter distances; what remains after [`PUSHES`] is left along a straight
-/// line.
+/// between two, pushes alternate by ever shorter distances; a point still inside after [`PUSHES`] is moved out along a
+/// straight line.
 pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     let mut at = p;
     for _ in 0..PUSHES {
@@ -280,10 +283,11 @@ pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     push_straight(ellipsoids, at)
 }
 
-/// Maximum number of pushes out of one ellipsoid after the other; a crease of 90° takes some three for each digit.
+/// Maximum number of pushes out of one ellipsoid after the other; in a crease of 90°, each further digit takes some
+/// three.
 const PUSHES: usize = 12;
 
-/// A point at this distance from the centre in the unit-ball frame counts as outside: rounding puts surface points
+/// A point at least this far from the centre in the unit-ball frame counts as outside: rounding puts surface points
 /// slightly off 1.
 const OUTSIDE: f64 = 1.0 - 1e-7;
 
@@ -308,8 +312,8 @@ fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     p + direction * distance
 }
 
-/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `distance`; `None`
-/// otherwise.
+/// Returns the distance at which the ray from `p` along `direction` leaves the ellipsoid; `None` if it is not inside at
+/// the distance `distance`.
 fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Option<f64> {
     if e.unit(p + direction * distance).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
@@ -323,8 +327,8 @@ fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Opti
 /// Returns `p` moved along with the ellipsoids from `before` to `after`: by the mean of their affine maps, with larger
 /// weights for nearer ones. Used to predict the membrane of the next frame.
 ///
-/// If all ellipsoids move alike, so does every point. Otherwise, points nearer to an ellipsoid than its size mostly
-/// move with it, and the space between two is stretched evenly.
+/// If all ellipsoids move alike, so does every point. Otherwise, points nearer to an ellipsoid than its shortest
+/// semi-axis mostly move with it, and the space between two is stretched evenly.
 pub(super) fn move_with(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec3 {
     let p = p.as_dvec3();
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
@@ -336,9 +340,9 @@ pub(super) fn move_with(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> V
     }
     if total > 0.0 { (p + sum / total).as_vec3() } else { p.as_vec3() }
 }
-/// Regularises the weight of an ellipsoid that a point lies on: it is ten times that of one at a distance of its own
-/// size. With a larger weight, all stretching falls on the crease between two ellipsoids that separate, and the map
-/// folds there; with a smaller one, detail slides on them.
+/// Regularises the weight of an ellipsoid that contains a point: it is eleven times that of one at a distance of its
+/// own shortest semi-axis. With a larger weight, all stretching falls on the crease between two ellipsoids that
+/// separate, and the map folds there; with a smaller one, detail slides on them.
 const SOFTNESS: f64 = 0.1;
 
 #[cfg(test)]
@@ -359,7 +363,7 @@ mod tests {
         Shape { center: vector(random), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
     }
 
-    /// Points spread evenly over the surface.
+    /// Returns `count` points spread evenly over the surface of an ellipsoid.
     fn spread(e: &Ellipsoid, count: usize) -> Vec<DVec3> {
         let on = |i: usize| {
             let (z, angle) = (1.0 - (2 * i + 1) as f64 / count as f64, 2.4 * i as f64);

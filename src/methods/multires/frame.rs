@@ -16,15 +16,16 @@ use crate::spatial::SurfaceWalker;
 /// be guarded nor solved in bounded time.
 const MAX_CHANGE: f64 = 2.0;
 
-/// While ellipsoids move, a membrane with at most this residual is only refreshed on one level: three times as fast as
-/// a solve on all levels.
+/// While ellipsoids move, a membrane with at most this residual, a share of the target edge, is only refreshed on one
+/// level: three times as fast as a solve on all levels.
 const REFRESH_TOLERANCE: f64 = 3.0 * TOLERANCE;
 
 /// Depth by which rounding may put vertices inside an ellipsoid, as a share of the target edge; a rigid motion stays
 /// below.
 const ROUNDING: f64 = 1e-3;
 
-/// Maximum number of frames in a row that only refresh the membrane, so that wide saddles do not lag far behind.
+/// Maximum number of frames in a row that only refresh the membrane, so that wide saddles between ellipsoids do not lag
+/// far behind.
 const MAX_REFRESHED_FRAMES: u32 = 3;
 
 impl MultiresolutionModel {
@@ -83,8 +84,9 @@ impl MultiresolutionModel {
         Ok(Prediction { ellipsoids_before: before, ellipsoids_after, predicted, residual, params })
     }
 
-    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small
-    /// and its edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
+    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small, its
+    /// edges are within bounds, no vertex is deep inside an ellipsoid and none is held back by the collision guard.
+    /// This makes rigid motions exact. `None` if the membrane has to be solved.
     fn predict_only(&mut self, prediction: &Prediction) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !prediction.moves() && self.refreshed_frames > 0;
@@ -146,8 +148,9 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// Returns the predicted membrane refreshed on one level; `None` unless the ellipsoids move and its residual is
-    /// small.
+    /// Returns the predicted membrane refreshed on one level; `None` unless the ellipsoids move, the parameters have
+    /// coarse levels, the residual is small and [`Self::with_threads_cut`] accepts the result, and after
+    /// [`MAX_REFRESHED_FRAMES`] such frames in a row.
     fn refresh(&mut self, prediction: &Prediction) -> Option<(Mesh, Changes)> {
         let may_refresh =
             prediction.moves() && prediction.params.levels > 0 && prediction.residual <= REFRESH_TOLERANCE;
@@ -182,8 +185,8 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// Cuts thin necks of a membrane that was made without collision tests. `None` if it intersects itself, or if an
-    /// ellipsoid is no longer inside.
+    /// Cuts thin necks of a membrane that was made without collision tests. `None` if it intersects itself, or if it no
+    /// longer contains the centre of an ellipsoid that it contained before.
     fn with_threads_cut(
         &mut self,
         mut mesh: Mesh,
@@ -215,7 +218,7 @@ struct Prediction {
     ellipsoids_after: Vec<Ellipsoid>,
     /// The membrane moved along with the ellipsoids.
     predicted: Mesh,
-    /// Its residual, as a share of the target edge.
+    /// The residual of the predicted membrane, as a share of the target edge.
     residual: f64,
     /// The parameters, with edge bounds that one frame can reach.
     params: MultiresParams,
@@ -239,7 +242,7 @@ impl<'a> Lap<'a> {
         Self { clock, start: clock(), times }
     }
 
-    /// Adds the time since the last call to `part`.
+    /// Adds the time since the last call, or since the start, to the time of `part`.
     fn end(&mut self, part: &'static str) {
         let now = (self.clock)();
         self.times.add(part, now - self.start);
@@ -257,5 +260,5 @@ fn edges_within_bounds(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     outside.count() as f64 <= MAX_OUT_OF_BOUNDS * mesh.edge_count() as f64
 }
 
-/// Share of edges that may be out of bounds without remeshing. Restructuring leaves some thousandths.
+/// Largest share of edges that may be out of bounds without remeshing. Restructuring leaves some thousandths.
 const MAX_OUT_OF_BOUNDS: f64 = 0.02;

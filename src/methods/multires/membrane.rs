@@ -11,8 +11,9 @@ use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 /// slip off the thinnest.
 const MAX_EDGE_PER_AXIS: f64 = 0.8;
 
-/// The iterations of a finer level end when one moves vertices by no more than this share of the level's target edge,
-/// as a root mean square: from there on they slide along the surface, and a tenth of that motion is normal to it.
+/// The iterations of a level finer than the coarsest end when one of them moves vertices by no more than this share of
+/// the level's target edge, as a root mean square: from there on they slide along the surface, and a tenth of that
+/// motion is normal to it.
 const LEVEL_TOLERANCE: f64 = 0.025;
 
 /// Minimum number of vertices of a coarse level: fewer do not represent the shape.
@@ -53,8 +54,8 @@ pub(super) fn solve_with(
     changes
 }
 
-/// Refreshes a membrane that is nearly at rest, on the target resolution only: restructures its edges and removes the
-/// small residual.
+/// Refreshes a membrane that has nearly converged, on the target resolution only: restructures its edges and reduces
+/// the small residual.
 pub(super) fn refresh(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Changes {
     let bounds = params.bounds();
     let mut changes = solve_level(mesh, ellipsoids, params, bounds, LEVEL_TOLERANCE * params.target());
@@ -62,7 +63,8 @@ pub(super) fn refresh(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &Multir
     changes
 }
 
-/// Restructures the edges to `bounds` and iterates; `tolerance` as in [`relaxed`].
+/// Solves the membrane on one level: restructures the edges to `bounds`, and moves the vertices as [`relaxed`] does
+/// with `tolerance`.
 fn solve_level(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -97,7 +99,7 @@ fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, leve
     (0..=levels).rev().find(|&level| level == 0 || fits(level)).unwrap_or(0)
 }
 
-/// One Gauss–Seidel iteration: moves every vertex to its energy minimum with all others fixed, then out of the
+/// Performs one Gauss–Seidel iteration: moves every vertex to its energy minimum with all others fixed, then out of the
 /// ellipsoids. Returns the root mean square of the displacements.
 fn sweep(mesh: &Mesh, positions: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let mut sum = 0.0;
@@ -117,15 +119,16 @@ fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Ve
     }
 }
 
-/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (equation 2).
+/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (equation 2 of the paper).
 #[inline]
 fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     ring.iter().fold(Vec3::ZERO, |sum, w| sum + positions[w.index()]) * (1.0 / ring.len() as f32)
 }
 
-/// Returns the position with the least bending energy: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p, U² of U, and ν = 1
-/// + Σ 1/nᵢ / n (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
+/// Returns the position with the least bending energy, all others fixed: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p,
+/// U²(p) = Σ U(pᵢ) / n − U(p), and ν = 1 + (Σ 1/nᵢ) / n, where nᵢ is the valence of the neighbour pᵢ (Kobbelt et al.,
+/// *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
 fn min_bending_position(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let umbrella = |w: VertexId| neighbour_mean(mesh, positions, w) - positions[w.index()];
     let ring = mesh.ring(v).as_slice();
@@ -144,8 +147,8 @@ fn pushed(ellipsoids: &[Ellipsoid], p: Vec3) -> Vec3 {
     pushed_out(ellipsoids, p.as_dvec3()).as_vec3()
 }
 
-/// Returns the residual: the root mean square of the displacements along the normals that one more iteration would
-/// make.
+/// Returns the residual, in units of the mesh: the root mean square of the displacements along the normals that one
+/// more iteration would make.
 pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let positions = mesh.positions();
     let mut sum = 0.0;
@@ -157,8 +160,9 @@ pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) ->
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Returns the positions after the iterations of one level, by slot, without changes of connectivity. They end early
-/// when one moves the vertices by no more than `tolerance`, as a root mean square.
+/// Returns the positions after the iterations of one level, by slot, without changes of connectivity:
+/// [`MultiresParams::smoothing`] iterations, or fewer if one moves the vertices by no more than `tolerance`, as a root
+/// mean square.
 pub(super) fn relaxed(
     mesh: &Mesh,
     ellipsoids: &[Ellipsoid],

@@ -58,7 +58,8 @@ pub struct MultiresOptions {
     pub base: Option<TriangleMesh>,
     /// The control ellipsoids that the membrane is spanned over.
     pub ellipsoids: Vec<ControlEllipsoid>,
-    /// The parameters. Edge bounds of 0 are derived from the area of the given surface, or else of the ellipsoids.
+    /// The parameters. If both edge bounds are 0, they are derived from the area of the base, else of the detail, else
+    /// of the ellipsoids; a single one that is 0 is derived from the other.
     pub params: MultiresParams,
 }
 
@@ -83,14 +84,16 @@ pub struct MultiresolutionModel {
     guard: Embedding,
     components: u32,
     iteration: u32,
-    /// Frames in a row that refreshed the membrane on the finest level only; 0 after a solve on all levels.
+    /// Number of frames in a row that refreshed the membrane on the finest level only, 0 after a solve on all levels;
+    /// at least 1 if a solve is due once the ellipsoids stop.
     refreshed_frames: u32,
     residual: f64,
     clock: fn() -> f64,
 }
 
 impl MultiresolutionModel {
-    /// Creates a model before its first step: its surface is the base with the detail.
+    /// Creates a model before its first step: its surface is the base, remeshed and moved out of the ellipsoids, with
+    /// the detail.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted;
@@ -165,8 +168,8 @@ impl MultiresolutionModel {
         mesh
     }
 
-    /// Solves the membrane for the current ellipsoids on every level, and returns the mesh of each, from coarse to fine
-    /// (figure 8).
+    /// Solves a copy of the membrane for the current ellipsoids on every usable level, and returns the mesh of each,
+    /// from coarse to fine (figure 8 of Kobbelt, Bareuther & Seidel).
     pub fn levels(&self) -> Vec<TriangleMesh> {
         let mut levels = Vec::new();
         let ellipsoids = self.ellipsoids.now();
@@ -250,7 +253,7 @@ impl MultiresolutionModel {
         self.ellipsoids.now().iter().map(Ellipsoid::control).collect()
     }
 
-    /// Returns the target ellipsoids.
+    /// Returns the target ellipsoids, without those that are being removed.
     pub fn targets(&self) -> Vec<ControlEllipsoid> {
         self.ellipsoids.targets().iter().map(Ellipsoid::control).collect()
     }
@@ -266,14 +269,18 @@ impl MultiresolutionModel {
         self.bands.all.len()
     }
 
-    /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit the
-    /// finer surface, and those held back to avoid self-intersections.
+    /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit a
+    /// finer surface, and those held back to avoid self-intersections, summed over the bands.
     pub fn detail_counts(&self) -> [usize; 2] {
         [self.detailed.unmatched_vertices, self.detailed.held_vertices]
     }
 
     /// Advances by one frame: moves the ellipsoids as far as the membrane can follow, and updates the membrane and its
-    /// detail.
+    /// detail. Does nothing once the model has converged.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`] if the membrane would grow too large for its edge bounds; [`MethodError::Mesh`]
+    /// if a position is not finite. The surface is then unchanged.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();

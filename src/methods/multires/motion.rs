@@ -5,17 +5,17 @@ use crate::math::{DMat3, DVec3};
 use glam::DQuat;
 use serde::{Deserialize, Serialize};
 
-/// Largest displacement of an ellipsoid's centre in one step, as a share of the larger of its shortest semi-axes before
-/// and after. With more, the surfaces before and after are too far apart for closest points to correspond; with less,
-/// drags take more steps.
+/// Largest displacement of an ellipsoid's centre in one step, as a share of its shortest semi-axis or that of its
+/// target, whichever is longer. With more, the surfaces before and after are too far apart for closest points to
+/// correspond; with less, drags take more steps.
 const MAX_SHIFT: f64 = 0.5;
 
 /// Largest rotation of an ellipsoid in one step, in radians. It also applies to a sphere, whose points on the axis of
 /// rotation do not move at all.
 const MAX_TURN: f64 = 0.35;
 
-/// Size at which a new ellipsoid starts, as a share of its own, and at which a removed one disappears, as a share of
-/// the thickest target's shortest semi-axis.
+/// Size at which a new ellipsoid starts, as a share of its target, and shortest semi-axis at which a removed one
+/// disappears, as a share of the longest of the targets' shortest semi-axes.
 const START_SIZE: f64 = 0.05;
 
 /// Largest factor by which a semi-axis grows or shrinks in one step.
@@ -29,7 +29,7 @@ struct MovingEllipsoid {
     target: Option<Ellipsoid>,
 }
 
-/// All ellipsoids of a model, with their targets.
+/// All ellipsoids of a model, with their targets, and those being removed, which have none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct MovingEllipsoids(Vec<MovingEllipsoid>);
 
@@ -63,8 +63,9 @@ impl MovingEllipsoids {
         self.0 = moving;
     }
 
-    /// Returns the state in which a new ellipsoid starts. Growing outside of the membrane, it would push the membrane
-    /// away instead of being covered by it.
+    /// Returns the state in which a new ellipsoid starts: small at its target, or inside the nearest ellipsoid if its
+    /// target is outside of the membrane. Growing there, it would push the membrane away instead of being covered by
+    /// it.
     fn initial_state(&self, target: &Ellipsoid, holds: impl Fn(&Ellipsoid) -> bool) -> Ellipsoid {
         let away = |ellipsoid: &MovingEllipsoid| ellipsoid.now.ray_distance(target.center);
         let nearest = self.0.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -77,7 +78,7 @@ impl MovingEllipsoids {
         }
     }
 
-    /// Whether all are valid ellipsoids; those of a saved state may not be.
+    /// Returns whether there is at least one ellipsoid and all are valid; those of a saved state may not be.
     pub fn are_valid(&self) -> bool {
         let all = self.0.iter().flat_map(|ellipsoid| std::iter::once(ellipsoid.now).chain(ellipsoid.target));
         !self.0.is_empty() && all.into_iter().all(|e| e.control().validate(0).is_ok())
@@ -98,7 +99,8 @@ impl MovingEllipsoids {
         self.0.iter().all(|ellipsoid| ellipsoid.target == Some(ellipsoid.now))
     }
 
-    /// Returns the number of steps, possibly fractional, that the slowest ellipsoid needs to reach its target.
+    /// Returns the number of steps, possibly fractional, that the slowest ellipsoid needs to reach its target; at least
+    /// 1 if one is being removed.
     pub fn steps_left(&self) -> f64 {
         self.0
             .iter()
@@ -107,7 +109,7 @@ impl MovingEllipsoids {
     }
 
     /// Moves all ellipsoids by one step, by the same share of their remaining motion, so that those that move together
-    /// stay together.
+    /// stay together; shrinks those that are being removed by the factor [`MAX_GROWTH`].
     pub fn advance(&mut self) {
         let share = 1.0 / self.steps_left().max(1.0);
         for moving in &mut self.0 {
@@ -119,7 +121,7 @@ impl MovingEllipsoids {
         }
     }
 
-    /// Removes ellipsoids that were being removed and have become small.
+    /// Drops the ellipsoids that are being removed and have shrunk to [`START_SIZE`].
     pub fn drop_vanished(&mut self) {
         let is_kept = |ellipsoid: &MovingEllipsoid, all: f64| {
             ellipsoid.target.is_some() || ellipsoid.now.shortest_axis() > START_SIZE * all

@@ -16,7 +16,7 @@ pub struct MultiresParams {
     pub levels: u32,
     /// q: the factor by which the edge bounds shrink from one level to the next finer one.
     pub refine_factor: f64,
-    /// Umbrella iterations per level.
+    /// Maximum number of Gauss–Seidel iterations per level of a solve; finer levels may end earlier.
     pub smoothing: u32,
     /// Applications of the operator D, which evens out the map T, per solve.
     pub distribute: u32,
@@ -50,8 +50,9 @@ pub enum Topology {
     SplitAndJoin,
 }
 
-/// Default edge bounds as shares of the target edge. Their ratio, 2.23, leaves no short edges behind.
+/// Default ε_min as a share of the target edge. The ratio of the default bounds, 2.23, leaves no short edges behind.
 const MIN_SHARE: f64 = 0.65;
+/// Default ε_max as a share of the target edge.
 const MAX_SHARE: f64 = 1.45;
 
 impl Default for MultiresParams {

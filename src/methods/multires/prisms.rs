@@ -7,8 +7,9 @@ use crate::math::triangle::Line;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::{NearestHit, SurfacePoint};
 
-/// For each triangle of one surface, the triangles of another that intersect its prism: the points of the triangle
-/// moved along its interpolated normals by up to a depth, to either side.
+/// For each triangle of one surface, the triangles of another that may intersect its prism: the points of the triangle
+/// moved along its interpolated normals by up to the prism's depth, to either side. Replaces most tree queries for hits
+/// along these normals.
 #[derive(Clone, Debug)]
 pub(super) struct PrismLookup {
     /// Start of each triangle's list in `candidates`, and the end of the last.
@@ -49,8 +50,9 @@ impl PrismLookup {
         prisms
     }
 
-    /// Returns the intersection with the other surface nearest to a point along its normal, no farther away than
-    /// `search_distance`. The same result as the tree's, which is queried if the lists have none.
+    /// Returns the intersection of the surface `to` with the line through `at` along `normal` that is nearest to `at`,
+    /// on either side and no farther away than `search_distance`. The same result as the tree's, which is queried if
+    /// the lists have none.
     pub fn line_hit(
         &self,
         to: &Band,
@@ -69,7 +71,8 @@ impl PrismLookup {
     }
 }
 
-/// Returns the depth of the prism of a triangle; 0 if it gets none.
+/// Returns the depth of the prism of a triangle; 0, for no prism, if the normals at its corners diverge too much or hit
+/// nothing.
 fn depth(from: &Band, to: &Band, search_distance: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {

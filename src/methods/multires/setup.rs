@@ -58,7 +58,11 @@ pub(super) fn set_up(
     Ok(bands)
 }
 
-/// Validates a closed mesh, and returns it without isolated vertices.
+/// Returns a mesh with vertices at the same position merged, see [`TriangleMesh::welded`], after checking that it is
+/// closed, manifold and not too small.
+///
+/// # Errors
+/// [`MethodError::Mesh`]; [`MethodError::InvalidArgument`] naming `parameter` if its edges are too short.
 fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
     let mesh = mesh.welded();
@@ -67,7 +71,8 @@ fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<Triang
     Ok(mesh)
 }
 
-/// Checks that at least one ellipsoid reaches the base: otherwise nothing would hold it.
+/// Checks that at least one ellipsoid comes within a target edge length of a vertex of the base: otherwise nothing
+/// would hold the membrane.
 fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
     let near = |p: &Vec3| {
         let p: DVec3 = p.as_dvec3();
@@ -88,7 +93,7 @@ pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), Metho
     Err(MethodError::TooManyVertices { most: MAX_VERTICES })
 }
 
-/// Returns the identity map from the base to itself, as the map T of every vertex.
+/// Returns the identity map from the base to itself: the base point of each vertex is the vertex.
 pub(super) fn identity(walker: &SurfaceWalker) -> Vec<BasePoint> {
     let mut correspondence = vec![UNSET; walker.mesh().positions.len()];
     for (t, corners) in walker.mesh().triangles.iter().enumerate() {

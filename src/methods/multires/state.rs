@@ -46,7 +46,8 @@ impl MultiresolutionModel {
         )
     }
 
-    /// Restores a run from the bytes of [`Self::save`], for a model of the same surfaces and initial ellipsoids.
+    /// Restores a run from the bytes of [`Self::save`], for a model with the same surfaces, given or derived; derived
+    /// ones depend on the initial ellipsoids and parameters.
     ///
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
@@ -76,7 +77,8 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// Restores the points of the map T; `None` if one refers to a triangle that does not exist.
+    /// Restores the points of the map T; `None` if one refers to a triangle that does not exist, or its coordinates are
+    /// not finite.
     fn correspondence_of(&self, points: &[(u32, Vec3)]) -> Option<Correspondence> {
         let base = &self.bands.base().walker;
         let count = base.mesh().triangles.len();
@@ -87,7 +89,7 @@ impl MultiresolutionModel {
         points.iter().map(point).collect()
     }
 
-    /// Returns a hash of all surfaces, which identifies the decomposition.
+    /// Returns a hash of the positions and triangles of all surfaces, which identifies the decomposition.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         for band in &self.bands.all {

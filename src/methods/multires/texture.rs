@@ -56,7 +56,7 @@ fn uv_at(mesh: &TriangleMesh, at: &BasePoint) -> Vec2 {
     blend(triangle_uvs(mesh, at.triangle), at.weights)
 }
 
-/// Returns the length in the texture per length in space, at a triangle.
+/// Returns the longest edge of a triangle of the finest surface in the texture, divided by its longest edge in space.
 fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
     let [p, q, r] = finest.corners(triangle);
@@ -64,7 +64,7 @@ fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     in_texture / p.distance(q).max(q.distance(r)).max(r.distance(p)).max(f32::MIN_POSITIVE)
 }
 
-/// Extrapolates the texture coordinates of a triangle to a point beside it.
+/// Extrapolates the texture coordinates of a triangle to a point beside it, projected onto its plane.
 fn extrapolated_uv(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
     let [a, b, c] = finest.corners(triangle);
     let normal = (b - a).cross(c - a);

@@ -12,14 +12,15 @@ use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
 use std::collections::BTreeSet;
 
-/// Maximum number of rounds that search for vertices without a boundary, and the minimum if there are any.
+/// Maximum number of rounds that search for vertices without a boundary.
 const ROUNDS: usize = 10;
+/// Minimum number of rounds if there are vertices without a boundary.
 const MIN_ROUNDS: usize = 2;
 
 /// Rounds end when at least this share of the vertices without a boundary remains from the round before.
 const LITTLE_PROGRESS: f64 = 0.9;
 
-/// Number of vertex moves in each round.
+/// Number of times that the vertices without a boundary are moved in each round.
 const MOVES: usize = 2;
 
 /// Largest distance between the two walls of a sheet, in the shortest side of a voxel.
@@ -28,7 +29,8 @@ const THICKNESS: f64 = 1.5;
 /// Largest cosine between the normals of the two walls of a sheet, which face away from each other.
 const OPPOSITE: f32 = -0.3;
 
-/// Share of the displacement to the mean of its neighbours that is added for a vertex that grows.
+/// Share of the displacement to the mean of its neighbours that is added to the outward displacement of a vertex that
+/// grows.
 const SMOOTHING: f32 = 0.5;
 
 impl FrameTracker {
@@ -116,14 +118,14 @@ impl FrameTracker {
     }
 }
 
-/// Returns the vertices without a boundary, and the intensity around each.
+/// Returns the vertices without a boundary, each with its [`Support`].
 fn without_boundary(mesh: &Mesh, context: &FrameContext) -> Vec<(VertexId, Support)> {
     let support = |v: VertexId| (v, context.classify(mesh.position(v), mesh.area_normal(v)));
     mesh.vertices().map(support).filter(|(_, support)| *support != Support::Boundary).collect()
 }
 
-/// Returns the vertices among `without_boundary` that are on a sheet: another one close by faces the opposite way. In
-/// ascending order.
+/// Returns the vertices among `without_boundary`, in ascending order, that are on a sheet: another one within
+/// [`THICKNESS`] faces the opposite way.
 fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &FrameContext) -> Vec<VertexId> {
     let thickness = (THICKNESS * context.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();
@@ -141,8 +143,8 @@ fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &Fr
     (0..without_boundary.len()).filter(|&i| has_opposite(i)).map(|i| without_boundary[i].0).collect()
 }
 
-/// Returns for each vertex of the sheets the number of edges to the nearest vertex off the sheets, by slot; 0 for other
-/// vertices.
+/// Returns for each vertex of the sheets the number of edges to the nearest vertex off the sheets, by slot: `u32::MAX`
+/// if there is none, 0 for other vertices.
 fn depths(mesh: &Mesh, sheets: &[VertexId]) -> Vec<u32> {
     let mut depth = vec![0; mesh.slots()];
     sheets.iter().for_each(|v| depth[v.index()] = u32::MAX);

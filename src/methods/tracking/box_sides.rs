@@ -34,7 +34,7 @@ impl Region {
     }
 
     /// Returns the distance from a voxel's centre to the box along the axis where it is largest, in world units;
-    /// negative infinity inside.
+    /// negative infinity for voxels of the box.
     pub fn distance_outside_box(&self, at: [usize; 3]) -> f64 {
         let [first, last] = self.inner;
         let beyond = |axis: usize| {
@@ -44,7 +44,7 @@ impl Region {
         (0..3).map(beyond).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Returns the voxel of the box nearest to a position outside; `None` for positions inside.
+    /// Returns the index of the voxel of the box nearest to a position outside; `None` for positions inside.
     pub fn clamp_into_box(&self, position: DVec3) -> Option<u32> {
         let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
         let at = position / self.spacing;
@@ -54,7 +54,7 @@ impl Region {
         (!is_inside).then_some((z * ny + y) * nx + x)
     }
 
-    /// Removes the faces beyond the box, and adds faces in its sides where the frame is bright.
+    /// Removes the faces beyond the box, and adds faces of weight 1 in its sides where the frame is bright.
     pub fn clip_to_box(&self, frame: usize, faces: &mut Faces) {
         for (direction, list) in faces.iter_mut().enumerate() {
             list.retain(|face| {
@@ -84,7 +84,7 @@ impl Region {
     }
 
     /// Returns faces in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer of the
-    /// voxels before the faces.
+    /// voxels before the faces. Both are indices along `direction`.
     fn box_side_faces<'a>(
         &self,
         frame: usize,
@@ -111,7 +111,7 @@ impl Region {
         bright.map(|i| Face { voxel: voxel(i), weight: 1.0 }).collect()
     }
 
-    /// Returns the voxels of the box that are adjacent to faces in its sides, sorted.
+    /// Returns the indices of the voxels of the box that are adjacent to faces in its sides, sorted.
     pub fn bright_box_side_voxels(&self, faces: &Faces) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let mut voxels = Vec::new();

@@ -9,7 +9,7 @@ use crate::math::{DVec3, symmetric};
 pub(super) struct PlaneFit {
     /// The spatial part of the normal, of unit length together with `along_time`; its sign is arbitrary.
     pub normal: DVec3,
-    /// The temporal component of the normal, for time in units of c per frame; 0 for a plane in space.
+    /// The temporal component of the normal, with time measured as c·t; 0 for a plane in space.
     pub along_time: f64,
     /// Signed distance from the position to the plane, along the normal.
     pub distance: f64,
@@ -23,7 +23,8 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Points whose variance in time is at most this share of their variance in space are fitted in space only.
 const MIN_TIME_SPREAD: f64 = 1e-6;
 
-/// Fits a plane in space: its normal is the direction of least variance. `None` if there are too few points.
+/// Fits a plane in space to the points summed in `sums`: its normal is the direction of least variance. `None` if there
+/// are too few points.
 pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
     let [mean, covariance] = mean_and_covariance(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
@@ -32,7 +33,8 @@ pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
     Some(PlaneFit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
 
-/// Fits a hyperplane in space-time. `None` if there are too few points.
+/// Fits a hyperplane in space-time to the points summed in `sums`, or a plane in space if all are of a single moment.
+/// `None` if there are too few points.
 pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
     let [mean, c] = mean_and_covariance(sums)?;
     // All points are of a single moment: in space-time every hyperplane through their plane would fit.
@@ -50,8 +52,8 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
     Some(PlaneFit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }
 
-/// Returns the mean and the covariance, with products in the order of [`Sums::second`]; `None` if there are too few
-/// points.
+/// Returns the mean, in the first four numbers, and the covariance, with products in the order of [`Sums::second`];
+/// `None` if there are too few points.
 fn mean_and_covariance(sums: &Sums) -> Option<[[f64; 10]; 2]> {
     if sums.weight < MIN_WEIGHT {
         return None;

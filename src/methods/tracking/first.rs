@@ -48,7 +48,8 @@ pub(super) fn extract_bright_surface(
     Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
 }
 
-/// Returns the face centres with the normals of their fitted planes, oriented towards falling intensity.
+/// Returns the centres of the faces of walls with the normals of their fitted planes, oriented towards falling
+/// intensity, or outwards in the sides of the box.
 fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
@@ -66,7 +67,8 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     points
 }
 
-/// Returns the direction in which intensity rises around a voxel: the covariance of intensity and position.
+/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame: the covariance of
+/// intensity and position.
 fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
     let range =
@@ -87,8 +89,8 @@ fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     sum - first * (mean / count)
 }
 
-/// Returns the weighted mean of the signed distances to the planes of nearby points, for each voxel in their band;
-/// positive inside.
+/// Returns for each voxel within `band` of a boundary point the weighted mean of its signed distances to the planes of
+/// such points, in world units, positive inside; `None` for other voxels.
 fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];

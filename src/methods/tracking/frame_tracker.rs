@@ -10,7 +10,8 @@ use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 
-/// Smoothing passes over the mesh for predictions and curvature corrections: raw, either is worse than none.
+/// Smoothing passes over the mesh for predictions and curvature corrections: unsmoothed, either does more harm than
+/// good.
 const SMOOTHINGS: usize = 5;
 
 /// Largest curvature correction of a vertex, in the shortest side of a voxel; larger ones occur at sharp corners.
@@ -22,7 +23,7 @@ const UNFOLDINGS: usize = 3;
 /// Number of times that the mesh is projected in the first frame: it comes from a grid, not from a tracked frame.
 const FIRST_FRAME_PASSES: usize = 3;
 
-/// A vertex is on a boundary if intensity falls along its normal by at least this share of τ.
+/// A vertex is on a boundary if intensity falls by at least this share of τ from one voxel inside to one voxel outside.
 const MIN_STEP: f64 = 0.3;
 
 /// Share of the tangential displacement to the mean of the neighbours by which vertices are spaced in each frame.
@@ -38,18 +39,20 @@ pub struct FrameStatistics {
     pub area: f64,
     /// Number of triangles.
     pub triangles: usize,
-    /// Number of folded triangles, which face away from the sum of their three neighbours.
+    /// Number of triangles that stay folded: they face away from the sum of their three neighbours.
     pub folded: usize,
-    /// Number of projections that found no points or moved too far.
+    /// Number of projections that failed: there were too few points, the hyperplane was nearly parallel to the frame,
+    /// or the vertex moved too far.
     pub rejected: usize,
     /// Number of vertex moves in projections and curvature corrections that were shortened to avoid self-intersections.
     pub held_moves: usize,
     /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
     /// smoothed.
     pub without_boundary: usize,
-    /// Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together.
+    /// Mean number of projection steps per vertex, summed over the projections of all vertices onto space-time and onto
+    /// the frame.
     pub steps: f64,
-    /// Mean displacement of the vertices by the last projection, in world units.
+    /// Mean displacement by the last projection of all vertices, in world units.
     pub mean_final_correction: f64,
 }
 
@@ -60,18 +63,18 @@ pub(super) struct FrameContext<'a> {
     pub frame: usize,
     /// The boundary points around that frame in time.
     pub samples: &'a SpaceTimeSamples,
-    /// The levels between bright and dark; those of that frame are known.
+    /// The voting, whose levels between bright and dark are known for that frame.
     pub voting: &'a BoundaryVoting,
 }
 
-/// The image around a point of the surface: whether there is a boundary, and if not, its intensity.
+/// The image around a point of the surface: whether there is a boundary, and if not, whether it is bright.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Support {
-    /// Inside is brighter than outside, or the box cuts a bright region.
+    /// Intensity falls from inside to outside, or the point is at a side of the box that cuts a bright region.
     Boundary,
-    /// Both sides are bright.
+    /// No boundary, and both sides are brighter than the level between bright and dark.
     Bright,
-    /// Neither of these.
+    /// No boundary, and not bright on both sides; also outside the box, unless the box cuts a bright region there.
     Dark,
 }
 
@@ -112,7 +115,8 @@ impl FrameTracker {
         Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
     }
 
-    /// Moves the mesh into the next frame, with a prediction from the samples of the frame before, if any.
+    /// Moves the mesh into the next frame, with a prediction from the samples of the frame before, if any. Returns the
+    /// edits and the statistics of the frame.
     pub fn track_frame(
         &mut self,
         mesh: &mut Mesh,
@@ -139,7 +143,8 @@ impl FrameTracker {
         (changes, statistics)
     }
 
-    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, and restores its edge bounds.
+    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, restores its edge bounds, and resolves
+    /// boundary loss. Returns the edits.
     fn project_and_restructure(
         &mut self,
         mesh: &mut Mesh,
@@ -197,7 +202,8 @@ impl FrameTracker {
         folds.len()
     }
 
-    /// Projects all vertices, and adds the mean number of steps and the mean displacement to `statistics`.
+    /// Projects all vertices, each displaced by `offsets` first; adds the mean number of steps to `statistics`, and
+    /// sets the mean displacement there.
     fn project_all(
         &mut self,
         mesh: &mut Mesh,
@@ -244,7 +250,7 @@ impl FrameTracker {
         (steps, sum)
     }
 
-    /// Moves the vertices by `displacements` under the collision guard. Returns the number held back.
+    /// Moves the vertices by `displacements` under the collision guard. Returns the number of those held back.
     pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
         self.guard.sync_with_edge(mesh, self.bounds.max);
         self.guard.move_all(mesh, &mut displacements).len()
@@ -279,7 +285,7 @@ pub(super) fn neighbour_mean(mesh: &Mesh, v: VertexId) -> Vec3 {
     ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }
 
-/// Returns for each vertex the mean of its neighbours' displacements.
+/// Returns for each vertex the mean of its neighbours' displacements, by slot.
 fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; displacements.len()];
     for v in mesh.vertices() {
@@ -290,7 +296,8 @@ fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
     out
 }
 
-/// Fills in each `rejected` vertex with the mean displacement of its neighbours.
+/// Returns the displacements, by slot, with that of each `rejected` vertex replaced by the mean of its neighbours'
+/// known ones.
 fn fill_rejected(mesh: &Mesh, displacements: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
     let mut out: Vec<Vec3> =
         displacements.iter().map(|displacement| displacement.unwrap_or(Vec3::ZERO)).collect();

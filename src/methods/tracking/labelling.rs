@@ -41,7 +41,7 @@ impl VoxelBox {
         [x + index % nx, y + index / nx % ny, z + index / (nx * ny)]
     }
 
-    /// Returns the index in the box of a voxel of the region; `None` outside.
+    /// Returns the index in the box of a voxel given by region coordinates; `None` outside.
     pub fn index(&self, at: [usize; 3]) -> Option<usize> {
         let [first, last] = self.ends;
         let is_inside = (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]));
@@ -79,8 +79,8 @@ pub(super) fn label_bright(
     Some(reconstructed.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// As [`label_bright`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve,
-/// but is only right where the signal is as strong as at that wall.
+/// Labels the voxels of a box as [`label_bright`] does, but by comparing each intensity with the middle of the step at
+/// the nearest wall. Needs no solve, but is only right where the signal is as strong as at that wall.
 pub(super) fn label_bright_by_level(
     region: &Region,
     frame: usize,
@@ -103,8 +103,8 @@ pub(super) fn label_bright_by_level(
     Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
 }
 
-/// Returns the steps at the faces within a box: the indices of the voxels before and after, and the share of votes,
-/// negative if intensity falls.
+/// Returns the steps at the faces within a box: the indices in the box of the voxels before and after, and the share of
+/// votes, negative if intensity falls.
 fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) -> Vec<(usize, usize, f32)> {
     let image = &region.frames[frame];
     let mut steps = Vec::new();
@@ -122,8 +122,8 @@ fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) ->
     steps
 }
 
-/// Solves the Poisson equation for the image whose differences to its neighbours sum to `source` at each voxel, by
-/// conjugate gradients.
+/// Solves the Poisson equation for the image whose graph Laplacian, see [`laplacian`], is `source`, by conjugate
+/// gradients.
 fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let mut solution = vec![0.0; source.len()];
@@ -147,7 +147,8 @@ fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     solution
 }
 
-/// Writes the sum of differences to the neighbours of each voxel: the graph Laplacian.
+/// Writes for each voxel the sum of its differences from its neighbours, its own value minus theirs: the graph
+/// Laplacian.
 fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let mut add = |i: usize, j: usize| {
@@ -169,7 +170,8 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Extends known values to all voxels, each from the nearest along the axes; `None` if no value is known.
+/// Extends known values to all voxels: each takes that of the voxel fewest steps along the axes away. `None` if no
+/// value is known.
 fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();

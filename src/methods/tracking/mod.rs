@@ -48,14 +48,14 @@ use vote::{BoundaryVoting, Faces, Window};
 /// Selects which surface of the first frame is tracked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Component {
-    /// The one that encloses the largest volume.
+    /// The surface that encloses the largest volume.
     #[default]
     Largest,
-    /// The one that contains a point in world coordinates, or is nearest to it.
+    /// The surface that contains a point in world coordinates, or has the vertex nearest to it.
     Nearest(DVec3),
 }
 
-/// A region of a volume.
+/// The region of a volume that is processed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
     /// Opposite corners in world coordinates. If the voxel axes are rotated, the bounding box along the voxel axes is
@@ -75,7 +75,7 @@ pub struct TrackingOptions {
     pub bounds: Option<Bounds>,
     /// Which surface is tracked.
     pub component: Component,
-    /// The surface in the first frame; by default it is extracted from the image.
+    /// The surface in the first frame, in world coordinates; by default it is extracted from the image.
     pub start: Option<TriangleMesh>,
     /// The parameters; those that are 0 are derived from the volume.
     pub params: TrackingParams,
@@ -121,7 +121,7 @@ struct ImageStatistics {
     longest_side: f64,
     /// The standard deviation of the noise, in intensity.
     noise: f64,
-    /// The range of intensities, without outliers.
+    /// The difference between the largest and the smallest intensity, without outliers.
     range: f64,
 }
 
@@ -130,9 +130,10 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for parameters that are not accepted, for a volume with one frame, without
-    /// contrast or with axes that are not at right angles, for a box outside of it, and for a start that is empty,
-    /// inside out, outside the box, or has a mean edge below a tenth of a voxel; [`MethodError::Mesh`] for a start that
-    /// is not a closed surface, or intersects itself.
+    /// contrast or with axes that are not at right angles, for a box outside of it, with too few voxels or with too
+    /// many for memory, and for a start that is empty, inside out, without a vertex in the box, or has a mean edge
+    /// below a tenth of a voxel; [`MethodError::Mesh`] for a start that is not a closed surface, or intersects itself;
+    /// [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
         let TrackingOptions { volume, bounds, component, start, params } = options;
         params.validate()?;
@@ -190,7 +191,7 @@ impl SurfaceTracker {
         Ok(params)
     }
 
-    /// Resets the run to before its first step, with the current parameters.
+    /// Resets the run to before its first step, with the current parameters; only the number of steps is kept.
     fn restart(&mut self) {
         self.region.threshold = self.params.threshold / self.region.quantum;
         let window = Window {
@@ -240,12 +241,13 @@ impl SurfaceTracker {
         self.image.noise
     }
 
-    /// Returns the surface in the newest frame, in world coordinates.
+    /// Returns the surface in the newest frame, in world coordinates; before the first frame is done, the caller's
+    /// start, or an empty mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Returns the surfaces of the frames so far, in world coordinates: positions and triangles.
+    /// Returns the surface of each frame so far, in world coordinates; positions and triangles only.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
@@ -296,8 +298,9 @@ impl SurfaceTracker {
         self.meshes.len() == self.frames() && (self.cycle_closure_error.is_some() || !self.params.cyclic)
     }
 
-    /// Processes one more frame: first finds the boundary in every frame, then tracks the surface through them, and
-    /// finally, in a cyclic sequence, from the last frame to the first.
+    /// Runs one step: finds the boundary in the next frame, until it is known in all frames; then tracks the surface
+    /// into the next frame; and finally, in a cyclic sequence, from the last frame to the first. Once that is done,
+    /// calls change nothing and report `done`.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
@@ -358,7 +361,8 @@ impl SurfaceTracker {
         Ok(changes)
     }
 
-    /// Tracks the surface of the last frame on to the first, and measures how far it is from where it began.
+    /// Tracks a copy of the last frame's surface on to the first frame, and measures its mean distance from the surface
+    /// there.
     fn close_cycle(&mut self) {
         let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
             return;

@@ -18,7 +18,7 @@ pub struct TrackingParams {
     pub radius: f64,
     /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
-    /// β: the scale of each step of a projection is this factor times that of the step before; at least 0.2.
+    /// β: the step number i of a projection, from 0 on, is scaled by βⁱ, but by at least 0.2.
     pub damping: f64,
     /// c_min: shorter edges are collapsed, as a multiple of the mean edge in the first frame.
     pub edge_min: f64,
@@ -47,8 +47,8 @@ impl Default for TrackingParams {
     }
 }
 
-/// Default τ in standard deviations of the noise: noise alone splits windows by 1.6 of them, so hardly any window of
-/// noise passes.
+/// Default τ in standard deviations of the noise: in windows of noise alone the cluster means differ by 1.6 of them, so
+/// hardly any such window passes.
 const THRESHOLD_IN_NOISE: f64 = 4.0;
 
 /// Smallest default τ, as a share of the intensity range: images without noise need a threshold as well.
@@ -67,7 +67,7 @@ const RADIUS_IN_SLICES: f64 = 1.2;
 const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
 impl TrackingParams {
-    /// Checks all values but those to be derived from the volume.
+    /// Checks all values, except those that are 0 and will be derived from the volume.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted.

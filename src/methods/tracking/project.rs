@@ -5,7 +5,7 @@ use super::extremal::{PlaneFit, hyperplane, plane};
 use super::samples::SampleField;
 use crate::math::DVec3;
 
-/// Smallest damping factor of a projection step; that of the i-th step is β^i until then.
+/// Smallest factor by which a step of a projection is scaled: that of step i, from 0 on, is βⁱ until then.
 const MIN_DAMPING: f64 = 0.2;
 
 /// Maximum number of steps of one projection.
@@ -18,11 +18,11 @@ const MIN_SPATIAL_NORMAL_SQUARED: f64 = 0.05;
 /// The boundary points around one frame in time, and the parameters of projections there.
 #[derive(Clone, Debug)]
 pub(super) struct SpaceTimeSamples {
-    /// Points of the frame and of those around it.
+    /// Points of the frame and of those around it in time, for fits in space-time.
     pub field: SampleField,
-    /// Points of the frame alone.
+    /// Points of the frame alone, for fits in space.
     pub own: SampleField,
-    /// Voxels of the frame that are bright at a side of the box, sorted.
+    /// Indices of the voxels of the frame that are bright at a side of the box, sorted.
     pub box_side_voxels: Vec<u32>,
     /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
@@ -39,7 +39,7 @@ pub(super) enum Onto {
     /// The space-time surface, restricted to the frame. It is found from farther away, but lags behind accelerating
     /// motion.
     SpaceTime,
-    /// The surface of the frame's own points.
+    /// The surface of the frame's own points, in space.
     Frame,
 }
 
@@ -54,7 +54,7 @@ impl SpaceTimeSamples {
 
     /// Projects a point onto the surface, and returns its position and the number of steps. If it has not converged
     /// after [`STEPS`], its last position is returned. `None` if there are too few points around it, the hyperplane is
-    /// nearly parallel to the frame, or it moves too far.
+    /// nearly parallel to the frame, or it moves further than `max_displacement`.
     pub fn project(&self, p: DVec3, onto: Onto) -> Option<(DVec3, usize)> {
         let mut x = p;
         let mut damping: f64 = 1.0;
@@ -78,7 +78,8 @@ impl SpaceTimeSamples {
         Some((x, STEPS))
     }
 
-    /// Predicts the displacement of the surface from a point to the next frame: −c·nₜ·n₃ / |n₃|².
+    /// Predicts the displacement of the surface from a point to the next frame: −c·nₜ·n₃ / |n₃|², in world units.
+    /// `None` if there are too few points, or the hyperplane is nearly parallel to the frame.
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
         let fit = self.fit(at, Onto::SpaceTime)?;
         let square = fit.normal.length_squared();

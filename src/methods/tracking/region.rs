@@ -21,14 +21,14 @@ const PADDING: usize = 2;
 /// Minimum number of voxels along at least two axes; a single slice is accepted.
 const MIN_VOXELS: usize = 5;
 
-/// Upper bounds of the memory per voxel, in bytes: in total, for the weights around two frames, and per frame, for
-/// intensity and level.
+/// Upper bounds of the memory per voxel, in bytes: first, once, for the weights around two frames; second, for each
+/// frame, for intensity and level.
 const BYTES: [u64; 2] = [140, 2];
 
 /// Maximum memory for a region, in bytes: what a browser gives to one page, less the volume.
 const MAX_BYTES: u64 = 3_000_000_000;
 
-/// Largest cosine between two voxel axes that counts as a right angle: rounding in headers stays far below.
+/// Largest absolute cosine between two voxel axes that counts as a right angle: rounding in headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
 /// A box of voxels of a 4D image, in all frames, with quantised intensities. Padding around the box lets windows extend
@@ -48,7 +48,7 @@ pub(super) struct Region {
     pub from_world: DAffine3,
     /// Quantised intensities by frame, x fastest.
     pub frames: Vec<Vec<u8>>,
-    /// The intensity of one quantisation step.
+    /// The difference in intensity of one quantisation step.
     pub quantum: f64,
     /// τ, in quantisation steps.
     pub threshold: f64,
@@ -118,7 +118,7 @@ impl Region {
         Ok(())
     }
 
-    /// Calls `visit` with each row of the region along x, in intensities from 0 to 1.
+    /// Calls `visit` with each row of the region along x in a frame, in intensities from 0 to 1.
     fn for_each_row(
         &self,
         volume: &Volume,
@@ -144,18 +144,18 @@ impl Region {
         Ok(())
     }
 
-    /// Returns the longest side of a voxel among axes with more than one voxel, in world units.
+    /// Returns the longest side of a voxel among axes along which the box has more than one voxel, in world units.
     pub fn longest_side(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
     }
 
-    /// Returns the range of intensities, without outliers.
+    /// Returns the difference between the largest and the smallest intensity, without outliers.
     pub fn span(&self) -> f64 {
         MAX_LEVEL * self.quantum
     }
 
-    /// Returns the grid coordinates of a voxel.
+    /// Returns the grid coordinates of a voxel given by its index.
     pub fn voxel(&self, index: u32) -> [usize; 3] {
         let ([nx, ny, _], i) = (self.dims, index as usize);
         [i % nx, i / nx % ny, i / (nx * ny)]
@@ -177,7 +177,7 @@ impl Region {
         (at * self.spacing, 0.0)
     }
 
-    /// Interpolates the quantised intensity trilinearly at a position, with the border replicated.
+    /// Interpolates the quantised intensity of a frame trilinearly at a position, with the border replicated.
     pub fn sample(&self, frame: usize, position: DVec3) -> f64 {
         trilinear(self.dims, position / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
@@ -225,7 +225,8 @@ fn bin_of(value: f32) -> usize {
     (value * (BINS - 1) as f32 + 0.5) as usize
 }
 
-/// Returns the lower and upper quantile of the intensities, from 0 to 1, beyond which voxels are outliers.
+/// Returns the lower and upper quantile of the intensities, normalised to 0..1, beyond which voxels are outliers, from
+/// the counts in [`BINS`].
 fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
     let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
     let beyond = |from_top: bool| {
@@ -263,7 +264,7 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
 }
 
 /// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in
-/// the world.
+/// the world; at least one voxel along each axis.
 fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {

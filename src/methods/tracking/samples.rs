@@ -29,7 +29,7 @@ impl Falloff {
         libm::exp(-4.0 * step * (2.0 * distance + step) / (self.radius * self.radius))
     }
 
-    /// Returns the offsets of the frames whose faces may be within the radius, at most `most` to either side.
+    /// Returns the offsets of the frames with points that may be within the radius, at most `most` to either side.
     pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
         let frames = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
         -frames..=frames
@@ -39,7 +39,7 @@ impl Falloff {
 /// Faces along x that one vector holds; usually no more are within the radius.
 const LANES: usize = 8;
 
-/// Maximum number of vectors along x.
+/// Maximum number of vectors for the faces along x within the radius.
 const MAX_VECTORS: usize = 4;
 
 /// Maximum number of faces within the radius along one axis; limits the radius.
@@ -51,22 +51,24 @@ pub(super) struct SampleField {
     dims: [usize; 3],
     spacing: DVec3,
     falloff: Falloff,
-    /// Length of a row, and its padding with zeros at either end.
+    /// Length of a row with its padding.
     stride: usize,
+    /// Number of zeros at either end of a row, for queries near the border.
     padding: usize,
     /// By axis, the constant factor by which the ratio of θ between neighbouring voxels changes from voxel to voxel.
     changes: DVec3,
-    /// Whether the points are of several moments, so that temporal sums are kept.
+    /// Whether the points are of several moments, so that sums with time are kept.
     has_times: bool,
     /// Points by direction of the faces; faces along time are at voxel centres.
     sites: [FaceWeights; 4],
 }
 
-/// Weights of the points of one direction, times θ of their time t: times 1 and, for several moments, times t and t².
+/// Weights of the points of one direction by face, summed over the frames: times θ(t), and for several moments also
+/// times t θ(t) and t² θ(t), where t is the distance in time in world units.
 #[derive(Clone, Debug, Default)]
 struct FaceWeights {
     weights: [Vec<f32>; 3],
-    /// By row, from the first voxel with a weight to after the last.
+    /// By row, the first voxel with a weight and the one after the last.
     extents: Vec<[u32; 2]>,
 }
 
@@ -98,7 +100,8 @@ impl SampleField {
         field
     }
 
-    /// Adds the points of the frame that is `offset` frames later.
+    /// Adds the points of the frame that is `offset` frames after that of the field; those beyond the radius in time
+    /// are left out.
     pub fn add(&mut self, faces: &Faces, offset: i64) {
         for direction in [X, Y, Z, TIME] {
             // Faces along time are half a frame after their frame.
@@ -156,7 +159,8 @@ impl SampleField {
         sums
     }
 
-    /// Sums over the faces of one direction, with `N` vectors of lanes along x, enough for all faces within the radius.
+    /// Sums over the faces of one direction within the radius, and adds the results to `sums`. `N` vectors of lanes
+    /// along x hold them all.
     fn gather<const N: usize, const TIMED: bool>(
         &self,
         sites: &FaceWeights,
@@ -196,10 +200,12 @@ impl SampleField {
     }
 }
 
-/// The faces within the radius along one axis, indexed by the voxel before them, with their θ.
+/// Along one axis, the faces across it, or the voxel centres if the faces lie across another axis, that are within the
+/// cut-off radius of the query position; with the factor of θ for this axis. Index i is voxel i's centre, or the face
+/// after it.
 struct AxisWeights {
     first: i64,
-    /// Signed distance from the position to the first face, and from each face to the next.
+    /// Signed distance from the position to the first of them, in world units.
     start: f64,
     spacing: f64,
     weights: [f32; MAX_FACES],
@@ -222,13 +228,13 @@ impl AxisWeights {
         Self { first, start, spacing, weights, count }
     }
 
-    /// Returns the index after the last face.
+    /// Returns the index after the last face or centre within the radius.
     fn end(&self) -> i64 {
         // Positions may be arbitrarily far away.
         self.first.saturating_add(self.count as i64)
     }
 
-    /// Returns the indices of the faces on a grid of `n` voxels.
+    /// Returns the indices of the faces or centres within the radius on a grid of `n` voxels.
     fn range(&self, n: usize) -> std::ops::Range<i64> {
         self.first.max(0)..self.end().min(n as i64)
     }
@@ -257,7 +263,8 @@ fn add<const N: usize>(to: &mut Lanes<N>, lanes: &Lanes<N>, factor: f32) {
     to.iter_mut().zip(lanes).for_each(|(to, lane)| *to += *lane * factor);
 }
 
-/// Sums over y in one plane of rows: weights times 1, y and y², weights times t, times 1 and y, and weights times t².
+/// Sums over the rows of one plane, by face along x: of the weights times 1, y and y², of the weights times t, times 1
+/// and y, and of the weights times t².
 struct RowSums<const N: usize> {
     plain: [Lanes<N>; 3],
     timed: [Lanes<N>; 2],
@@ -288,7 +295,7 @@ impl<const N: usize> RowSums<N> {
     }
 }
 
-/// Sums over the planes: those of [`RowSums`], and its sums with factors z and z².
+/// Sums over the planes along z: `rows` like [`RowSums`], and the others with factors z and z².
 struct PlaneSums<const N: usize> {
     rows: RowSums<N>,
     /// Weights times z, yz and zt.
@@ -321,7 +328,7 @@ impl<const N: usize> PlaneSums<N> {
         add(&mut self.z_sums[2], &rows.timed[0], theta * dz);
     }
 
-    /// Sums over x, and adds the results to `sums`.
+    /// Sums over x, with the factors of θ and the powers of x, and adds the results to `sums`.
     fn add_to(&self, sums: &mut Sums, x: &AxisWeights) {
         let theta = lanes::<N>(&x.weights);
         let mut away = [f32x8::ZERO; N];

@@ -12,14 +12,14 @@ use crate::remesh::{EdgeBounds, remesh};
 /// Target edge length of the first frame's mesh, in the shortest side of a voxel.
 const EDGE: f64 = 1.2;
 
-/// Factor between the target edge and its bounds, to either side.
+/// Factor by which the longest edge of the first frame's mesh may exceed the target, and the shortest fall below it.
 const EDGE_BOUND_RATIO: f32 = 1.5;
 
 /// Smallest mean edge of a caller's mesh, in the shortest side of a voxel. Its resolution is kept: with shorter edges,
 /// a surface as large as the image would have more triangles than fit into memory.
 const MIN_EDGE: f64 = 0.1;
 
-/// Validates the caller's mesh, and returns it unchanged.
+/// Validates the caller's mesh, and converts it to a [`Mesh`] with the same vertices.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
@@ -69,7 +69,8 @@ impl SurfaceTracker {
         Ok(())
     }
 
-    /// Returns the component to be tracked. Components with negative volume are cavities of others, and are skipped.
+    /// Returns the component to be tracked, as the option `component` selects. Components with negative volume are
+    /// cavities of others, and are skipped.
     fn tracked_component(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
         let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
         let solids = with_volume.filter(|(volume, _)| *volume > 0.0);

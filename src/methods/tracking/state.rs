@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLTRK\x01";
 
-/// The saved state: everything of a run but its image.
+/// The saved state: everything of a run but its input and what is computed again.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -29,7 +29,7 @@ struct State {
 }
 
 impl SurfaceTracker {
-    /// Serialises the run, without the image.
+    /// Serialises the run, without its input: the image, the box, the component and the start.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
         encode(

@@ -5,13 +5,13 @@ use super::region::Region;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
 
-/// Marks a window without a boundary; quantised intensities are lower.
+/// The level of a window without a boundary; quantised intensities are lower.
 const NONE: u8 = u8::MAX;
 
 /// Faces that are counted at once in one vector.
 const LANES: usize = u8x16::LANES as usize;
 
-/// Smallest share of its window that a cluster must exceed.
+/// Share of the voxels of a window that each cluster must exceed.
 const MIN_SHARE: f64 = 0.1;
 
 /// Maximum number of Lloyd iterations; two to five are usual.
@@ -30,7 +30,7 @@ pub(super) struct Window {
     pub cyclic: bool,
 }
 
-/// Directions in which two voxels share a face: indices into [`Faces`].
+/// Directions in which two voxels share a face, X, Y, Z and TIME: indices into [`Faces`].
 pub(super) const X: usize = 0;
 pub(super) const Y: usize = 1;
 pub(super) const Z: usize = 2;
@@ -41,14 +41,14 @@ pub(super) const TIME: usize = 3;
 pub(super) struct Face {
     /// Index of the voxel before the face; the other one is next along the direction.
     pub voxel: u32,
-    /// Votes as a share of the windows that contain both voxels, above 0.
+    /// Votes as a share of the windows that contain both voxels, above 0; 1 in the sides of the box.
     pub weight: f32,
 }
 
 /// Faces of one frame by direction; those along time are between it and the next frame.
 pub(super) type Faces = [Vec<Face>; 4];
 
-/// Finds the levels and the boundary votes of a sequence, frame by frame.
+/// Finds, frame by frame, the level between bright and dark in each window of a sequence, and the boundary votes.
 #[derive(Clone, Debug)]
 pub(super) struct BoundaryVoting {
     window: Window,
@@ -64,7 +64,7 @@ impl BoundaryVoting {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
-    /// Returns the faces of a frame that have votes, within the box and in its sides. Frames are processed in order.
+    /// Returns the faces of a frame that have votes, within the box, and those in its sides that cut bright regions.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
         let frames = self.window.frames_around(frame, region.frames.len());
         frames.iter().for_each(|&t| self.ensure_levels(region, t));
@@ -106,7 +106,7 @@ impl BoundaryVoting {
         (level != NONE).then_some(level)
     }
 
-    /// Computes the level of each window with its centre in a frame.
+    /// Computes the level of each window with its centre in a frame, in padded rows (see [`Rows`]).
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
         let frames: Vec<&[u8]> = self
@@ -134,8 +134,8 @@ impl BoundaryVoting {
         out
     }
 
-    /// Returns the level that separates the clusters of a window: voxels up to it are in the lower one. [`NONE`] if the
-    /// clusters do not pass.
+    /// Returns the level that separates the clusters of a window: voxels up to it are in the lower one. [`NONE`] if a
+    /// cluster is too small, or their means differ by too little.
     fn level(&mut self, counts: &Histogram) -> u8 {
         let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
         let enough = MIN_SHARE * f64::from(low.count + high.count);
@@ -150,8 +150,8 @@ impl BoundaryVoting {
         ((low.mean() + high.mean()) / 2.0) as u8
     }
 
-    /// Counts votes for the faces between the voxels of `frame` and the next ones along a direction, which are in the
-    /// frame `other` for faces along time. The windows with centres in the frames `frames` vote.
+    /// Returns the faces that have votes between the voxels of `frame` and the next ones along a direction, which are
+    /// in the frame `other` for faces along time. The windows with centres in the frames `frames` vote.
     fn votes(
         &self,
         region: &Region,
@@ -187,7 +187,7 @@ impl BoundaryVoting {
     }
 }
 
-/// Pairs of neighbouring voxels: the lower intensity of each pair, and the difference.
+/// Pairs of neighbouring voxels: the lower intensity of each pair, and the absolute difference.
 struct Pairs {
     low: [u8; LANES],
     span: [u8; LANES],
@@ -246,7 +246,7 @@ impl VotingWindows<'_> {
 }
 
 impl Window {
-    /// Returns the frames within a window's extent in time around a frame, with `count` frames in total.
+    /// Returns the frames within a window's extent in time around a frame of a sequence of `count` frames.
     fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
         let half_width = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
@@ -335,8 +335,8 @@ impl Histogram {
         cluster
     }
 
-    /// Splits the histogram into two clusters by Lloyd iterations from its lowest and highest intensity; `None` if
-    /// those differ by no more than `threshold`.
+    /// Splits the histogram into two clusters, the lower first, by Lloyd iterations from its lowest and highest
+    /// intensity; `None` if these two differ by no more than `threshold`.
     fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
         let least = self.0.iter().position(|&count| count > 0)?;
         let greatest = self.0.iter().rposition(|&count| count > 0)?;
@@ -366,8 +366,8 @@ impl Histogram {
     }
 }
 
-/// Histograms of the slabs at each x, of the voxels within a window's reach of (y, z) in several frames. A window is
-/// the sum of consecutive slabs.
+/// For each x, a histogram of the voxels at this x within a window's half-width of a row (y, z), in several frames. A
+/// window is the sum of consecutive slabs.
 struct Slabs<'a> {
     dims: [usize; 3],
     half_width: usize,
@@ -381,7 +381,7 @@ impl<'a> Slabs<'a> {
         Self { dims, half_width, frames, at: None, counts: vec![Histogram::default(); dims[0]] }
     }
 
-    /// Moves the slabs to a row; incrementally if it follows the current one.
+    /// Moves the slabs to the row (y, z); incrementally if it follows the current one.
     fn move_to_row(&mut self, y: usize, z: usize) {
         let ny = self.dims[1];
         if y > 0 && self.at == Some((y - 1, z)) {
@@ -400,7 +400,7 @@ impl<'a> Slabs<'a> {
         self.at = Some((y, z));
     }
 
-    /// Changes the counts of all voxels in row y of the slices within reach of z.
+    /// Applies `change` to the counts of all voxels in row y of the slices within the half-width of z.
     fn update_row(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
         let [nx, ny, nz] = self.dims;
         for z in z.saturating_sub(self.half_width)..(z + self.half_width + 1).min(nz) {
@@ -413,7 +413,7 @@ impl<'a> Slabs<'a> {
         }
     }
 
-    /// Adds the slab at `x` to the histogram of a sliding window, and subtracts the one that leaves it.
+    /// Adds the slab at `x` to the histogram of a sliding window, and subtracts the one that leaves the window.
     fn slide(&self, window: &mut Histogram, x: usize) {
         if let Some(counts) = self.counts.get(x) {
             window.add(counts);

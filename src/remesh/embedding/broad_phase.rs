@@ -7,12 +7,13 @@ use crate::math::Bounds;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
-/// The whole mesh is swept if at least one in this many vertices has to be searched around; otherwise only those
-/// vertices are. Tuned by timing.
+/// The whole mesh is swept if at least one in this many vertices has to be searched around; otherwise the grid is
+/// queried around those vertices only. Tuned by timing.
 const MANY: usize = 8;
 
 impl Embedding {
-    /// Updates the positions of dirty vertices in the grid, and the pairs of those whose skin is used up.
+    /// Measures the longest edges of dirty vertices, and updates grid positions and pairs of those whose skin is used
+    /// up.
     pub(super) fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let is_entered = self.entered == Some(mesh.geometry_version());
         let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
@@ -46,7 +47,7 @@ impl Embedding {
         self.pending[v.index()].has(Check::Search)
     }
 
-    /// Finds pairs by a sweep over the whole mesh.
+    /// Finds the pairs with a vertex to be searched around, by a sweep over the whole mesh.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let proximity = self.proximity();
         let balls = mesh.vertices().map(|v| self.grid.ball(v)).collect();
@@ -57,7 +58,8 @@ impl Embedding {
         });
     }
 
-    /// Finds pairs by grid queries around vertices, those of one cell together.
+    /// Finds the pairs of the `dirty` vertices to be searched around, by grid queries, one for all those in the same
+    /// cell.
     pub(super) fn search(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let proximity = self.proximity();
         let searched = dirty.iter().filter(|&&v| self.is_searched_around(v));
@@ -88,7 +90,7 @@ impl Embedding {
         }
     }
 
-    /// Stores a pair, unless its vertices are identical or adjacent.
+    /// Stores a pair at both of its vertices, unless these are identical or adjacent, and whether the two may touch.
     fn add_pair(&mut self, mesh: &Mesh, a: &VertexBall, b: &VertexBall, proximity: Proximity) {
         if a.vertex == b.vertex || mesh.ring(a.vertex).contains(b.vertex) {
             return;
@@ -106,12 +108,13 @@ impl Embedding {
         }
     }
 
-    /// Returns the position of `w` among the vertices near `v`.
+    /// Returns the index of `w` in the list of vertices found near `v`.
     pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
         self.nearby[v.index()].iter().position(|near| near.vertex == w)
     }
 
-    /// Returns the distance below which two vertices can intersect or touch before either is searched around again.
+    /// Returns the distance between two vertices below which their triangles can intersect, or the two touch, before
+    /// either is searched around again.
     fn proximity(&self) -> Proximity {
         // Distance and edges change by twice the skin at most.
         let change = 2.0 * (SEARCH_SKIN * self.ordinary_edge + self.exact_below());
@@ -122,7 +125,7 @@ impl Embedding {
         }
     }
 
-    /// Returns the vertices in a box, sorted.
+    /// Returns the vertices inside a box, sorted.
     pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
         self.sync(mesh);
         let mut found = Vec::new();
@@ -138,8 +141,8 @@ impl Embedding {
     }
 
     /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and the squared
-    /// distance. `distance` must not exceed the contact distance of the sampling whose longest edge is the ordinary
-    /// edge.
+    /// distance; to be called after [`Self::sync`]. `distance` must be at most 1/√3 of the ordinary edge: the contact
+    /// distance of a sampling whose longest edge is the ordinary edge.
     pub fn for_each_contact(
         &self,
         mesh: &Mesh,

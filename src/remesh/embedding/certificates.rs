@@ -29,24 +29,24 @@ const ROUNDING: f32 = 4e-7;
 /// certificates are discarded.
 const MAX_ODOMETER: f32 = 500.0;
 
-/// The odometers, and the certificates of all pairs of adjacent one-rings. Those of non-adjacent pairs are stored with
-/// the pairs.
+/// The odometers of all vertices, and the certificates of all pairs of adjacent one-rings. Those of non-adjacent pairs
+/// are stored with the pairs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Certificates {
     edge: f32,
-    /// The odometer of each vertex: the accumulated displacement of its one-ring, increased further by edits that
-    /// change it.
+    /// The odometer of each vertex: the sum of the largest displacements in its one-ring, increased further by edits
+    /// that change it.
     odometer: Vec<f32>,
     /// The odometer reading up to which the one-ring of each vertex itself is certified.
     own: Vec<f32>,
-    /// The sum of both readings up to which a pair of adjacent vertices is certified, by vertex and position in its
-    /// ring.
+    /// The sum of both odometers up to which a pair of adjacent vertices is certified, by vertex and position of the
+    /// other in its ring.
     along_edges: Vec<SmallVec<[f32; ORDINARY]>>,
     worn: bool,
 }
 
 impl Certificates {
-    /// Discards all certificates and resets the odometers.
+    /// Discards all certificates and resets the odometers; `edge` is the ordinary edge, to which limits are relative.
     pub(super) fn begin(&mut self, edge: f32, slots: usize) {
         *self = Self { edge, ..Self::default() };
         self.resize(slots);
@@ -63,7 +63,7 @@ impl Certificates {
         self.worn
     }
 
-    /// Advances the odometer of a vertex by the displacement of its one-ring.
+    /// Advances the odometer of a vertex by the largest displacement in its one-ring.
     pub(super) fn advance(&mut self, v: VertexId, displacement: f32) {
         let odometer = &mut self.odometer[v.index()];
         *odometer = (*odometer + displacement).next_up();
@@ -77,7 +77,7 @@ impl Certificates {
         self.advance(v, 2.0 * MAX_CLEARANCE * self.edge);
     }
 
-    /// Prepares for tests of a vertex with the given valence; if `anew`, its certificates are discarded.
+    /// Makes room for the certificates of a vertex with the given valence before its tests; if `anew`, discards them.
     pub(super) fn prepare(&mut self, v: VertexId, valence: usize, anew: bool) {
         let along_edges = &mut self.along_edges[v.index()];
         if anew || along_edges.len() != valence {
@@ -94,14 +94,14 @@ impl Certificates {
         self.odometer[v.index()] + self.odometer[w.index()]
     }
 
-    /// Returns the remainder for each vertex of a certificate that is valid up to a sum of readings, if it is large
-    /// enough to be reused.
+    /// Returns the displacement that remains for each vertex of a pair certified up to the odometer sum `until`; `None`
+    /// if it is too small to reuse the certificate.
     pub(super) fn left(&self, pair: [VertexId; 2], until: f32) -> Option<f32> {
         let left = 0.5 * (until - self.sum(pair));
         (left > WORTH * self.edge).then_some(left)
     }
 
-    /// Returns the sum of readings up to which a clearance certifies a pair.
+    /// Returns the odometer sum up to which a clearance found by a test certifies a pair.
     pub(super) fn until(&self, pair: [VertexId; 2], clearance: f32) -> f32 {
         let sum = self.sum(pair);
         let until = (sum + 2.0 * lower(MAX_CLEARANCE * self.edge, clearance)) * (1.0 - ROUNDING);
@@ -109,7 +109,8 @@ impl Certificates {
         if until < f32::INFINITY { until } else { 0.0 }
     }
 
-    /// Returns the remainder of the certificate of a one-ring itself.
+    /// Returns the displacement that remains by the certificate of the one-ring of `v` itself; `None` if it is too
+    /// small.
     pub(super) fn left_of_own(&self, v: VertexId) -> Option<f32> {
         self.left([v, v], 2.0 * self.own[v.index()])
     }
@@ -118,12 +119,13 @@ impl Certificates {
         self.own[v.index()] = 0.5 * self.until([v, v], clearance);
     }
 
-    /// Returns the remainder of the certificate of a vertex and the neighbour at a position in its ring.
+    /// Returns the displacement that remains by the certificate of a vertex and its neighbour at `position` in its
+    /// ring; `None` if it is too small.
     pub(super) fn left_along(&self, pair: [VertexId; 2], position: usize) -> Option<f32> {
         self.left(pair, *self.along_edges[pair[0].index()].get(position)?)
     }
 
-    /// Sets the certificate of a pair of adjacent vertices at one of them, by the position of the other in its ring.
+    /// Stores at `v` the odometer sum up to which it and its neighbour at `position` in its ring are certified.
     pub(super) fn set_along(&mut self, v: VertexId, position: usize, until: f32) {
         if let Some(own) = self.along_edges[v.index()].get_mut(position) {
             *own = until;

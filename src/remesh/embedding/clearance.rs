@@ -9,8 +9,8 @@ use crate::mesh::{Mesh, VertexId};
 use smallvec::SmallVec;
 use wide::f32x4;
 
-/// The smallest squared length of the cross product of two edges that has a reliable direction, with edges relative to
-/// the longest.
+/// The squared length, with edges relative to the longest, above which the cross product of two edges has a reliable
+/// direction.
 const SHORTEST: f32 = 1e-30;
 
 type Triangle = [Vec3; 3];
@@ -80,8 +80,8 @@ pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     clearance
 }
 
-/// Returns the clearance from folding onto each other of two triangles with the given tips that share the edge from the
-/// origin to `edge`.
+/// Returns the clearance of two triangles that share the edge from the origin to `edge` and have the third corners
+/// `tips`: the displacement of all vertices below which the two cannot fold onto each other.
 fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
@@ -151,7 +151,8 @@ impl Vectors {
         x * f32x4::splat(p.x) + y * f32x4::splat(p.y) + z * f32x4::splat(p.z)
     }
 
-    /// Returns the gap between the projections of two triangles onto each of the four vectors.
+    /// Returns the gap between the projections of two triangles onto each of the four vectors; negative if they
+    /// overlap.
     fn gaps(self, s: &Triangle, t: &Triangle) -> f32x4 {
         let ([a, b, c], [p, q, r]) = (s.map(|corner| self.dot(corner)), t.map(|corner| self.dot(corner)));
         let (low, high) = (lower_of(lower_of(a, b), c), higher_of(higher_of(a, b), c));
@@ -172,7 +173,7 @@ fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
 
 /// Returns whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal
 /// to one of its edges. Most triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is
-/// the longest distance between two of their corners.
+/// the extent of both together, which bounds the rounding error.
 pub(super) fn are_apart_in_plane(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
     is_beyond_edge(s, t, gap) || is_beyond_edge(t, s, gap)
@@ -203,8 +204,8 @@ fn gap_between_boxes(a: &Bounds, b: &Bounds) -> f32 {
     (b.min - a.max).max(a.min - b.max).max_element()
 }
 
-/// Returns the distance of the tips of two triangles, whose common corner is the origin, from a separating plane
-/// through it; not positive if none was found.
+/// Returns the smallest distance of the tips of two triangles, whose common corner is the origin, from a separating
+/// plane through it; not positive if none was found.
 ///
 /// If the tips of one triangle are mirrored at the origin, all four are on one side of the plane. Its normal is the
 /// mean of those of the faces of the cone around them.

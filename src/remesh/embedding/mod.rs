@@ -10,8 +10,9 @@
 //! Two triangles intersect in one of three configurations, each tested where it can occur:
 //! - they share a corner: in the one-ring of a vertex;
 //! - a corner of one is adjacent to a corner of the other: across an edge;
-//! - otherwise two non-adjacent corners are near each other. If an edge of length `a` with end P meets a triangle with edges up to `b`,
-//!   and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two ends.
+//! - otherwise two non-adjacent corners are near each other. If an edge of length `a` with end P meets a triangle with
+//!   edges up to `b`, and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two
+//!   ends.
 
 mod broad_phase;
 mod certificates;
@@ -47,11 +48,11 @@ const PIERCING: f32 = 0.763_763;
 /// more searches. Few vertices of an ordinary mesh have any pair.
 const SEARCH_SKIN: f32 = 0.04;
 
-/// The smallest length that is distinguished: squares of shorter lengths lose their digits to rounding. Edges and
-/// displacements count as at least this long, and a smaller clearance as none.
+/// The smallest length that is distinguished, in units of the mesh: squares of shorter lengths lose their digits to
+/// rounding. Edges and displacements count as at least this long, and a smaller clearance as none.
 const MIN_LENGTH: f32 = 1e-17;
 
-/// A non-adjacent vertex found near another, and the sum of both odometers up to which the pair is certified.
+/// A non-adjacent vertex found near another by the broad phase, and the odometer sum up to which the pair is certified.
 #[derive(Clone, Copy, Debug)]
 struct Nearby {
     vertex: VertexId,
@@ -66,13 +67,13 @@ pub struct Embedding {
     grid: VertexGrid,
     /// The ordinary edge: a length that most edges of the mesh do not exceed.
     ordinary_edge: f32,
-    /// The longest edge of each vertex, as last measured.
+    /// The longest edge at each vertex, as last measured, by slot.
     longest: Vec<f32>,
     /// The non-adjacent vertices that the broad phase found near each vertex.
     nearby: Vec<SmallVec<[Nearby; 4]>>,
     /// Whether a non-adjacent vertex may be within the contact distance, by vertex.
     may_touch: Vec<bool>,
-    /// The motion bounds of each vertex: the displacement of its one-ring up to the next test.
+    /// The remaining motion bounds of each vertex: the displacement of its one-ring up to the next test.
     motion_bounds: Vec<MotionBounds>,
     certificates: Certificates,
     /// The largest displacement in the one-ring of each vertex during a move; `touched` are the vertices where it is
@@ -115,9 +116,9 @@ impl Embedding {
         output::exact_below(self.output.as_ref())
     }
 
-    /// Synchronises with `mesh` as [`Self::sync`] does, and sets the ordinary edge: a length that most edges do not
-    /// exceed. It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are
-    /// found.
+    /// Synchronises with `mesh` after any changes, and sets the ordinary edge: a length that most edges do not exceed.
+    /// It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are found.
+    /// Unlike [`Self::sync`], it does not fill the cells of the grid.
     pub fn sync_with_edge(&mut self, mesh: &Mesh, edge: f32) {
         let edge = higher(MIN_LENGTH, edge);
         if self.ordinary_edge != edge {
@@ -127,7 +128,7 @@ impl Embedding {
         self.sync_without_cells(mesh);
     }
 
-    /// Synchronises with `mesh` after any changes.
+    /// Synchronises with `mesh` after any changes, and fills the cells of the grid.
     pub fn sync(&mut self, mesh: &Mesh) {
         self.sync_without_cells(mesh);
         self.grid.link_cells();
@@ -222,7 +223,7 @@ impl Embedding {
         self.check_all(mesh)
     }
 
-    /// Returns the total number of nearby vertices visited for edits: a measure of work, by which
+    /// Returns the total work of all edits so far, counted mainly in nearby vertices visited, by which
     /// [`Resolver`](super::Resolver) limits a call.
     pub fn effort(&self) -> u64 {
         self.effort
@@ -265,7 +266,7 @@ impl Embedding {
         count
     }
 
-    /// Resizes the arrays by vertex; new vertices are untested.
+    /// Resizes the arrays by vertex to a number of slots; new vertices are untested.
     fn resize_for(&mut self, slots: usize) {
         self.longest.resize(slots, 0.0);
         self.nearby.resize(slots, SmallVec::new());
@@ -274,7 +275,7 @@ impl Embedding {
         self.certificates.resize(slots);
     }
 
-    /// Measures the longest edge at `v`.
+    /// Measures and stores the longest edge at `v`.
     fn measure(&mut self, mesh: &Mesh, v: VertexId) {
         self.longest[v.index()] = longest_edge(mesh, v);
     }

@@ -16,7 +16,7 @@ impl Embedding {
         self.stuck && !self.is_embedded(mesh)
     }
 
-    /// Moves all vertices, as [`Self::move_some`] does.
+    /// Moves all vertices by `displacements`, as [`Self::move_some`] does.
     pub fn move_all(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.move_some(mesh, &all, displacements)
@@ -24,7 +24,7 @@ impl Embedding {
 
     /// Moves the vertices `moving` by `displacements`, given by slot; those whose triangles would intersect move by a
     /// quarter of it, or not at all. `displacements` is set to the displacements applied. Returns the vertices that
-    /// were held back, sorted, and the share of its displacement by which each moved.
+    /// were held back, sorted, and the share of its displacement by which each moved: 1/4 or 0.
     ///
     /// A mesh without self-intersections has none afterwards: in the worst case no vertex moves.
     pub fn move_some(
@@ -81,7 +81,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// An edit may create triangles near a vertex whose skin is not used up.
+    /// An edit may move triangles near a vertex whose skin is not used up.
     #[test]
     fn triangles_that_an_edit_puts_near_are_detected() {
         let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);

@@ -15,7 +15,7 @@ pub(super) enum Check {
     OneRing,
     /// Pairs of triangles, one at the vertex and one at a non-adjacent vertex near it.
     Nearby,
-    /// The search for non-adjacent vertices near the vertex.
+    /// The search for non-adjacent vertices near the vertex; followed by [`Check::Nearby`].
     Search,
 }
 
@@ -55,13 +55,13 @@ impl MotionBounds {
         self.0[check as usize] = clearance;
     }
 
-    /// Lowers a bound to `clearance` if it is higher.
+    /// Lowers the bound of one kind of check to `clearance` if it is higher.
     pub(super) fn lower(&mut self, check: Check, clearance: f32) {
         let own = &mut self.0[check as usize];
         *own = if *own < clearance { *own } else { clearance };
     }
 
-    /// Subtracts a displacement; an infinite one uses up all bounds.
+    /// Subtracts a displacement of the one-ring from all bounds; an infinite one uses them up.
     fn subtract(&mut self, displacement: f32) {
         self.0.iter_mut().for_each(|bound| {
             *bound = if displacement < f32::INFINITY { *bound - displacement } else { 0.0 }
@@ -105,7 +105,8 @@ impl Embedding {
         self.touched = touched;
     }
 
-    /// Marks vertices dirty that edits created or changed.
+    /// Marks dirty the vertices that edits created or changed since the last move, for the checks whose bounds are used
+    /// up.
     pub(super) fn mark_edited_dirty(&mut self, mesh: &Mesh) {
         let mut edited = std::mem::take(&mut self.edited);
         for v in edited.drain(..).filter(|&v| mesh.is_live(v)) {

@@ -189,7 +189,7 @@ impl Embedding {
         clearance > AMPLE * self.ordinary_edge
     }
 
-    /// Returns whether the pair `w`, `v` is tested from `w`, so that `v` can skip it.
+    /// Returns whether the pair `w`, `v` is tested from `w` in this check, so that `v` can skip it.
     pub(super) fn is_checked_from(&self, w: VertexId, v: VertexId, check: Check) -> bool {
         w < v && self.pending[w.index()].has(check)
     }
@@ -200,7 +200,7 @@ impl Embedding {
     }
 }
 
-/// Returns the edge across which `v` and `w` are opposite each other.
+/// Returns the edge across which `v` and `w` are opposite each other, if there is one.
 fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
     mesh.ring(v).pairs().find(|&(a, b)| mesh.ring(a).before(b) == Some(w)).map(|(a, b)| [a, b])
 }

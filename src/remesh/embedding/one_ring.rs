@@ -158,9 +158,9 @@ pub(super) fn plane_clearance(
     clearance_beside_line(gap, reach, square, longest)
 }
 
-/// Returns the clearance of vertices from a plane through two of them: `gap` is the smallest distance from it, beside
-/// points of the line through the two with |t| + |1 − t| up to `reach`, and `square` their squared distance. See
-/// [`plane_clearance`].
+/// Returns the clearance of vertices from a plane through two of them: `gap` is their smallest distance from it, beside
+/// points of the line through the two with |t| + |1 − t| up to `reach`, `square` the squared distance of the two, and
+/// `longest` the longest edge. See [`plane_clearance`].
 pub(super) fn clearance_beside_line(gap: f32, reach: f32, square: f32, longest: f32) -> f32 {
     let clearance = (LEFT_BY_TURN * gap - ROUNDING * longest) / (1.0 + reach);
     lower(clearance, TURN * square.sqrt())
@@ -253,7 +253,8 @@ pub(super) fn changes_intersect_around(
     })
 }
 
-/// Returns whether a plane through the common corner of two triangles is known to separate them by more than `margin`.
+/// Returns whether a plane through `corner`, the first corner of both triangles, is known to separate them, with their
+/// other corners further than `margin` from it.
 fn are_apart_at_corner(corner: Vec3, s: &Facet, t: &Facet, margin: f32) -> bool {
     let tips = |facet: &Facet| [facet.points[1] - corner, facet.points[2] - corner];
     gap_between_corners(tips(s), tips(t)) > margin

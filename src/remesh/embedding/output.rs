@@ -53,12 +53,13 @@ impl OutputSpace {
     }
 }
 
-/// Returns the clearance below which triangles are tested by exact predicates.
+/// Returns the clearance below which triangles are tested by exact predicates: the rounding of the output space, if
+/// there is one, but at least [`MIN_LENGTH`].
 pub(super) fn exact_below(output: Option<&OutputSpace>) -> f32 {
     output.map_or(MIN_LENGTH, |space| higher(MIN_LENGTH, space.rounding()))
 }
 
-/// Returns whether two triangles intersect, in the space of the mesh or in its output space.
+/// Returns whether two triangles intersect, in the space of the mesh or, if there is one, in its output space.
 pub(super) fn intersect(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> bool {
     facets_intersect(s, t) || output.is_some_and(|space| facets_intersect(&space.facet(s), &space.facet(t)))
 }

@@ -7,13 +7,14 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
-/// The largest number of triangles that an ordinary edit changes; larger edits count as more work.
+/// Number of changed triangles for which the work of an edit is counted twice, for double of it three times, and so on;
+/// most edits change fewer.
 const ORDINARY_PATCH: usize = 24;
 
-/// The work counted for an edit that is tested in one-rings only, in nearby vertices visited.
+/// The work counted for an edit that is tested in one-rings only, in units of nearby vertices visited.
 const UNSEARCHED: u64 = 30;
 
-/// A changed triangle and its bounding box.
+/// A triangle changed by an edit, or one tested against these, and its bounding box.
 type Changed = (Facet, Bounds);
 
 fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
@@ -33,13 +34,14 @@ impl Embedding {
             || self.intersect_others(mesh, &edited)
     }
 
-    /// Does the same as [`Self::changes_intersect`], for pairs of triangles with a common corner only.
+    /// Returns whether a triangle changed since [`Mesh::begin`] intersects another one with a common corner;
+    /// `triangles` are the changed ones, by their corners.
     pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         self.effort += UNSEARCHED;
         self.any_one_ring_intersects(mesh, triangles)
     }
 
-    /// Returns whether two triangles with a common corner intersect, at the corners of the changed triangles.
+    /// Returns whether a changed triangle intersects another one with a common corner.
     fn any_one_ring_intersects(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
         hubs.sort_unstable();
@@ -94,7 +96,7 @@ fn intersects_one(other: &Changed, edited: &[Changed], output: Option<&OutputSpa
     !edited.iter().any(same) && edited.iter().any(|changed| intersect_apart(other, changed, output))
 }
 
-/// Returns whether two triangles without a common corner intersect.
+/// Returns whether two triangles intersect and have no common corner.
 fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bool {
     s.1.overlaps(&t.1)
         && s.0.corners.iter().all(|v| !t.0.corners.contains(v))

@@ -4,7 +4,7 @@ use super::Embedding;
 use crate::math::Vec3;
 use crate::mesh::{DisjointSets, Mesh, VertexId};
 
-/// Displacements along the normals that are tried in turn, relative to the ordinary edge.
+/// Displacements along the outward normals that are tried in turn, relative to the ordinary edge.
 const OFFSETS: [f32; 8] = [-0.02, 0.02, -0.06, 0.06, -0.12, 0.12, -0.2, 0.2];
 
 /// Fractions of the displacement to the mean of the neighbours that are tried in turn.
@@ -13,7 +13,8 @@ const SHARES: [f32; 2] = [0.5, 1.0];
 /// The largest distance between neighbouring vertices of one cluster, relative to the ordinary edge.
 const CLUSTER_DISTANCE: f32 = 1.0;
 
-/// The largest number of corners of intersecting triangles: with more, moving a few vertices is no remedy.
+/// The largest number of corners of intersecting triangles for which [`Embedding::separate`] tries anything: with more,
+/// moving a few vertices is no remedy.
 const MAX_VERTICES: usize = 4000;
 
 /// Vertices, each with its displacement before scaling.
@@ -21,8 +22,8 @@ type Moves = Vec<(VertexId, Vec3)>;
 
 impl Embedding {
     /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other; used
-    /// at the start from a contour. Returns whether none intersect afterwards; if some do, other clusters may have been
-    /// changed.
+    /// for the start from a contour and for remeshing, after edits that were not fully tested. Returns whether none
+    /// intersect afterwards; if some do, other clusters may have been changed.
     ///
     /// `intersecting` must contain all corners of intersecting triangles, as returned by
     /// [`Self::intersecting_vertices`].
@@ -34,7 +35,8 @@ impl Embedding {
     }
 
     /// Separates one cluster: tries to move all its vertices along their normals, then those of one sheet, then
-    /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet.
+    /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet. Returns whether one
+    /// of these succeeded.
     fn separate_cluster(&mut self, mesh: &mut Mesh, cluster: &[VertexId]) -> bool {
         let normal = |v: VertexId| mesh.area_normal(v).normalize_or_zero() * self.ordinary_edge;
         let all: Moves = cluster.iter().map(|&v| (v, normal(v))).collect();
@@ -98,8 +100,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns two spheres that overlap by up to about a hundredth of an edge, and a torus inside the first one; a vertex of the first
-    /// sphere is displaced inwards as a spike.
+    /// Returns two spheres that overlap by up to about a hundredth of an edge, and a torus inside the first one; a
+    /// vertex of the first sphere is displaced inwards as a spike.
     fn overlapping(seed: u64) -> Mesh {
         let mut random = Random::new(seed);
         let overlap = 0.02 * random.unit() as f32;

@@ -7,15 +7,15 @@ use crate::mesh::{Mesh, VertexId};
 /// a hundred times finer than the bounds. Longer walks would only cost time on malformed meshes.
 const STEPS: usize = 200;
 
-/// A point inside a triangle is accepted at once if its squared distance is below this share of the squared distance to
-/// the corner: no other triangle around the corner is much nearer, except on rough surfaces.
+/// A point inside a triangle is accepted at once if its squared distance from the query point is below this share of
+/// that of the corner: no other triangle around the corner is much nearer, except on rough surfaces.
 const NEAR: f32 = 0.04;
 
 /// The squared sine of an angle below which only the edges of a triangle are tested: rounding makes barycentric
 /// coordinates meaningless there.
 const SLIVER: f32 = 1e-6;
 
-/// A closest point on the input surface.
+/// A closest point on the input surface, as returned by [`closest_point`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestPoint {
     /// The position of the point.
@@ -24,8 +24,8 @@ pub(super) struct ClosestPoint {
     pub anchor: VertexId,
 }
 
-/// Returns the closest point to `p` on the input surface, by descent from `anchor`: the closest one on the same sheet,
-/// whereas a search in space might find one on another.
+/// Returns the closest point to `p` on the input surface near `anchor`, by descent from there in at most 200 steps: the
+/// closest one on the same sheet, whereas a search in space might find one on another.
 pub(super) fn closest_point(surface: &Mesh, anchor: VertexId, p: Vec3) -> ClosestPoint {
     let mut best = ClosestPoint { point: surface.position(anchor), anchor };
     let mut least = f32::INFINITY;
@@ -43,8 +43,8 @@ pub(super) fn closest_point(surface: &Mesh, anchor: VertexId, p: Vec3) -> Closes
     best
 }
 
-/// Returns the closest point on the triangles around `centre`, anchored at its nearest corner, and the squared
-/// distance.
+/// Returns the closest point to `p` on the triangles around `centre`, anchored at its nearest corner, and the squared
+/// distance; `None` without triangles.
 fn closest_in_ring(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, ClosestPoint)> {
     let origin = surface.position(centre);
     let target = p - origin;
@@ -73,7 +73,7 @@ struct Barycentric {
 }
 
 impl Barycentric {
-    /// Returns the corner with the largest weight: 0 for the origin, 1 for A, 2 for B.
+    /// Returns the corner with the largest barycentric coordinate: 0 for the origin, 1 for A, 2 for B.
     fn nearest_corner(self) -> usize {
         let Self { a, b } = self;
         let rest = 1.0 - a - b;
@@ -121,7 +121,8 @@ fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Barycentric, bool) {
     (best.1, false)
 }
 
-/// Returns the parameter of a point projected onto a segment, in 0..=1, from dot products.
+/// Returns the parameter, in 0..=1, of the point of a segment closest to another point: `along` is the dot product of
+/// the offset of that point with the segment, `whole` the squared length of the segment.
 fn share(along: f32, whole: f32) -> f32 {
     if whole > 0.0 { (along / whole).clamp(0.0, 1.0) } else { 0.0 }
 }

@@ -24,12 +24,13 @@ impl<'a> ConflictMask<'a> {
         !self.marked.contains(&true)
     }
 
-    /// Returns the complement of the set, by slot.
+    /// Returns, by slot of the input surface, whether each vertex is not in the set, so that it may be edited.
     pub fn complement(&self) -> Vec<bool> {
         self.marked.iter().map(|marked| !marked).collect()
     }
 
-    /// Returns the set dilated by `reach` along the surface, by slot.
+    /// Returns, by slot of the input surface, whether each vertex is in the set or connected to it within a distance of
+    /// `reach`.
     pub fn dilated(&self, reach: f32) -> Vec<bool> {
         let mut wider = self.marked.clone();
         let is_marked = |v: VertexId| self.marked[v.index()];
@@ -41,14 +42,14 @@ impl<'a> ConflictMask<'a> {
         wider
     }
 
-    /// Adds the vertices near `position`, that of a corner of an intersecting triangle; `anchor` is a nearby vertex of the
-    /// input surface.
+    /// Adds the vertices within three target edges of `position`, that of a corner of an intersecting triangle;
+    /// `anchor` is a nearby vertex of the input surface.
     pub fn add(&mut self, anchor: VertexId, position: Vec3, target_edge: f32) {
         mark_around(self.surface, anchor, position, REACH * target_edge, &mut self.marked);
     }
 }
 
-/// Marks `seed` and the vertices connected to it within `reach` of `centre`.
+/// Marks `seed` and the vertices connected to it via vertices within `reach` of `centre`.
 fn mark_around(surface: &Mesh, seed: VertexId, centre: Vec3, reach: f32, marked: &mut [bool]) {
     let mut pending = vec![seed];
     let mut seen = BTreeSet::from([seed]);

@@ -3,11 +3,12 @@
 use crate::math::{Vec3, triangle};
 use smallvec::SmallVec;
 
-/// The squared cosine of the largest angle to the mean normal at which the triangles count as flat: they then cover the
-/// old ones, and the distance from their planes is at least that from the triangles themselves.
+/// The squared cosine of the largest angle to the mean normal at which the triangles count as flat. They then cover the
+/// old ones, and the largest distance of `from` from their planes is at least its distance from the triangles.
 const FLAT: f32 = 0.5;
 
-/// The triangles around `to` that replace those around `from`, and a bound on the distance of `from` from them.
+/// The triangles around `to` that replace those around `from` in a move or collapse, for the distance of `from` from
+/// them.
 pub(super) struct Fan {
     from: Vec3,
     to: Vec3,
@@ -29,7 +30,7 @@ impl Fan {
         normal
     }
 
-    /// Returns the distance of `from` from the triangles, or a slightly larger upper bound.
+    /// Returns the distance of `from` from the triangles, or, if they are nearly flat, an upper bound.
     pub fn gap(&self) -> f32 {
         let (sum, squared) = (self.sum, self.sum.length_squared());
         let mut most = 0.0;

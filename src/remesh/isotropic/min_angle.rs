@@ -13,7 +13,7 @@ const POOR: f32 = 0.2966;
 /// The largest number of passes over all poor triangles; most improvements are made in three.
 const ROUNDS: usize = 6;
 
-/// Step lengths tried, as fractions of the target edge, and the largest number of steps of a vertex.
+/// Step lengths tried in turn, as fractions of the target edge; a vertex makes at most `MOVES` steps.
 const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
 const MOVES: usize = 4;
 
@@ -52,7 +52,8 @@ pub(super) fn improve_angles<E: EditPolicy>(
     changes
 }
 
-/// Tries to improve the angles at `v`; `ring` contains its neighbours before the edits.
+/// Tries to improve the angles at `v` below 33°: by flips, then by a collapse of `v`, then by moves of it; `ring`
+/// contains its neighbours before the edits. Returns the changes made, without moves.
 fn improve_around<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -78,7 +79,8 @@ fn improve_around<E: EditPolicy>(
     changes
 }
 
-/// Flips an edge if that increases the smallest angle of its two triangles.
+/// Flips an edge if the smallest angle of its two triangles is below 33° and increases, and the flip is allowed;
+/// returns whether it was flipped.
 fn flip<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -103,7 +105,8 @@ fn flip<E: EditPolicy>(
         && session.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok()
 }
 
-/// Collapses `removed` into `kept` if that increases the smallest angle around it from `now`.
+/// Collapses `removed` into `kept` if that is allowed and gives all remaining triangles of `removed` a better
+/// [`angle_quality`] than `now`, the lowest around it; returns whether it was collapsed.
 fn collapse<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -123,7 +126,7 @@ fn collapse<E: EditPolicy>(
     done
 }
 
-/// Moves `v` along the surface in steps that increase the smallest angle around it.
+/// Moves `v` along the surface in up to four steps, each of which increases the smallest angle around it.
 fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, session: &mut Session<E>) {
     let mut step = 0;
     for _ in 0..MOVES {
@@ -138,7 +141,8 @@ fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, sessio
     }
 }
 
-/// Moves `v` by the best step of length `reach`, if it increases the smallest angle; returns whether it moved.
+/// Moves `v` by the best step of length `reach` parallel to one of its edges, if that increases the smallest angle
+/// around it; returns whether it moved.
 fn best_step<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,

@@ -28,31 +28,32 @@ use min_angle::improve_angles;
 use relax::relax;
 use session::Session;
 
-/// The number of rounds of restructuring, and of relaxation sweeps in each. One fewer of either leaves twice as many
-/// poor angles for the final optimisation; more cost more than they save.
+/// The largest number of rounds of restructuring, each followed by up to `SWEEPS` relaxation sweeps. One fewer of
+/// either leaves twice as many poor angles for the final optimisation; more cost more than they save.
 const ROUNDS: usize = 5;
 const SWEEPS: usize = 2;
 
-/// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With
-/// a smaller ratio, halves of long edges are too short. `MAX_NARROWING` is the largest factor by which wider bounds are
-/// narrowed.
+/// The ratio of the longest to the shortest edge allowed in rounds, by Botsch & Kobbelt: triangles with such edges have
+/// no angle below 33°. With a smaller ratio, halves of long edges are too short. To reach it, the requested bounds are
+/// narrowed by a factor of at most `MAX_NARROWING` each.
 const INNER_RATIO: f32 = 5.0 / 3.0;
 const MAX_NARROWING: f32 = 1.2;
 
-/// The largest number of runs with unchecked edits. Usually the second one has no intersections; after this many, all
-/// edits are checked.
+/// The largest number of runs with unchecked edits. Usually the second one has no intersections; if all have, a last
+/// run checks all edits.
 const UNCHECKED_RUNS: usize = 4;
 
-/// The index of the unsuccessful run after which the input is tested for self-intersections. The test takes longer than
-/// a run to long edges, and only an input that intersects itself fails often.
+/// The index, from 0, of the unchecked run after which, if it failed, the input is tested for self-intersections. The
+/// test takes longer than a run to long edges, and only an input that intersects itself fails often.
 const INPUT_TEST_RUN: usize = 1;
 
 /// Remeshes isotropically: brings edge lengths within bounds and valences near six, preserving shape, components and χ;
 /// returns the changes made. Vertices are renumbered.
 ///
-/// Edges become about √(min max) long. Vertices lie on the input surface, or within a fifth of an edge of it where sheets
-/// had to be separated. No self-intersections are added; if the input has some, edges may stay out of bounds. Attributes
-/// are blended by collapses and splits; moves do not change them.
+/// Edges become about √(min max) long. Vertices lie on the input surface, except for midpoints of edges split last, and
+/// for vertices moved to separate sheets, by up to a fifth of `max` along their normals or to the mean of their
+/// neighbours. No self-intersections are added; if the input has some, edges may stay out of bounds. Attributes are
+/// blended by collapses and splits; moves do not change them.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
@@ -134,14 +135,14 @@ fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Sess
     changes
 }
 
-/// Brings the last edges within bounds, and improves the worst angles.
+/// Brings the last edges within the requested bounds, and improves angles below 33°; returns the changes made.
 fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = pass(mesh, bounds, session);
     changes += improve_angles(mesh, bounds, session);
     changes
 }
 
-/// Does the same as [`restructure`](super::restructure()), with a limit on the number of vertices.
+/// Does one round of restructuring as [`restructure`](super::restructure()) does, with at most eight million vertices.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
     changes += split_long(mesh, bounds, MAX_VERTICES, session);

@@ -15,8 +15,8 @@ const SLACK: f32 = 0.04;
 pub(super) struct OneRing {
     /// The vector from the vertex to the area-weighted centroid of its triangles.
     pub to_centroid: Vec3,
-    /// Projects displacements approximately onto the planes of the triangles: onto a plane, onto a sharp edge, and to
-    /// nearly 0 at a corner.
+    /// Reduces displacements to their tangential part when applied twice: onto the plane of a flat one-ring, onto the
+    /// line of a sharp edge, and to nearly 0 at a corner.
     along: Mat3,
 }
 
@@ -48,7 +48,7 @@ impl OneRing {
         Some(Self { to_centroid: sum / (3.0 * area), along: stiff.inverse() })
     }
 
-    /// Returns the tangential component of a displacement.
+    /// Returns approximately the tangential component of a displacement.
     pub fn along(&self, displacement: Vec3) -> Vec3 {
         self.along * (self.along * displacement)
     }
@@ -82,16 +82,16 @@ fn angle_quality_fraction([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     [ab.cross(ca).length_squared() * least, x * y * z]
 }
 
-/// The result of moving a vertex, as computed by [`moved`].
+/// The result of moving a vertex without making the move, as computed by [`moved`].
 pub(super) struct Move {
-    /// The lowest [`angle_quality`] around it.
+    /// The lowest [`angle_quality`] of the triangles around the moved vertex.
     pub least_quality: f32,
-    /// The accumulated deviation from the input surface.
+    /// The deviation of the moved vertex from the input surface, accumulated over all moves.
     pub deviation: f32,
 }
 
-/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn over, an edge
-/// leave its bounds, or the surface deviate too far.
+/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn over or face
+/// inwards, an edge leave its bounds or get further out of them, or the surface deviate too far.
 pub(super) fn moved<E: EditPolicy>(
     mesh: &Mesh,
     v: VertexId,
@@ -121,12 +121,12 @@ pub(super) fn moved<E: EditPolicy>(
     Some(Move { least_quality, deviation: session.deviation_after(v, fan.gap())? })
 }
 
-/// Returns whether an edge out of bounds was nearer to them before; squared lengths.
+/// Returns whether an edge whose new length is out of bounds was within or nearer to them before; lengths are squared.
 fn leaves(new: f32, old: f32, shortest: f32) -> bool {
     if new < shortest { new < old } else { new > old }
 }
 
-/// Returns the lowest [`angle_quality`] around `v`.
+/// Returns the lowest [`angle_quality`] of the triangles around `v`.
 pub(super) fn min_quality(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let of = |(a, b)| angle_quality([p, mesh.position(a), mesh.position(b)]);

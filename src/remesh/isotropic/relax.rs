@@ -1,18 +1,19 @@
-//! Tangential relaxation: each vertex moves along the surface to the centroid of its triangles, then to the closest point on the input
-//! surface (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004).
+//! Tangential relaxation: each vertex moves along the surface to the centroid of its triangles, then to the closest
+//! point on the input surface (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004).
 
 use super::one_ring::{Move, OneRing, min_quality, moved};
 use super::session::Session;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The squared sine of 35°: moves may reduce angles that stay above it.
+/// The squared sine of 35°: a move may reduce the smallest angle around a vertex if that stays above it.
 const GOOD: f32 = 0.329;
 
-/// The shortest step that is made, as a fraction of the target edge; with a higher value angles stay smaller.
+/// The shortest step that a vertex makes, as a fraction of the target edge; with a higher value angles stay smaller.
 const SHORTEST_STEP: f32 = 0.02;
 
-/// Moves every vertex once, one after the other; returns the number of vertices moved.
+/// Moves each free vertex once along the surface to the centroid of its triangles, one after the other, unless the step
+/// is too short, is rejected by [`moved`] or makes a poor angle poorer; returns the number of vertices moved.
 pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
     let mut moves = 0;
     let shortest = SHORTEST_STEP * session.target_edge();

@@ -7,9 +7,9 @@ use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::remesh::EditPolicy;
 
-/// The largest deviation accumulated by collapses and moves, and the largest depth of a flip, as fractions of the
-/// target edge. Higher values shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces stay
-/// out of bounds.
+/// The largest deviation from the input surface that collapses and moves may accumulate at a vertex, as a fraction of
+/// the target edge; `FLIP_DEPTH` is the largest distance between the old and the new edge of a flip. Higher values
+/// shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces stay out of bounds.
 const MAX_DEVIATION: f32 = 0.25;
 const FLIP_DEPTH: f32 = 0.15;
 
@@ -23,16 +23,17 @@ pub(super) struct Session<'a, E> {
     anchors: Vec<VertexId>,
     /// Whether edits other than splits are allowed near a vertex of the input surface, by its slots.
     free: Vec<bool>,
-    /// An upper bound of the deviation from the input surface, by slot.
+    /// An upper bound of the deviation from the input surface at each vertex, by slot.
     deviation: Vec<f32>,
-    /// The deviation after the last collapse passed to `may_collapse`.
+    /// The deviation at the remaining vertex after the last collapse passed to `may_collapse`.
     pending_deviation: f32,
     target_edge: f32,
     edits: E,
 }
 
 impl<'a, E: EditPolicy> Session<'a, E> {
-    /// Starts a run on a copy of `surface`, to be remeshed to edges of about `target_edge`.
+    /// Starts a run on a copy of `surface`, to be remeshed to edges of about `target_edge`; only vertices near the
+    /// `free` ones of the input surface are moved, collapsed or flipped.
     pub fn new(surface: &'a Mesh, target_edge: f32, free: Vec<bool>, edits: E) -> Self {
         let slots = surface.slots();
         let anchors = (0..slots).map(VertexId::from_index).collect();
@@ -49,7 +50,7 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         }
     }
 
-    /// Continues this run with another edit policy and another set of free vertices.
+    /// Continues this run with another edit policy and other free vertices of the input surface.
     pub fn with<F>(self, free: Vec<bool>, edits: F) -> Session<'a, F> {
         let Self { surface, normals, anchors, deviation, pending_deviation, target_edge, .. } = self;
         Session { surface, normals, free, anchors, deviation, pending_deviation, target_edge, edits }
@@ -75,13 +76,15 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         closest_point(self.surface, self.anchors[v.index()], p)
     }
 
-    /// Returns whether a triangle with these corners and this normal faces out of the input surface.
+    /// Returns whether a triangle with these corners and this normal faces out of the input surface: the normal is
+    /// within 90° of that of the input surface near at least one corner.
     pub fn faces_outwards(&self, corners: [VertexId; 3], normal: Vec3) -> bool {
         let [u, v, w] = corners.map(|corner| self.normals[self.anchors[corner.index()].index()]);
         normal.dot(u) > 0.0 || normal.dot(v) > 0.0 || normal.dot(w) > 0.0
     }
 
-    /// Moves `v` to a point of the input surface, if the policy allows it; returns whether it was moved.
+    /// Moves `v` to a point of the input surface and stores its new deviation, if the policy allows it; returns whether
+    /// it was moved.
     pub fn move_to(&mut self, mesh: &mut Mesh, v: VertexId, closest: ClosestPoint, deviation: f32) -> bool {
         let moved = self.edits.attempt(mesh, |mesh| {
             mesh.set_position(v, closest.point);
@@ -94,8 +97,8 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         moved.is_ok()
     }
 
-    /// Returns the distance of `removed` from the surface after its collapse; `None` if a triangle would not face
-    /// outwards.
+    /// Returns the distance of `removed`, or an upper bound, from the surface after its collapse into `kept`; `None` if
+    /// a triangle would not face outwards.
     fn gap_without(&self, mesh: &Mesh, kept: VertexId, removed: VertexId) -> Option<f32> {
         let mut fan = Fan::new(mesh.position(removed), mesh.position(kept));
         for (a, b) in mesh.ring(removed).pairs().filter(|&(a, b)| a != kept && b != kept) {
@@ -106,13 +109,14 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         Some(fan.gap())
     }
 
-    /// Returns the deviation at `v` increased by `gap`; `None` if it exceeds the limit.
+    /// Returns the accumulated deviation at `v` increased by `gap`; `None` if it exceeds [`MAX_DEVIATION`].
     pub fn deviation_after(&self, v: VertexId, gap: f32) -> Option<f32> {
         let deviation = self.deviation[v.index()] + gap;
         (deviation <= MAX_DEVIATION * self.target_edge).then_some(deviation)
     }
 
-    /// Renumbers the mesh in memory order along its surface, together with the arrays by slot.
+    /// Renumbers the mesh so that vertices near each other on its surface are near in memory, together with the arrays
+    /// by slot.
     pub fn reorder(&mut self, mesh: &mut Mesh) {
         let new_ids = mesh.reorder();
         let (mut anchors, mut deviation) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);

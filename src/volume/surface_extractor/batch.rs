@@ -2,7 +2,7 @@
 
 use crate::math::DVec3;
 
-/// Points, and the function values of the first of them.
+/// Points to be evaluated, and the function values of those evaluated so far, from the first on.
 #[derive(Default)]
 pub(super) struct Batch {
     points: Vec<DVec3>,
@@ -20,7 +20,7 @@ impl Batch {
         self.points.extend(points);
     }
 
-    /// Evaluates `f` at the next points, at most `most`; returns their number.
+    /// Evaluates `f` at the next points of the batch, at most `most` of them; returns how many were evaluated.
     pub fn evaluate(&mut self, most: usize, f: &mut dyn FnMut(&[DVec3], &mut [f64])) -> usize {
         let done = self.values.len();
         let count = most.min(self.points.len() - done);
@@ -32,7 +32,7 @@ impl Batch {
         count
     }
 
-    /// Returns the share of points that are evaluated.
+    /// Returns the share of the points of the batch that are evaluated; 0 if it is empty.
     pub fn progress(&self) -> f64 {
         if self.points.is_empty() { 0.0 } else { self.values.len() as f64 / self.points.len() as f64 }
     }

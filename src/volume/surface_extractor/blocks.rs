@@ -7,7 +7,7 @@
 use super::super::cube_cases::corner;
 use super::super::error::{VolumeError, reserve};
 
-/// A node of the padded lattice.
+/// The indices of a node of the padded lattice.
 pub(super) type Node = [usize; 3];
 
 /// Nodes along the side of a block. If it is smaller, the table of blocks grows; if larger, more of each block lies off
@@ -26,7 +26,7 @@ const UNKNOWN: f64 = f64::NAN;
 /// Value of a node in the padding, and of one where the function is NaN.
 const OUTSIDE: f64 = f64::NEG_INFINITY;
 
-/// Returns whether a node with this value is inside the surface.
+/// Returns whether a node with this value is inside the surface: 0 and above is.
 pub(super) fn is_inside(value: f64) -> bool {
     value >= 0.0
 }
@@ -57,9 +57,9 @@ fn local(node: Node) -> usize {
 pub(super) struct Blocks {
     /// Number of nodes of the padded lattice along each axis.
     nodes: [usize; 3],
-    /// Number of blocks that cover them, along each axis.
+    /// Number of blocks that cover the padded lattice, along each axis.
     dims: [usize; 3],
-    /// Index of the block at each block position, or [`ABSENT`].
+    /// Index of the block at each block position, x fastest, then y, z, or [`ABSENT`].
     table: Vec<u32>,
     /// The first node of each block.
     origins: Vec<[u16; 3]>,
@@ -69,7 +69,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Creates empty storage for a lattice of `dims` nodes, which is padded here.
+    /// Creates empty storage for a lattice of `dims` nodes and one layer of padding around it.
     pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
         let nodes = dims.map(|n| n + 2);
         let dims = nodes.map(|n| n.div_ceil(SIDE));
@@ -79,7 +79,7 @@ impl Blocks {
         Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), visited: Vec::new() })
     }
 
-    /// Returns the bytes allocated.
+    /// Returns the size of the stored data in bytes, without spare capacity.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.table[..])
             + size_of_val(&self.origins[..])
@@ -87,7 +87,7 @@ impl Blocks {
             + size_of_val(&self.visited[..])
     }
 
-    /// Returns the number of slots.
+    /// Returns the number of slots: 512 for each allocated block.
     pub fn slots(&self) -> usize {
         self.values.len()
     }
@@ -187,7 +187,7 @@ impl Blocks {
         self.value(slot).is_nan()
     }
 
-    /// Sets the value at a node; NaN counts as outside.
+    /// Sets the value at a node; NaN is stored as [`OUTSIDE`].
     pub fn set(&mut self, slot: u32, value: f64) {
         self.values[slot as usize] = nan_to_outside(value);
     }

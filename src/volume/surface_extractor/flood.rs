@@ -26,9 +26,9 @@ pub(super) struct CrossedCell {
 pub(super) struct Flood {
     /// Cells of seeds added since the last wave.
     seeds: Vec<Node>,
-    /// Visited cells of seeds whose neighbours are queued if no surface is found near them.
+    /// Visited cells of seeds whose neighbours are queued, too, if the queue ends before a surface is found near them.
     unresolved_seeds: Vec<u32>,
-    /// Cells of the next wave.
+    /// Cells to visit in the next wave.
     queue: Vec<u32>,
     /// Unprocessed cells of the current wave.
     wave: Vec<u32>,
@@ -39,7 +39,7 @@ pub(super) struct Flood {
 }
 
 impl Flood {
-    /// Adds a seed cell; its neighbours are visited, too, if no surface is found near it.
+    /// Adds a seed cell; its neighbours are visited, too, if no surface is found in or next to it.
     pub fn seed(&mut self, cell: Node) {
         self.seeds.push(cell);
     }
@@ -54,7 +54,8 @@ impl Flood {
         Ok(is_new)
     }
 
-    /// Fills `batch` with the points of the next wave, which may be none; returns false if no cell is left.
+    /// Fills `batch` with the corners of the cells of the next wave that are not evaluated yet, which may be none;
+    /// returns false if no cell is left.
     pub fn request(
         &mut self,
         blocks: &mut Blocks,
@@ -123,7 +124,7 @@ impl Flood {
         Ok(())
     }
 
-    /// Queues the neighbours of those seed cells near which no surface was found.
+    /// Queues the neighbours of those seed cells in or next to which no surface was found.
     fn queue_seed_neighbours(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
         self.unresolved_seeds.sort_unstable();
         self.unresolved_seeds.dedup();
@@ -143,7 +144,7 @@ fn is_crossed(cell: Node, blocks: &Blocks) -> bool {
     slot != ABSENT && blocks.is_visited(slot) && !matches!(blocks.case(slot), 0 | 255)
 }
 
-/// Returns a cell and its neighbours, up to 27 within the padded lattice.
+/// Returns a cell and its neighbours within the padded lattice, up to 27 cells.
 fn around(cell: u32, blocks: &Blocks) -> Vec<Node> {
     let (cell, cells) = (blocks.node(cell), blocks.cells());
     let step = |k: usize, by: usize| (cell[k] + by).checked_sub(1).filter(|&at| at < cells[k]);

@@ -47,7 +47,7 @@ const MIN_EDGE: f64 = 1e-30;
 pub struct Lattice {
     /// World position of node (0, 0, 0).
     pub origin: DVec3,
-    /// Edge length of the cubes, in world units.
+    /// Edge length of the cubes, in world units, at least 1e-30.
     pub edge: f64,
     /// Number of nodes along x, y and z, 1 to 2048 each.
     pub dims: [usize; 3],
@@ -76,7 +76,8 @@ impl Lattice {
         Err(VolumeError::invalid("origin", problem))
     }
 
-    /// Returns the world position of a node of the padded lattice.
+    /// Returns the world position of a node of the padded lattice, whose node (1, 1, 1) is at the origin of the
+    /// lattice.
     fn position(&self, node: Node) -> DVec3 {
         DVec3::from(std::array::from_fn(|k| self.coordinate(k, node[k] as f64 - 1.0)))
     }
@@ -139,10 +140,10 @@ pub struct SurfaceExtractor {
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Refinement steps requested per vertex; `refine_steps_done` is the number performed.
+    /// Largest number of refinement steps of a vertex; `refine_steps_done` is the number performed.
     refine_steps: usize,
     refine_steps_done: usize,
-    /// The surface during and after refinement.
+    /// The surface during and after refinement; `None` before.
     surface: Option<Surface>,
     batch: Batch,
     task: Task,
@@ -346,7 +347,7 @@ impl SurfaceExtractor {
         self.evaluations
     }
 
-    /// Returns the bytes allocated for lattice values: in proportion to the surface area, plus 4 for each block of 8³
+    /// Returns the size of the lattice values in bytes: in proportion to the surface area, plus 4 for each block of 8³
     /// nodes of the lattice.
     pub fn bytes(&self) -> usize {
         self.blocks.bytes()

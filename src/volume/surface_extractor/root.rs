@@ -12,7 +12,7 @@ const CONVERGED: f64 = 1e-6;
 /// converge slowly from one side of it.
 const MAX_CURVATURE: f64 = 4.0;
 
-/// A sample on the edge: the position as a fraction of the edge, and the function value.
+/// A sample on a lattice edge: the position as a fraction of the edge, and the function value.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     at: f64,
@@ -45,7 +45,7 @@ impl Root {
         Self { inside, outside, before: inside }
     }
 
-    /// Returns the estimated position of the zero, where the function is evaluated next.
+    /// Returns the estimated position of the zero, as a fraction of the edge, where the function is evaluated next.
     pub fn estimate(&self) -> f64 {
         let Self { inside, outside, .. } = self;
         inside.at + self.share() * (outside.at - inside.at)
@@ -54,7 +54,7 @@ impl Root {
     /// Returns the zero of the parabola as a fraction of the way from the inside to the outside sample; one half if a
     /// value is infinite.
     ///
-    /// At fraction s, the parabola divided by the difference of the two values is height − s + bend s (s − 1).
+    /// At fraction s, the parabola divided by the difference of the two values is height − s + curvature s (s − 1).
     fn share(&self) -> f64 {
         let Self { inside, outside, before } = self;
         let fall = inside.value - outside.value;
@@ -80,12 +80,14 @@ impl Root {
         self.before = std::mem::replace(end, sample);
     }
 
-    /// Returns whether the root has converged: another evaluation would move it by a negligible amount.
+    /// Returns whether the root has converged: the estimate is within [`CONVERGED`] of an end of the bracket, so that
+    /// another evaluation would hardly move it.
     pub fn has_converged(&self) -> bool {
         [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= CONVERGED)
     }
 
-    /// Returns the estimate, kept [`MARGIN`] away from both ends of the edge: the vertex position on it.
+    /// Returns the position of the mesh vertex on the edge, as a fraction: the estimate, kept [`MARGIN`] away from both
+    /// ends.
     pub fn fraction(&self) -> f64 {
         let margin = f64::from(MARGIN);
         self.estimate().clamp(margin, 1.0 - margin)

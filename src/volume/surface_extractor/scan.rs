@@ -11,8 +11,8 @@ use super::batch::Batch;
 use super::blocks::{Blocks, Node, is_inside};
 use super::flood::Flood;
 
-/// Number of coarse nodes evaluated in one batch: limits memory, and is large enough for functions that are evaluated
-/// in batches.
+/// Largest number of coarse nodes evaluated in one batch: limits memory, and is large enough for functions that are
+/// evaluated in batches.
 const BATCH: usize = 4096;
 
 /// A straight line of lattice edges between two nodes, and whether its ends are inside.
@@ -41,7 +41,7 @@ impl Line {
         self.to == self.from[self.axis] + 1
     }
 
-    /// Returns a half with a missing component; one half has one if the line does.
+    /// Returns a half of the line with a missing component: one half has one if the line does.
     fn halved(&self, middle_inside: bool, blocks: &Blocks) -> Line {
         let middle = self.middle();
         let first = Line { to: middle[self.axis], inside: [self.inside[0], middle_inside], ..*self };
@@ -56,9 +56,9 @@ pub(super) struct Scan {
     axes: [Vec<usize>; 3],
     /// Whether each coarse node is inside, x fastest, then y, z.
     inside: Vec<bool>,
-    /// Number of coarse nodes that were evaluated or requested.
+    /// Number of coarse nodes that were evaluated or requested so far, in the order of `inside`.
     known: usize,
-    /// Coarse nodes of the current batch.
+    /// Indices of the coarse nodes in the current batch.
     requested: Vec<usize>,
     /// Index of the next line: axis + 3 × the coarse node where it starts.
     next_line: usize,
@@ -66,7 +66,7 @@ pub(super) struct Scan {
     line: Option<Line>,
     /// Whether a component was found in the current pass over all lines.
     found_in_pass: bool,
-    /// Number of components found so far.
+    /// Number of components of the surface found by the scan so far.
     pub components_found: usize,
 }
 
@@ -168,7 +168,7 @@ impl Scan {
         }
     }
 
-    /// Returns the line from a coarse node to the next one along an axis, if there is one.
+    /// Returns line number `number`, from a coarse node to the next one along an axis; `None` if the node is the last.
     fn line(&self, number: usize) -> Option<Line> {
         let (axis, coarse) = (number % 3, number / 3);
         let to = *self.axes[axis].get(self.index(coarse)[axis] + 1)?;

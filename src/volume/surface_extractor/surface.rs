@@ -12,7 +12,7 @@ use crate::mesh::TriangleMesh;
 
 const NONE: u32 = u32::MAX;
 
-/// Returns the cut edges that start at the cell's first node, one bit per axis.
+/// Returns which edges that start at the cell's first node, the one of lowest coordinates, are cut: one bit per axis.
 fn crossed_near_edges(case: u8) -> u8 {
     let far_ends = [corner([1, 0, 0]), corner([0, 1, 0]), corner([0, 0, 1])];
     (0..3).fold(0, |cuts, axis| cuts | ((case ^ case >> far_ends[axis]) & 1) << axis)
@@ -28,12 +28,13 @@ struct Vertex {
 /// The crossed cells and their vertices, both sorted by block, then node.
 pub(super) struct Surface {
     cells: Vec<CrossedCell>,
-    /// For each cell, the vertex on the first cut edge that starts at its first node; those on its other edges follow.
+    /// For each cell, the index of the vertex on the first cut edge that starts at its first node; those on its other
+    /// such edges follow.
     first: Vec<u32>,
     /// For each slot, the index of its cell in `cells`, or [`NONE`].
     index: Vec<u32>,
     vertices: Vec<Vertex>,
-    /// Vertices in the current refinement batch.
+    /// Indices of the vertices in the current refinement batch.
     requested: Vec<usize>,
 }
 
@@ -108,8 +109,8 @@ impl Surface {
         case.triangles.iter().filter_map(move |&[a, b, c]| Some([on_edge(a)?, on_edge(b)?, on_edge(c)?]))
     }
 
-    /// Returns the vertex on the cut edge from a node along an axis; `None` if the cell that starts there has not been
-    /// found yet.
+    /// Returns the index of the vertex on the cut edge from a node along an axis; `None` if the cell that starts at the
+    /// node has not been found yet.
     fn vertex(&self, slot: u32, axis: usize) -> Option<u32> {
         let at = *self.index.get(slot as usize)? as usize;
         let before = crossed_near_edges(self.cells.get(at)?.case) & ((1 << axis) - 1);
@@ -117,7 +118,7 @@ impl Surface {
     }
 }
 
-/// Returns the root on a cut edge, fixed at its middle if one end is in the padding.
+/// Returns the root finder of a cut edge; at its middle and converged if one end is in the padding.
 fn root(slot: u32, axis: usize, blocks: &Blocks) -> Root {
     let from = blocks.node(slot);
     let to = next(from, axis);

@@ -70,8 +70,8 @@ fn hash(seed: u64, p: DVec3) -> u64 {
     state
 }
 
-/// Returns noise whose zeros by linear interpolation between two nodes are identical in `f32` and `f64`; denser for a
-/// higher `share` of 16.
+/// Returns noise whose zeros by linear interpolation between two nodes are identical in `f32` and `f64`; on average,
+/// `share` of 16 nodes are inside.
 fn noise(seed: u64, share: u64) -> impl Fn(DVec3) -> f64 + Copy {
     move |p| {
         let hash = hash(seed, p);

@@ -19,7 +19,7 @@ export function drawSection({ id, title, measured, command, notes, charts }: Sec
   );
 }
 
-/** Verdicts as shown. */
+/** Displayed labels of the verdicts: whether a measurement meets its target, or was not measured. */
 export const VERDICTS = {
   met: text('bench.met'),
   'not met': text('bench.notMet'),
@@ -90,7 +90,7 @@ function drawBar(figure: Figure, bar: Bar, drawn: ChartLayout): HTMLElement {
   return row;
 }
 
-/** Draws the bar and the mark of its target; decorative, since the number beside it says the same. */
+/** Draws the bar and the mark of its target; hidden from screen readers, since the number beside it says the same. */
 function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayout): HTMLElement {
   const missed = meetsTarget(figure, bar) === false;
   const [from, to] = [Math.min(at(value), base), Math.max(at(value), base)];
@@ -104,7 +104,7 @@ function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayou
   return element;
 }
 
-/** Returns the target that applies to a bar; a target for one host is not shown on the others. */
+/** Returns the limit of a target, if the target applies to a bar; a target for one host is not shown on the others. */
 function limitFor(target: Target | undefined, { label }: Bar): number | undefined {
   return target && (!target.host || label.startsWith(target.host)) ? target.limit : undefined;
 }
@@ -124,7 +124,10 @@ function axis({ ticks, at }: ChartLayout): HTMLElement {
 
 const short = (value: number) => new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 3 }).format(value);
 
-/** Creates the table of a chart: a row per figure if all have the same hosts, else a row per bar. */
+/**
+ * Creates the table of a chart: a row per bar for a chart of kind `ratio`, else a row per figure with a column per
+ * host.
+ */
 function tableOf(section: string, chart: Chart): HTMLElement {
   const { title, kind } = chart;
   const [head, rows] = kind === 'ratio' ? listed(chart) : byHost(chart);

@@ -20,7 +20,7 @@ function targetsIn({ charts }: Section): Targeted[] {
   return charts.flatMap((chart) => chart.figures.filter(({ target }) => target).map((figure) => ({ chart, figure })));
 }
 
-/** Summarises all measurements with a target and their results. */
+/** Creates the summary table: each measurement with a target, the target, the verdict, and the worst value. */
 function summary(sections: Section[]): HTMLElement {
   const targets = sections.flatMap(targetsIn);
   const met = targets.filter(({ figure }) => verdict(figure) === 'met').length;
@@ -65,7 +65,7 @@ function summaryRow({ chart, figure }: Targeted): HTMLElement {
   return row;
 }
 
-/** Returns the value of the worst bar with a target. */
+/** Returns the worst value among the bars to which the target applies, with its host; a dash if none was measured. */
 function worstValue({ bars, target }: Figure, unit: string): string {
   const sign = target?.sense === 'least' ? -1 : 1;
   const judged = bars.filter(({ label, value }) => value !== undefined && label.startsWith(target?.host ?? ''));

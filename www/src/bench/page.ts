@@ -1,4 +1,4 @@
-/** Benchmarks of the app itself: start-up time, frame rate and memory. */
+/** Benchmarks of the app itself: start-up time, longest task, frame rate and memory. */
 import { text } from '../texts';
 import { count } from '../ui/format';
 import type { Report } from './report';

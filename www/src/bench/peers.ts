@@ -5,7 +5,10 @@ import type { PeerRow, Report, Side } from './report';
 import type { Section } from './sections';
 import { type Bar, type Figure, withUnit } from './targets';
 
-/** Short form of the notes at the head of bench/peers.py. */
+/**
+ * Notes displayed above the comparison: the meaning of the ratio (there are no targets), then a short form of the notes
+ * at the head of bench/peers.py.
+ */
 const NOTES = [
   text('bench.peersRatioNote'),
   text('bench.peersNativeNote'),
@@ -44,7 +47,7 @@ function barOf(row: PeerRow): Bar {
 const describeSide = ([whose, figure, ...rest]: string[]) =>
   `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
-/** Removes the post-release suffix of a version. */
+/** Removes the post-release suffix of a version, such as `.post1`. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');
 
 function figureOf({ unit }: PeerRow, { figure }: Side): string {
@@ -52,7 +55,10 @@ function figureOf({ unit }: PeerRow, { figure }: Side): string {
   return withUnit(figure, unit);
 }
 
-/** Returns the results that show how far the two runs are comparable. */
+/**
+ * Describes the result of one side, such as its number of triangles and its volume, so that the reader can judge how
+ * comparable the two sides are.
+ */
 function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string[] {
   if (refused) return [text('bench.notClosedSurface')];
   const words = [];

@@ -9,7 +9,9 @@ export interface Report {
   steps?: (Host & { rows: StepRow[] })[];
   head?: (Host & HeadFigures)[];
   phantom?: (Host & HeadFigures)[];
-  /** `load` is the load of the machine at the start of the measurement. */
+  /**
+   * `load` is the load average of the machine (over one minute) before the measurement; `cores` its number of cores.
+   */
   peers?: { bestOf: number; load?: number; cores?: number; rows: PeerRow[] };
   page?: Host & PageFigures;
 }
@@ -96,7 +98,7 @@ export interface PageFigures {
   memory: { heap: number; arrays: number; wasm?: number; gpu: number };
 }
 
-/** Measurement of one side in the row's unit, and its result. */
+/** Measurement of this library or of the other software, in the row's unit, with facts about the result. */
 export interface Side {
   figure: number;
   vertices?: number;
@@ -115,7 +117,7 @@ export interface PeerRow {
   version?: string;
   ours: Side & Host;
   theirs?: Side & { what: string };
-  /** Ratio of this library's figure to the other's. */
+  /** Ratio of this library's figure to the other's: below 1, this library takes less time. */
   ratio?: number;
   /** Reason why there is no measurement of the other software. */
   skipped?: string;

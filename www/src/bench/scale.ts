@@ -1,14 +1,17 @@
 /** Scale of a chart's axis, mapping values to 0 at its left end and 1 at its right. */
 export interface Scale {
   at: (value: number) => number;
-  /** Position at which bars start. */
+  /** Position, 0 to 1, at which bars start: that of the value 1 for ratios, else the left end. */
   base: number;
   ticks: number[];
 }
 
 export type Kind = 'linear' | 'log' | 'ratio';
 
-/** Returns a scale that contains all values: linear from 0, logarithmic, or logarithmic on both sides of 1. */
+/**
+ * Returns a scale that contains all finite values: from 0 (`linear`), between powers of ten (`log`), or logarithmic
+ * with bars that start at 1 (`ratio`). Logarithmic scales ignore values that are not above 0.
+ */
 export function scaleOf(kind: Kind, values: number[]): Scale {
   const good = values.filter((value) => Number.isFinite(value) && (kind === 'linear' || value > 0));
   if (kind === 'linear') return linear(Math.max(...good, 0));

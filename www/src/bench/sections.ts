@@ -1,4 +1,4 @@
-/** Selects the measurements of the report that are drawn, with their units and targets. */
+/** Selects the measurements of the report that the benchmark page draws, with their units and targets. */
 import { plural, text } from '../texts';
 import { count } from '../ui/format';
 import { pageSection } from './page';
@@ -20,7 +20,7 @@ export interface Section {
   /** Description of the measurement in one sentence. */
   measured: string;
   command: string;
-  /** Notes to read before the figures. */
+  /** Notes displayed above the charts. */
   notes: string[];
   charts: Chart[];
 }
@@ -50,7 +50,7 @@ function figure<T extends Host>(name: string, hosts: T[], value: (host: T) => nu
   return { name, bars: hosts.map((host): Bar => ({ label: shortHost(host.host), value: value(host) })), target };
 }
 
-/** Returns a figure for each row that the hosts have in common, by index. */
+/** Returns a figure for each row of the first host, with a bar for each host's row of the same index. */
 function figuresOfRows<Row>(
   hosts: (Host & { rows: Row[] })[],
   name: (row: Row) => string,
@@ -139,7 +139,10 @@ function spread(rows: StepRow[]): number {
   return Math.max(...steps) / Math.min(...steps);
 }
 
-/** Only the middle size has a target. */
+/**
+ * Returns the figures of the time of a topology update, one for each mesh size; only that near 65,000 vertices has a
+ * target.
+ */
 function topologyFigures(hosts: Steps[]): Figure[] {
   return figuresOfRows(
     hosts,
@@ -149,7 +152,7 @@ function topologyFigures(hosts: Steps[]): Figure[] {
   );
 }
 
-/** Returns the chart of each host's time relative to native code, if that was measured. */
+/** Returns a chart of the step time of each host relative to native code; no chart if native code was not measured. */
 function overNative(hosts: Steps[]): Chart[] {
   const native = hosts.find(({ host }) => host === 'native');
   if (!native) return [];
@@ -194,7 +197,7 @@ function pointSection(hosts: NonNullable<Report['points']>): Section {
   };
 }
 
-/** Returns the target of a row; only sizes near 20,000 triangles have one. */
+/** Returns the target frame rate of a row; only sizes near 20,000 triangles have one. */
 function targetOf({ name, triangles }: SculptRow): Target | undefined {
   return near(triangles, 20_000) ? atLeast(name === 'lava lamp' ? 30 : 10) : undefined;
 }

@@ -1,10 +1,10 @@
 import { LANGUAGE } from '../texts';
 
-/** The target of a measurement. */
+/** Target of a measurement: its largest or smallest permitted value. */
 export interface Target {
   limit: number;
   sense: 'most' | 'least';
-  /** Host to which it applies; all by default. */
+  /** Start of the names of the hosts to which it applies; all hosts if undefined. */
   host?: string;
 }
 
@@ -27,20 +27,28 @@ export interface Figure {
 export const atMost = (limit: number, host?: string): Target => ({ limit, sense: 'most', host });
 export const atLeast = (limit: number): Target => ({ limit, sense: 'least' });
 
-/** Returns whether a bar meets its figure's target; undefined if no target applies. */
+/**
+ * Returns whether a bar meets its figure's target; undefined if the bar has no value or the target does not apply to
+ * it.
+ */
 export function meetsTarget({ target }: Figure, { label, value }: Bar): boolean | undefined {
   if (!target || value === undefined || (target.host && !label.startsWith(target.host))) return undefined;
   return target.sense === 'most' ? value <= target.limit : value >= target.limit;
 }
 
-/** Returns the verdict on a figure: met only if all bars with a target meet it. */
+/**
+ * Returns the verdict on a figure: met only if all bars to which the target applies meet it, not measured if none of
+ * them has a value.
+ */
 export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
   const judged = figure.bars.map((bar) => meetsTarget(figure, bar)).filter((met) => met !== undefined);
   if (judged.length === 0) return 'not measured';
   return judged.every(Boolean) ? 'met' : 'not met';
 }
 
-/** Formats a number with its unit, to three significant digits (integers from 100). */
+/**
+ * Formats a number with its unit, to three significant digits (integers from 100); seconds below 0.1 as milliseconds.
+ */
 export function withUnit(value: number, unit: string): string {
   if (unit === 's' && value < 0.1) return withUnit(1000 * value, 'ms');
   const digits = Math.abs(value) >= 100 ? { maximumFractionDigits: 0 } : { maximumSignificantDigits: 3 };
@@ -52,5 +60,5 @@ export function formatTarget({ limit, sense, host }: Target, unit: string): stri
   return `${sense === 'most' ? '≤' : '≥'} ${withUnit(limit, unit)}${host ? ` ${host}` : ''}`;
 }
 
-/** Shortens a host's version to its major number. */
+/** Shortens a host's name and version to the name and the major version. */
 export const shortHost = (host: string) => host.replace(/^(\S+ \d+)\..*/, '$1');

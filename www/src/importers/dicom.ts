@@ -9,18 +9,18 @@ import { Refusal } from '../worker/refusal';
 
 const PIPELINE = 'read-image-dicom-file-series';
 
-/** The ITK program is served beside the page; it runs in the calling worker. */
+/** Returns the options for itk-wasm: its program is served beside the page, and runs in the calling worker. */
 const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
 
 /**
- * Returns the address of the page that this worker belongs to: the worker's own file is in a subfolder of the built
- * page.
+ * Returns the base address of the page that this worker belongs to: the worker's own file is in a subfolder of the
+ * built page.
  */
 function pageAddress(): string {
   return new URL(import.meta.env.DEV ? import.meta.env.BASE_URL : '../', self.location.href).href;
 }
 
-/** Reads the volume of one series, in LPS as in DICOM. */
+/** Reads the volume from the DICOM files of one series, in world space LPS as in DICOM. */
 export async function readSeries(files: NamedBytes[]): Promise<VolumeInit> {
   const paths = files.map((_, k) => `${k}.dcm`);
   const inputs = files.map(({ bytes }, k) => ({
@@ -56,7 +56,10 @@ function volumeOf({ imageType, data, size, spacing, origin, direction }: Image):
   };
 }
 
-/** Returns the column-major affine matrix; ITK's direction matrix is row-major, with the image axes in its columns. */
+/**
+ * Returns the affine matrix from voxel indices to world space, column-major; ITK's direction matrix is row-major, with
+ * the image axes in its columns.
+ */
 function affineOf(spacing: number[], origin: number[], direction: number[]): number[] {
   const column = (axis: number) => [0, 1, 2].map((row) => (direction[3 * row + axis] ?? 0) * (spacing[axis] ?? 1));
   return [...[0, 1, 2].flatMap((axis) => [...column(axis), 0]), ...[0, 1, 2].map((axis) => origin[axis] ?? 0), 1];

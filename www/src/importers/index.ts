@@ -1,4 +1,7 @@
-/** Formats read by other libraries, which are loaded only when such a file is opened. */
+/**
+ * Imports volume formats that other libraries read (DICOM, TIFF); each library is loaded when the first such file is
+ * opened.
+ */
 import type { VolumeInit } from 'vesicle';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
@@ -22,8 +25,8 @@ export function isTiff({ bytes }: NamedBytes): boolean {
 }
 
 /**
- * Reads the volume from a series of DICOM files, or from TIFF files with one slice each or all in one; undefined if
- * they are neither.
+ * Reads the volume from the DICOM files among `files`, or else from TIFF files with one slice each or all in one;
+ * undefined if no file is DICOM and not all are TIFF.
  */
 export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
   // DICOM folders contain other files as well, and DICOM files without that extension.
@@ -34,7 +37,7 @@ export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | un
   return undefined;
 }
 
-/** Rejects a single slice, which has no surface. */
+/** Returns the volume; throws a `Refusal` if it is a single slice, which has no surface. */
 function rejectSingleSlice(format: string, init: VolumeInit): VolumeInit {
   if (init.dims[2] > 1) return init;
   throw new Refusal('bad-file', text('files.singleSlice', { format }));

@@ -1,16 +1,16 @@
 /** Parses the description of the stack in a TIFF file: OME's XML, or the lines of ImageJ. */
 
 export interface Stack {
-  /** Page indices of the volume in order: z, then time. */
+  /** Indices of the pages that make up the volume: z, then time. */
   pages: number[];
   frames: number;
-  /** Voxel sizes, as far as the description contains them. */
+  /** Voxel sizes along x, y and z in the stack's unit; undefined where the description has none. */
   spacing: [number | undefined, number | undefined, number | undefined];
-  /** Whether the resolution of a page is in the unit of the stack. */
+  /** Whether the pages' resolution tags count pixels per unit of the stack, as in ImageJ. */
   perUnit: boolean;
 }
 
-/** Parses the description of a stack; without one, all pages are slices. */
+/** Parses the description of a stack of `count` pages; without a description, all pages are slices of one frame. */
 export function describedIn(text: string, count: number): Stack {
   if (/<OME[\s>]/.test(text)) return fromOme(text, count);
   if (text.startsWith('ImageJ=')) return fromImageJ(text, count);
@@ -45,8 +45,8 @@ function fromImageJ(text: string, count: number): Stack {
 }
 
 /**
- * Returns the pages of the first channel, z before time, from a file in which they are stored in `order`, fastest
- * first.
+ * Returns the pages of the first channel, z before time, from a file that stores the dimensions in `order`, fastest
+ * first. If the sizes do not fit the number of pages, all pages are slices of one frame.
  */
 function ordered(sizes: Record<string, number>, order: string, count: number): Pick<Stack, 'pages' | 'frames'> {
   const { Z = 1, T = 1 } = sizes;

@@ -63,8 +63,8 @@ async function tagOf(page: GeoTIFFImage, name: 'ImageDescription' | 'XResolution
 }
 
 /**
- * Returns the voxel size. The description of the stack takes precedence over the page's resolution, which scanners set
- * to that of paper.
+ * Returns the voxel size along x, y and z: from the stack's description, else from the page's resolution if it is in
+ * the stack's unit (scanners store that of paper), else 1.
  */
 async function pixelSize(page: GeoTIFFImage, { spacing, perUnit }: Stack): Promise<[number, number, number]> {
   const resolution = async (tag: 'XResolution' | 'YResolution') => {

@@ -1,11 +1,11 @@
-/** The page's address, whose hash tells which lab is open, and with what. */
+/** Reads and writes the page's address; its hash names the open lab and contains its settings. */
 import { text } from '../texts';
 import type { StatusLine } from '../ui/status';
 
 /** Names of the labs in addresses. */
 export const LAB_IDS = ['extract', 'reconstruct', 'track', 'sculpt'] as const;
 
-/** Returns the lab that an address names. */
+/** Returns the id of the lab that the hash of an address names, undefined if none. */
 export const labOf = (hash: string): string | undefined =>
   LAB_IDS.find((id) => hash === `#${id}` || hash.startsWith(`#${id}?`));
 
@@ -23,7 +23,8 @@ export function showAddress(hash: string): void {
 export const FILE_NOTE = text('labs.linkLacksFile');
 
 /**
- * Copies the page's address to the clipboard, and says so in the status line, with the notes on what the link lacks.
+ * Copies the page's address to the clipboard, and reports it in the status line, with the notes on what the link lacks;
+ * if the clipboard is not available, refers to the address bar.
  */
 export async function copyAddress(status: StatusLine, notes: (string | false)[]): Promise<void> {
   const say = (done: string) => status.say([done, ...notes].filter(Boolean).join(' '));

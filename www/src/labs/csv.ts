@@ -5,7 +5,7 @@ const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'van
 
 /**
  * Returns the history as CSV, one line per iteration, with the data of the plots, the event list and the table of times
- * (in milliseconds). `residual` is the method's name for that column.
+ * (in milliseconds). `residual` is the heading of the residual's column, which is a different quantity for each method.
  */
 export function toCsv({ reports }: History, residual = 'energy'): string {
   const parts = [...new Set(reports.flatMap(({ times }) => Object.keys(times)))];

@@ -1,6 +1,6 @@
 import { text } from '../texts';
 
-/** Downloads that were started ahead, by address. */
+/** Downloads started by {@link preload} and not yet used, by address. */
 const early = new Map<string, Promise<Uint8Array>>();
 
 /** Starts to download a file that will be needed as soon as the engine has loaded. */
@@ -11,7 +11,7 @@ export function preload(url: string): void {
   early.set(url, bytes);
 }
 
-/** Returns the bytes of a file; the caller may transfer them. */
+/** Returns the bytes of a file, preloaded or downloaded now; the caller may transfer them. */
 export function fetchBytes(url: string): Promise<Uint8Array> {
   const bytes = early.get(url) ?? download(url);
   early.delete(url);

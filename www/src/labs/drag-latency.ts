@@ -1,37 +1,50 @@
 /**
- * Measures the latency of moving an ellipsoid: until the displayed surface is carried along, and until the model's
- * frame follows.
+ * Measures the two latencies of moving an ellipsoid: of the display, until the page itself has deformed the displayed
+ * surface accordingly, and of the model, until a frame it computed for the new pose is drawn.
  */
 export class DragLatency {
-  /** Poses sent that no frame of the model has followed yet: their number, the time, and the frames drawn by then. */
+  /**
+   * Poses sent to the model for which it has returned no frame yet: their ids, the times they were sent in
+   * milliseconds, and the number of frames drawn until then.
+   */
   #pending: { poseId: number; at: number; drawn: number }[] = [];
   #drawn = 0;
   #displayMs: number | undefined;
-  /** Latency of the model for the last pose it followed: milliseconds, and frames drawn. */
+  /**
+   * Latency of the model at the last frame that reached new poses, from the oldest of these: milliseconds, and frames
+   * drawn.
+   */
   #last: { milliseconds: number; frames: number } | undefined;
 
-  /** Display latency: milliseconds from the last move to the displayed surface that was carried along. */
+  /**
+   * Display latency of the last move: milliseconds until the page itself had deformed the displayed surface; undefined
+   * before the first.
+   */
   get displayMs(): number | undefined {
     return this.#displayMs;
   }
 
-  /** Latency of the model for the last pose it followed: milliseconds, and frames drawn. */
+  /**
+   * Latency of the model at the last frame that reached new poses, from the oldest of these: milliseconds, and frames
+   * drawn.
+   */
   get last(): { milliseconds: number; frames: number } | undefined {
     return this.#last;
   }
 
-  /** Records that a pose was sent. */
+  /** Records that a pose was sent to the model at the time `at`, milliseconds. */
   poseSent(poseId: number, at: number): void {
     this.#pending.push({ poseId, at, drawn: this.#drawn });
   }
 
-  /** Records that the surface drawn follows a move `milliseconds` ago. */
+  /** Records that the page has deformed the displayed surface for a move that happened `milliseconds` ago. */
   carried(milliseconds: number): void {
     this.#displayMs = milliseconds;
   }
 
   /**
-   * Records that a frame following all poses up to `poseId` was drawn; returns whether any pose was pending until then.
+   * Records that a frame of the model was drawn that takes account of all poses up to `poseId`; returns whether it is
+   * the first to do so for any of them.
    */
   frameDrawn(poseId: number, at: number): boolean {
     this.#drawn += 1;

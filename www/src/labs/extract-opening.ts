@@ -17,7 +17,7 @@ import { Opening, type Source } from './opening';
 
 export type ExtractSource = Source<Example, Linked, VolumeSource>;
 
-/** An opened volume, and its model before the first step. */
+/** An opened volume, and the settings of its model, which has done no step yet. */
 interface OpenedVolume extends Loaded {
   choice: StartChoice;
   setup: Setup;
@@ -51,7 +51,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     this.#onRestart = onRestart;
   }
 
-  /** Starts to download the volume that the address asks for, while the engine loads. */
+  /**
+   * Starts to download the volume of the example that the address names, or of the first example, while the engine
+   * loads.
+   */
   static fetchLinked(): void {
     const linked = fromHash(location.hash);
     const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
@@ -102,7 +105,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     await this.#client.request('play', undefined);
   }
 
-  /** After a restart of the engine, with volume and settings unchanged: restores the newest saved state. */
+  /**
+   * Continues after a restart of the engine, with volume and settings unchanged: restores the newest saved state, or
+   * begins a new model if there is none.
+   */
   async #takeUp({ choice, params }: OpenedVolume, { example }: ExtractSource): Promise<void> {
     this.#ui.data.choose(example);
     // Sends the slice planes to the new engine.
@@ -136,8 +142,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Returns the settings for an example; a file keeps the present ones, except the iso value, which is specific to a
-   * volume.
+   * Returns the settings for a model of an example, or of a file: for a file those in force, except the iso value,
+   * which is specific to a volume. A link's settings take precedence.
    */
   #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
@@ -148,8 +154,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Returns the start for an example; a file keeps the present one, except lengths and positions, which are specific to
-   * a volume.
+   * Returns the choice of the initial surface for an example, or for a file: for a file the one in force, except
+   * lengths and positions, which are specific to a volume. A link's settings take precedence.
    */
   #startFor({ example, linked }: ExtractSource): StartChoice {
     const choice = this.#ui.start.value;

@@ -4,7 +4,7 @@ import { text } from '../texts';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure } from '../ui/format';
 
-/** Elements that the lab's page is laid out from. */
+/** Elements that {@link layOut} arranges on the lab's page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -125,7 +125,7 @@ export class DataPanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if it is none. */
+  /** Selects the open example in the list, or “Your file” if the open volume is no example. */
   choose(example: Example | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -56,7 +56,10 @@ export class ExtractResults {
     this.#ui.replaceHistory();
   }
 
-  /** Requests the pyramid levels that the model uses, and displays them. */
+  /**
+   * Requests the `levels` coarser levels of the image pyramid from the worker, and displays them with the volume
+   * itself.
+   */
   async showPyramid({ dims }: VolumeView, levels: number): Promise<void> {
     const asked = ++this.#pyramids;
     try {
@@ -67,7 +70,7 @@ export class ExtractResults {
     }
   }
 
-  /** Describes the state in the status line; if the surface has vanished, explains why. */
+  /** Describes the state in the status line; if the surface has vanished, a banner explains possible causes. */
   showState(state: LabState): void {
     this.#ui.status.say(this.describe(state));
     if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show(text('extract.vanished'), VANISHED);
@@ -97,7 +100,10 @@ export class ExtractResults {
     cancelAnimationFrame(this.#framePending);
   }
 
-  /** Displays a snapshot at the next animation frame; only then may the worker send another. */
+  /**
+   * Displays a snapshot at the next animation frame, which returns the previous one's buffers to the worker; without
+   * free buffers, the worker sends no further snapshot.
+   */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);
     if (this.#snapshot) this.#client.returnBuffers(this.#snapshot.surface);

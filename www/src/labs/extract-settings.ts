@@ -14,7 +14,7 @@ const SPHERE_PART = 0.1;
 /** Radius of a new attractor, as a fraction of the volume's shortest side. */
 const ATTRACTOR_PART = 0.15;
 
-/** Why nothing can be changed after a failure of the engine. */
+/** Message why nothing can be changed after a failure of the engine. */
 const BROKEN = text('labs.engineStopped');
 
 /** State of the page besides the model, which undo restores. */
@@ -62,7 +62,7 @@ export class ExtractSettings {
     return this.#attractors;
   }
 
-  /** The sphere at the crosshair that the model may start from. */
+  /** The sphere at the crosshair that the model may start from, world units. */
   get sphere(): { center: Vec3; radius: number } {
     return { center: this.#ui.stage.crosshair, radius: SPHERE_PART * this.#smallestSide };
   }
@@ -104,7 +104,10 @@ export class ExtractSettings {
     return this.#undo.saved;
   }
 
-  /** Saves the present state for undo, before a change. Returns a function that forgets it. */
+  /**
+   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
+   * one. Returns a function that discards the saved state, for a change that fails.
+   */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
@@ -122,7 +125,9 @@ export class ExtractSettings {
     });
   }
 
-  /** Adds missing parts to the surface, and continues the run if there were any. */
+  /**
+   * Adds new components for the parts of the object that the surface misses, and continues the run if there were any.
+   */
   seed(): Promise<void> {
     const { coverage } = this.#ui;
     return this.#change(text('extract.seeding'), text('extract.seedFailed'), async () => {

@@ -20,7 +20,7 @@ import type { Handoff, Lab, OpenInLab } from './labs';
  */
 export class ExtractLab implements Lab {
   readonly #root: HTMLElement;
-  /** Removes all event listeners when the lab is closed. */
+  /** Aborted when the lab is closed, which removes all event listeners. */
   readonly #closing = new AbortController();
   readonly #client = new Client((event) => this.#onEvent(event));
   readonly #ui: ExtractParts;
@@ -30,7 +30,7 @@ export class ExtractLab implements Lab {
   readonly #opening: ExtractOpening;
   readonly #sharing: ExtractSharing;
   readonly #passOn: OpenInLab;
-  /** The quantity requested for each vertex. */
+  /** The quantity that the worker computes for each vertex, to colour the surface; undefined if none is needed. */
   #quantity: VertexQuantity | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
@@ -186,7 +186,7 @@ export class ExtractLab implements Lab {
     }
   }
 
-  /** Reports a request's failure, without waiting for its reply. */
+  /** Shows an error message if a request fails, without waiting for the reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }

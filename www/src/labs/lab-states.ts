@@ -3,7 +3,10 @@ import { type LabState, Observable } from '../state';
 import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 
-/** The state of a lab; an error covers it until the user dismisses it. */
+/**
+ * The state of a lab: loading, running, paused, done, or an error, which covers the other states until the user
+ * dismisses it.
+ */
 export class LabStates {
   readonly #state = new Observable<LabState>('loading');
   readonly #banner: ErrorBanner;
@@ -62,8 +65,8 @@ export class LabStates {
   }
 
   /**
-   * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is called, the
-   * present model's state is ignored.
+   * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is
+   * called, the present model's state is ignored.
    */
   async open(text: string): Promise<void> {
     this.#opening = true;
@@ -84,7 +87,7 @@ export class LabStates {
     return turn;
   }
 
-  /** Ends loading with a model that is not running. */
+  /** Ends loading with a model that is not running; ignored while something else is being opened. */
   idle(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
     this.#state.value = state;
@@ -112,7 +115,10 @@ export class LabStates {
     return true;
   }
 
-  /** Displays a failure. The model stays, and a run continues. */
+  /**
+   * Displays a failure, unless something else is being opened. The model stays, and a run continues; after an internal
+   * error, the engine counts as broken, and the run as stopped.
+   */
   fail(title: string, error: unknown): void {
     if (this.#signal.aborted) return;
     const failure = toFailure(error);

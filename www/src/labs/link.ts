@@ -70,7 +70,7 @@ export function differing(values: ParamValues, usual: ParamValues): ParamValues 
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !Object.is(usual[name], value)));
 }
 
-/** Applies a link's settings to a start. */
+/** Returns the choice of the initial surface, with the settings of a link in place of those it contains. */
 export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: Linked): StartChoice {
   return {
     kind: isStartKind(start) ? start : choice.kind,
@@ -124,7 +124,9 @@ export function fromHash(hash: string): Linked | undefined {
   return query.has('v') ? linked : asBefore(linked);
 }
 
-/** Adds the defaults that a link without a version relies on. Figures set all of them themselves. */
+/**
+ * Adds the defaults that a link without a version relies on. Figures are excepted: they set all parameters themselves.
+ */
 function asBefore(linked: Linked): Linked {
   if (isPreset(exampleById(linked.example ?? ''))) return linked;
   return { start: 'enclosing', ...linked, params: { ...PAPER, ...linked.params } };

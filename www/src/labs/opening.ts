@@ -74,13 +74,14 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
   /**
-   * Has the worker build a model of the data. With `reopening`, the source is already open, and the engine was restarted.
+   * Has the worker build a model of the data. With `reopening`, the source is already open, and the engine was
+   * restarted.
    */
   protected abstract load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened>;
 
   /**
-   * Displays what was opened, with the settings of its example or link, and runs it; with `reopening`, with the previous
-   * settings.
+   * Displays what was opened, with the settings of its example or link, and runs it; with `reopening`, with the
+   * previous settings.
    */
   protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, reopening: boolean): Promise<void>;
 
@@ -93,7 +94,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return source;
   }
 
-  /** Has the worker save the present model, so that it can be restored. */
+  /** Has the worker save the present model, so that it can be restored; does nothing by default. */
   protected save(): void {}
 
   /** Settles when all pending saves are complete. */
@@ -246,7 +247,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     this.states.fail(text('labs.openFailed', { name: source.name }), error);
   }
 
-  /** Opens a link's example with its own settings, after one of the link's settings was rejected. */
+  /** Opens a link's example or file without the link's settings, after one of them was rejected, and says why. */
   async #openWithoutLink({ linked: _, ...source }: Source<Example, Linked, Data>, why: string): Promise<void> {
     await this.open(source);
     if (this.states.value === 'error' || this.#source !== source) return;

@@ -8,7 +8,7 @@ export const NO_EDITS: Edits = { added: [], removed: [], outside: [] };
 
 /**
  * Returns the edits after a click with a tool; undefined if it changes nothing. `distance`, in world units, is the
- * offset of a new point along the surface normal, or the radius for removal.
+ * offset along the surface normal of a new point or exterior point; its magnitude is the radius for removal.
  */
 export function applyClick(
   tool: EditTool,
@@ -30,7 +30,10 @@ export function applyClick(
   }
 }
 
-/** Removes all points within `radius` of a position, including those added by hand; undefined if there are none. */
+/**
+ * Returns the edits with all points within `radius` of a position removed, including those added by hand; undefined if
+ * there are none.
+ */
 function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Array): Edits | undefined {
   const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= radius;
   const gone = new Set(edits.removed);
@@ -43,7 +46,9 @@ function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Ar
   return { ...edits, added, removed: [...edits.removed, ...found] };
 }
 
-/** Returns packed triples without those of the removed points. */
+/**
+ * Returns the positions or colours of points, packed triples, without those of the points with the indices `removed`.
+ */
 export function withoutRemoved(values: Float32Array, removed: number[]): Float32Array {
   const gone = new Set(removed);
   return gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;

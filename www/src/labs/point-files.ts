@@ -10,7 +10,7 @@ import { type Photograph, readPhotographs } from './photographs';
 /** File extensions that the Reconstruct lab opens. */
 export const ACCEPT = '.ply,.obj,.xyz,.pts,.csv,.txt,.json,.png,.jpg,.jpeg,.webp';
 
-/** Files opened together. */
+/** Points, and cameras with photographs, read from files that were opened together. */
 export interface PointFiles {
   /** The points; undefined if only cameras were opened, for the present points. */
   source?: CloudSource;

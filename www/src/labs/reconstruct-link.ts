@@ -35,8 +35,8 @@ export interface CloudSettings {
 }
 
 /**
- * Returns the settings that differ from those of the example, or else from the method's defaults. 0 means the method's
- * own choice.
+ * Returns the settings that differ from those of the example, or else from the method's defaults. A number of points or
+ * clusters of 0 stands for the method's own choice.
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
   const { example, file, choice, params, defaults, edits, color, photo } = settings;
@@ -53,12 +53,15 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
   };
 }
 
-/** Returns the index of the photograph that an example opens with. */
+/** Returns the index of the photograph that an example opens with, undefined if none. */
 function photoOf(example: CloudExample | undefined): number | undefined {
   return isCloudPreset(example) ? example.photo : undefined;
 }
 
-/** Returns the index of the photograph for the view; `photo` of a link counts from 1, and 0 means none. */
+/**
+ * Returns the index of the photograph that the view opens with, undefined if none; `photo` of a link counts from 1, and
+ * 0 means none.
+ */
 export function photoFor(example: CloudExample | undefined, photo: number | undefined): number | undefined {
   if (photo === undefined) return photoOf(example);
   return photo > 0 ? photo - 1 : undefined;
@@ -69,7 +72,10 @@ export function fits({ added, removed, outside }: Edits): boolean {
   return added.length + removed.length + outside.length <= MOST_EDITS;
 }
 
-/** Applies a link's settings to the choice of points. */
+/**
+ * Returns the numbers of points and clusters, with those of a link in place of the given ones; 0 in a link stands for
+ * the method's own choice.
+ */
 export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Partial<CloudChoice>): CloudChoice {
   return {
     maxPoints: maxPoints === undefined ? choice.maxPoints : maxPoints || undefined,
@@ -94,7 +100,10 @@ export function toHash(linked: LinkedCloud): string {
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
 
-/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
+ * ignored.
+ */
 export function fromHash(hash: string): LinkedCloud | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);
   if (address !== ADDRESS || !text) return undefined;

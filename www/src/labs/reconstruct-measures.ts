@@ -50,7 +50,7 @@ export const FIT_ROWS: ExtraMeasure[] = [
   { name: 'residual', label: text('reconstruct.residual'), help: text('reconstruct.residualHelp'), text: figure },
 ];
 
-/** Returns the values of these measures by name. */
+/** Returns the values of the measures of points and fit, by the names in {@link FIT_ROWS}. */
 export function fitValues(fit: Fit): Record<string, unknown> {
   const { fitness, ...rest } = fit;
   if (!fitness) return { ...rest };

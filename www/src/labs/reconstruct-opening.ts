@@ -76,7 +76,10 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     return { ...(await this.#client.request('load', { source: from, cameras, setup })), photographs, setup, from };
   }
 
-  /** If only cameras were opened, the source is the present points, now with these cameras. */
+  /**
+   * Returns the source to remember as open: if only cameras were opened, the present points, with these cameras from
+   * now on.
+   */
   protected override sourceToRemember(
     origin: CloudOrigin,
     { from, photographs }: OpenedCloud,
@@ -90,7 +93,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     return this.#onOpened(opened, origin);
   }
 
-  /** Returns the present points, for cameras that are opened after them. */
+  /** Returns the present points, for cameras that are opened after them. Throws if there are none. */
   async #presentPoints(): Promise<CloudSource> {
     if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
     const { source } = await this.source.load();
@@ -109,8 +112,8 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /**
-   * Returns the settings before a link changes them: an example's own; for one file after another, those in force; else
-   * the defaults.
+   * Returns the settings before a link changes them: an example's own; for cameras alone, those in force; for one file
+   * after another, those in force but the cell size; else the defaults.
    */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {

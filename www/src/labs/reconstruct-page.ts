@@ -4,7 +4,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that the lab's page is laid out from. */
+/** Elements that {@link layOut} arranges on the lab's page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -114,7 +114,7 @@ export class CloudPanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if it is none. */
+  /** Selects the open example in the list, or “Your file” if the open points are no example. */
   choose(example: CloudExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -56,7 +56,7 @@ export class ReconstructResults {
     }
   }
 
-  /** Describes the state in the status line; if a finished run has no surface, explains why. */
+  /** Describes the state in the status line; if a finished run has no surface, a banner explains possible causes. */
   showState(state: LabState): void {
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
@@ -126,7 +126,7 @@ export class ReconstructResults {
     this.#ui.csv.disabled = this.#history.reports.length === 0;
   }
 
-  /** Clears a surface that belongs to other settings, and explains why there is none. */
+  /** Clears a surface that belongs to other settings, and shows a banner with possible causes why there is none. */
   #showNothing(): void {
     this.#complete = false;
     this.#ui.clearSurface();

@@ -32,7 +32,7 @@ export class RunControl {
     this.ask(this.#client.request('step', { count: steps }));
   }
 
-  /** Reports a request's failure, without waiting for its reply. */
+  /** Shows an error message if a request fails, without waiting for the reply. */
   ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }

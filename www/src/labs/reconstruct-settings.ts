@@ -11,7 +11,7 @@ import type { ReconstructResults } from './reconstruct-results';
 import type { RunControl } from './reconstruct-running';
 import { UndoStack } from './undo';
 
-/** Limits of the undo history. */
+/** Limits of the undo history: number of states, and their total size in bytes. */
 const UNDO_LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
 const TOGETHER = 1500;
@@ -77,7 +77,7 @@ export class ReconstructSettings {
     this.#showEdits();
   }
 
-  /** Adopts the parameters that the worker reports. */
+  /** Adopts the parameters in force, as reported by the worker, and shows them. */
   showParams(params: ParamValues): void {
     this.#params = params;
     this.#onParams(params);

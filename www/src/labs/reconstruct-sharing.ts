@@ -12,8 +12,8 @@ import type { ReconstructSettings } from './reconstruct-settings';
 const VOLUME_SIZE = 96;
 
 /**
- * Shares the state of the Reconstruct lab as an address, saves f as a volume, and passes volume or surface to other
- * labs.
+ * Shares the state of the Reconstruct lab as an address, saves the implicit function f as a volume, and passes volume
+ * or surface to other labs.
  */
 export class ReconstructSharing {
   readonly #client: ReconstructClient;
@@ -70,7 +70,10 @@ export class ReconstructSharing {
     });
   }
 
-  /** Passes f on to the Extract lab as a volume; inside is above the level. */
+  /**
+   * Passes the implicit function f on to the Extract lab as a volume, with the level of the surface as iso value; f is
+   * above it inside.
+   */
   toExtract(passOn: OpenInLab): void {
     this.#ui.status.say(text('reconstruct.samplingVolume'));
     this.#tryTo(async () => {

@@ -4,14 +4,14 @@ import { download } from '../ui/files';
 import type { History } from '../ui/history';
 import { toCsv } from './csv';
 
-/** Saves a lab's results as files named after the open volume or mesh; `say` is told the name of each. */
+/** Saves a lab's results as files named after the open volume or mesh; `say` shows the name of each file. */
 export class Saving {
   readonly #fetch: (format: MeshFormat) => Promise<Uint8Array>;
   readonly #say: (text: string) => void;
   /** Name of the open volume or file. */
   name = 'surface';
 
-  /** `fetch` returns the surface in a format. */
+  /** `fetch` returns the present surface as a file of the given format. */
   constructor(fetch: (format: MeshFormat) => Promise<Uint8Array>, say: (text: string) => void) {
     this.#fetch = fetch;
     this.#say = say;

@@ -4,27 +4,30 @@ import type { FrameEvent, Pose, Surface } from '../sculpt/protocol';
 import type { SculptureView } from '../view/sculpture';
 
 /**
- * Carries the displayed surface along with the ellipsoids at once during a drag, between two frames of the model; each
- * frame of the model replaces it.
+ * Deforms the displayed surface along with the ellipsoids at once during a drag, between two frames of the model; each
+ * frame of the model replaces the result.
  */
 export class SurfaceCarrier {
   readonly #view: SculptureView;
   /** The last frame of the model. */
   #frame: FrameEvent | undefined;
-  /** Pose under the pointer, until the model has reached it. */
+  /** Pose under the pointer, and its id, until the model has reached it. */
   #dragged: { pose: Pose; poseId: number } | undefined;
 
   constructor(view: SculptureView) {
     this.#view = view;
   }
 
-  /** Carries the surface to a dragged pose; returns whether that was possible. */
+  /** Deforms the displayed surface to a dragged pose; returns whether that was possible. */
   dragTo(pose: Pose, poseId: number): boolean {
     this.#dragged = { pose, poseId };
     return this.#deform();
   }
 
-  /** Takes a frame of the model, and carries it on if the pointer is still ahead. */
+  /**
+   * Takes a frame of the model that is displayed, and deforms its surface to the pointer's pose if the model has not
+   * reached it.
+   */
   frameShown(frame: FrameEvent): void {
     this.#frame = frame;
     const dragged = this.#dragged;

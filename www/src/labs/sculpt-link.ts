@@ -16,10 +16,10 @@ export interface LinkedScene {
   /** Name of the user's own file, which is not part of the link. */
   file?: string;
   params: ParamValues;
-  /** Pose that the ellipsoids move to, if set by hand. */
+  /** Pose that the ellipsoids move to, if it was set by hand. */
   pose?: Pose;
   names?: string[];
-  /** Keyframes of the user's own film; with `loop` alone, the example's film is looped. */
+  /** Keyframes of the user's own film; without them, `loop` applies to the example's film. */
   keys?: Pose[];
   between?: number;
   loop?: boolean;
@@ -32,7 +32,7 @@ export interface SceneSettings {
   example: SculptExample | undefined;
   file: string;
   params: ParamValues;
-  /** Parameters that the scene opened with. */
+  /** Parameters that the scene opened with, without changes by a link. */
   usual: ParamValues;
   pose: Pose | undefined;
   film: Film | undefined;
@@ -40,7 +40,7 @@ export interface SceneSettings {
   layout: string;
 }
 
-/** Returns the settings that differ from those of the example, or else from the method's defaults. */
+/** Returns the settings that differ from those of the example, and the parameters that differ from `usual`. */
 export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
   const own = film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS;
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
@@ -62,7 +62,9 @@ export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undef
   return film && loop !== undefined ? { ...film, loop } : film;
 }
 
-/** Converts a pose to text, to a ten-thousandth of each ellipsoid's size, which is finer than any drag. */
+/**
+ * Converts a pose to text, rounded to at most 10⁻⁴ of each ellipsoid's longest semi-axis, which is finer than any drag.
+ */
 function asText(pose: Pose): string {
   return pose
     .map((one) =>

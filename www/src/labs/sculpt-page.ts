@@ -4,7 +4,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that the lab's page is laid out from. */
+/** Elements that {@link layOut} arranges on the lab's page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -104,7 +104,7 @@ export class ScenePanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if it is none. */
+  /** Selects the open example in the list, or “Your file” if the open scene is no example. */
   choose(example: SculptExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -195,7 +195,10 @@ export class SculptParts {
     this.#params?.showError(name, message);
   }
 
-  /** With `canPlay`, a converged model can be played, since there is a film. */
+  /**
+   * Enables and disables controls according to the state; with `canPlay`, a converged model can be played, since there
+   * is a film.
+   */
   showState(state: LabState, ready: boolean, canPlay: boolean): void {
     this.transport.showState(state === 'done' && canPlay ? 'paused' : state, ready);
     this.#exports.enabled = ready && state !== 'loading';

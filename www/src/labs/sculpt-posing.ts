@@ -6,14 +6,16 @@ import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
 import type { SculptSettings } from './sculpt-settings';
 
-/** Effect of one key press: displacement as a share of the scene's size, rotation in radians, and scale factor. */
+/** Displacement by one key press, as a fraction of the scene's size. */
 const MOVE_STEP = 0.02;
+/** Rotation by one key press, radians. */
 const ROTATION_STEP = 0.1;
+/** Scale factor by one key press. */
 const SCALE_STEP = 1.06;
-/** Share of these effects with Shift. */
+/** Fraction of the effect of one key press while Shift is held. */
 const FINE_FACTOR = 0.2;
 
-/** Radius of a new ellipsoid, as a share of the scene's size. */
+/** Radius of a new ellipsoid, as a fraction of the scene's size. */
 const NEW_RADIUS = 0.12;
 
 /** Milliseconds after the last key press until the change counts as ended. */
@@ -26,7 +28,7 @@ const DONE: Record<HandleMode, string> = {
   size: text('sculpt.scaled'),
 };
 
-/** Messages on what handles and arrow keys do. */
+/** Text keys of the messages on what handles and arrow keys do. */
 const MODE_TEXTS = { move: 'sculpt.handlesMove', turn: 'sculpt.handlesRotate', size: 'sculpt.handlesScale' } as const;
 
 /** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
@@ -89,7 +91,7 @@ export class Posing {
     this.#ui.ellipsoids.focus();
   }
 
-  /** Stops the timer: no pose is sent any more. */
+  /** Stops the timer of a series of key presses when the lab is closed, so that no pose is sent any more. */
   close(): void {
     clearTimeout(this.#resting);
   }

@@ -7,7 +7,7 @@ import { type History, underWay } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 
-/** Least milliseconds between two updates of the plots, which take time to draw. */
+/** Smallest number of milliseconds between two updates of the plots, which take time to draw. */
 const SHOW_EVERY = 250;
 
 /** Displays the worker's results: frames, measures and plots. */
@@ -129,7 +129,7 @@ export class SculptResults {
     );
   }
 
-  /** Requests and displays stages of restructuring, which need no model. */
+  /** Requests and displays the stages of restructuring shown in a figure of the paper, which need no model. */
   showStages(kind: StageKind): void {
     const scene = this.#scene;
     this.#client.request('stages', kind).then(

@@ -27,7 +27,7 @@ export interface Adopted {
   params: ParamValues;
 }
 
-/** Ellipsoids, film and parameters: changes them, sends them to the worker, and undoes changes. */
+/** Ellipsoids, film and parameters of the Sculpt lab: changes them, sends them to the worker, and undoes changes. */
 export class SculptSettings {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -42,7 +42,7 @@ export class SculptSettings {
   #posed = false;
   #film: Film | undefined;
   #frame = 0;
-  /** Number of the last pose sent. */
+  /** Id of the last pose sent; ids count up. */
   #poseId = 0;
 
   /** `onChange` is called whenever the settings in force may have changed. */
@@ -118,13 +118,13 @@ export class SculptSettings {
 
   /**
    * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
-   * one. Returns a function that forgets it.
+   * one. Returns a function that discards the saved state, for a change that fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
-  /** Sends the worker a target pose; `names` if the ellipsoids themselves have changed. */
+  /** Sends the worker a target pose for the ellipsoids; `names` if ellipsoids were added or removed. */
   send(pose: Pose, dragging: boolean, names = this.#names): void {
     if (!this.#states.canChange) return;
     this.#ui.banner.hide();
@@ -138,7 +138,10 @@ export class SculptSettings {
     if (!dragging) this.#onChange();
   }
 
-  /** During a drag, carries the displayed surface along at once; the model follows. Records both latencies. */
+  /**
+   * Records the model's latency from the pose just sent; during a drag, also deforms the displayed surface at once, and
+   * records the display latency.
+   */
   #measureLatency(dragging: boolean): void {
     const { carrier, latency } = this.#ui;
     const at = performance.now();
@@ -160,7 +163,7 @@ export class SculptSettings {
     await this.#client.request('film', { film, frame });
   }
 
-  /** Takes the film's frame and the target pose from a frame of the model, unless a newer pose was sent. */
+  /** Adopts the film's frame and the target pose of a frame computed by the model, unless a newer pose was sent. */
   follow({ poseId, frame, pose }: FrameEvent, playing: boolean): void {
     if (poseId < this.#poseId) return;
     if (playing && frame !== this.#frame) this.#posed = false;
@@ -173,7 +176,7 @@ export class SculptSettings {
     this.#ui.film.show(this.#film, frame);
   }
 
-  /** Returns to the previous target after the worker has rejected a pose. */
+  /** Returns to `pose`, the previous target, after the worker has rejected a pose, and shows why. */
   reject(pose: Pose, why: string): void {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);

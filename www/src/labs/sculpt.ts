@@ -28,7 +28,7 @@ import { Posing } from './sculpt-posing';
 import { SculptResults } from './sculpt-results';
 import { SculptSettings } from './sculpt-settings';
 
-/** The colourings that the worker has to compute. */
+/** The colourings whose values the worker has to compute at the vertices. */
 const QUANTITIES: readonly string[] = [
   'area distortion',
   'angle distortion',
@@ -234,7 +234,7 @@ export class SculptLab implements Lab {
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
-  /** Rebuilds the model, with the ellipsoids in the scene's start pose. */
+  /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history cleared. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -250,7 +250,7 @@ export class SculptLab implements Lab {
     }
   }
 
-  /** Reports a request's failure, without waiting for its reply. */
+  /** Shows an error message if a request fails, without waiting for the reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }

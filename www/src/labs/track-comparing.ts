@@ -12,7 +12,10 @@ const NAMES: Record<Enrichment, string> = {
   flow: text('track.opticalFlow'),
 };
 
-/** Repeats the present run with one setting changed; returns both for the comparison, or undefined if cancelled. */
+/**
+ * Tracks the present image again with one setting changed; returns the present and the new run for comparison, or
+ * undefined if cancelled.
+ */
 export async function compareWith(
   client: TrackClient,
   { setup, params }: TrackSettings,

@@ -45,7 +45,7 @@ export const TRACK_ROWS: ExtraMeasure[] = [
   { name: 'noise', label: text('track.noise'), help: text('track.noiseHelp'), text: round },
 ];
 
-/** The results so far that the measures are computed from. */
+/** The results so far from which the lab's measures are computed. */
 export interface Tracked {
   frames: readonly TrackedFrame[];
   /** Number of frames of the image. */
@@ -55,7 +55,10 @@ export interface Tracked {
   noise: number;
 }
 
-/** Returns the values of these measures by name, and more for programs that read the page. */
+/**
+ * Returns the values of the tracking's measures by the names in {@link TRACK_ROWS}, and more for programs that read the
+ * page.
+ */
 export function moreOf({ frames, count, frame, closing, noise }: Tracked): Record<string, unknown> {
   const beat = frames.length === count ? beatOf(frames.map(({ facts }) => facts.volume)) : undefined;
   const shown = frames[frame];

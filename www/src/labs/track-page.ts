@@ -5,7 +5,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { figure, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that the lab's page is laid out from. */
+/** Elements that {@link layOut} arranges on the lab's page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -130,7 +130,7 @@ export class ImagePanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if it is none. */
+  /** Selects the open example in the list, or “Your file” if the open image is no example. */
   choose(example: TrackExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -194,7 +194,7 @@ export class TrackParts {
     this.#thresholdHolder.replaceWith(this.#threshold.element);
   }
 
-  /** Shows a newly opened image. */
+  /** Shows the facts about a newly opened image. */
   adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
     this.saving.name = (example?.id ?? name).replace(/^.*\//, '');
     this.measures.unit = example?.unit ?? 'mm';
@@ -220,7 +220,10 @@ export class TrackParts {
     else this.#params?.showError(name, message);
   }
 
-  /** `tracked` is the number of frames with a surface; `here`, whether the displayed frame has one. */
+  /**
+   * Enables and disables controls according to the state; `tracked` is the number of frames with a surface; `here`,
+   * whether the displayed frame has one.
+   */
   showState(state: LabState, ready: boolean, tracked: number, here: boolean): void {
     this.transport.showState(state, ready);
     const idle = ready && state !== 'loading';

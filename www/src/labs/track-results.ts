@@ -42,9 +42,11 @@ export class TrackResults {
   /** Counts runs, so that replies for a previous one are discarded. */
   #run = 0;
   #comparedVolumes: { volumes: number[]; name: string } | undefined;
-  /** Parameters in force, and the noise of the image. */
+  /** Half width k of the windows in force, in voxels. */
   window = 2;
+  /** Edge threshold τ in force, in intensity units. */
   threshold = 1;
+  /** Standard deviation of the image's noise, in intensity units. */
   noise = 0;
 
   constructor(client: TrackClient, ui: TrackParts, states: LabStates, history: History) {
@@ -75,7 +77,10 @@ export class TrackResults {
     return this.#image?.truth;
   }
 
-  /** Sets the image: another one, or the same after another preparation. */
+  /**
+   * Sets the image: another one, or with `keep` the same after another preparation. `slices` is their number before
+   * preparation, `truth` the true volumes if the image is synthetic.
+   */
   setImage(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
     this.#image = { volume, slices, truth };
     this.#between = undefined;
@@ -99,7 +104,10 @@ export class TrackResults {
     return { frames: this.#frames, closing: this.#closing, mark: this.#history.marker() };
   }
 
-  /** Restores results as of an iteration. */
+  /**
+   * Restores the results of a snapshot, as far as they existed at an iteration; `done`: whether the run was finished
+   * then.
+   */
   restore({ frames, closing, mark }: TrackRecord, iteration: number, done: boolean): void {
     this.#history.rewind(mark(iteration));
     const count = this.#image?.volume.frames ?? 0;
@@ -178,19 +186,22 @@ export class TrackResults {
     table.show(facts, errors, this.#frame);
   }
 
-  /** Unit of lengths. */
+  /** Unit of lengths, for the volume curve. */
   #unit = 'mm';
   set unit(unit: string) {
     this.#unit = unit;
   }
 
-  /** Shows the volumes of another run beside these, for comparison. */
+  /** Sets the volumes of another run, shown beside the present ones for comparison; undefined for none. */
   set other(other: { volumes: number[]; name: string } | undefined) {
     this.#comparedVolumes = other;
     this.showCurve();
   }
 
-  /** Shows the pictures below the view and the boundary votes; requests the data that is missing. */
+  /**
+   * Shows the boundary votes and the figures below the view, as selected in the view options; requests the data that is
+   * missing.
+   */
   showFigures(): void {
     const image = this.#image;
     if (!image) return;

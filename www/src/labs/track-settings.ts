@@ -54,7 +54,7 @@ export class TrackSettings {
     );
   }
 
-  /** The setup as requested; its `params` are those not left to the method. */
+  /** The setup as requested; its `params` are only those set by the example, a link or the user. */
   get setup(): Setup {
     return this.#setup;
   }
@@ -64,12 +64,12 @@ export class TrackSettings {
     return this.#ready.params;
   }
 
-  /** The edge threshold τ that the noise suggests. */
+  /** The edge threshold τ suggested by the noise of the image, in intensity units. */
   get suggested(): number {
     return this.#ready.suggested;
   }
 
-  /** Standard deviation of the noise, in intensity units. */
+  /** Standard deviation of the image's noise, in intensity units. */
   get noise(): number {
     return this.#ready.noise;
   }
@@ -80,12 +80,15 @@ export class TrackSettings {
     this.#take(setup, ready);
   }
 
-  /** Saves the present state for undo, before a change. Returns a function that forgets it. */
+  /**
+   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
+   * one. Returns a function that discards the saved state, for a change that fails.
+   */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
-  /** Changes the setup: builds a new tracker, and runs it. */
+  /** Changes preparation, region or component: builds a new tracker, and runs it. */
   change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
@@ -109,7 +112,10 @@ export class TrackSettings {
     });
   }
 
-  /** Sets parameters, and tracks again as far as the results depend on them. */
+  /**
+   * Sets parameters, discards the surfaces tracked so far, and runs the tracker again from the first step that depends
+   * on the changed parameters.
+   */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;

@@ -38,8 +38,9 @@ export class TrackLab implements Lab {
   /** Number of slices of the image before its preparation. */
   #slices = 1;
   #truth: number[] | undefined;
-  /** Start and duration of the run in milliseconds, for comparisons; undefined if it was interrupted. */
+  /** Time in milliseconds at which the present run began; undefined if none is running, or if it was resumed midway. */
   #began: number | undefined;
+  /** Duration in milliseconds of the last run without a pause, for comparisons; undefined after a pause. */
   #duration: number | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
@@ -259,7 +260,7 @@ export class TrackLab implements Lab {
     }
   }
 
-  /** Reports a request's failure, without waiting for its reply. */
+  /** Shows an error message if a request fails, without waiting for the reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
@@ -292,7 +293,7 @@ export class TrackLab implements Lab {
     else this.#ui.frames.stop();
   }
 
-  /** Measures the duration of a run; only one without a pause can be compared. */
+  /** Measures the duration of a run from its first step to its end; one that was paused has none for the comparison. */
   #time(state: 'running' | 'paused' | 'done'): void {
     if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
     else if (state === 'done' && this.#began !== undefined) this.#duration = performance.now() - this.#began;

@@ -1,6 +1,6 @@
 import { UndoStack } from './undo';
 
-/** Limits of the undo history. */
+/** Limits of the undo history: number of states, and their total size in bytes. */
 const LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
 const MERGE_MS = 1500;
@@ -29,7 +29,7 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   #lastChange = { mergeKey: '', at: 0 };
   #newest: SavedMoment<Page, Saved> | undefined;
   #saving: Promise<unknown> = Promise.resolve();
-  /** Counts volumes, so that saves of a previous one are discarded. */
+  /** Counts the volumes or meshes opened, so that saves of a previous one are discarded. */
   #volume = 0;
 
   constructor(
@@ -52,7 +52,7 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
     return this.#saving;
   }
 
-  /** Forgets all states: none fits another volume. */
+  /** Forgets all states, since they do not fit another volume or mesh. */
   clear(): void {
     this.#volume += 1;
     this.#lastChange = { mergeKey: '', at: 0 };
@@ -61,7 +61,10 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
     this.#notify();
   }
 
-  /** Saves the present state as {@link newest} only. Undefined if the engine is broken. */
+  /**
+   * Saves the present state as {@link newest}, without a step of undo. Returns undefined if the worker could not save
+   * it.
+   */
   async save(): Promise<SavedMoment<Page, Saved> | undefined> {
     const page = this.#page();
     const volume = this.#volume;

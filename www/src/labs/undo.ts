@@ -1,4 +1,4 @@
-/** Undo history: saved states, newest last, within limits. */
+/** Undo history: stacks of saved states, newest last, within limits. */
 
 /** A saved state, from before a change. */
 export interface Checkpoint<State> {
@@ -8,7 +8,7 @@ export interface Checkpoint<State> {
   state: State;
 }
 
-/** Limits of the undo history: number and total size of its states. */
+/** Limits of the undo history: number of its states, and their total size in bytes. */
 export interface UndoLimits {
   entries: number;
   bytes: number;
@@ -51,12 +51,12 @@ export class UndoStack<State> {
     this.#past = this.#past.filter((one) => one !== checkpoint);
   }
 
-  /** Returns the state before the last change; `now` is kept for redo. */
+  /** Returns the state before the last change, undefined if there is none; `now` is kept for redo. */
   undo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#past, this.#future, now);
   }
 
-  /** Returns the state after the last undone change; `now` is kept for undo. */
+  /** Returns the state after the change undone last, undefined if there is none; `now` is kept for undo. */
   redo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#future, this.#past, now);
   }
@@ -73,7 +73,7 @@ export class UndoStack<State> {
     return checkpoint.state;
   }
 
-  /** Removes the oldest states beyond the limits; the last state to undo to stays, however large. */
+  /** Removes the oldest states to undo to while limits are exceeded; of these, at least one stays, however large. */
   #trim(): void {
     const size = () => [...this.#past, ...this.#future].reduce((sum, { bytes }) => sum + bytes, 0);
     while (this.#past.length > this.#limits.entries || (this.#past.length > 1 && size() > this.#limits.bytes))

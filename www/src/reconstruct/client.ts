@@ -11,7 +11,7 @@ export class ReconstructClient extends Channel<Requests, WorkerEvent> {
     super(spawnReconstruct, onEvent);
   }
 
-  /** Tells the worker that the surface it sent last is on the screen, so that it may send another. */
+  /** Tells the worker that the surface it sent last is on the screen, so that it may send another preview. */
   acknowledge(): void {
     const message: ShownMessage = { kind: 'shown' };
     this.post(message);

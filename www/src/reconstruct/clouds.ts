@@ -4,7 +4,10 @@ import type { Cloud } from './protocol';
 
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
 
-/** Standard deviation of the points' distance from their surface; some shapes use a fraction of it. */
+/**
+ * Standard deviation of the points' distance from their surface, relative to shapes about 1 in size; some shapes use a
+ * fraction of it.
+ */
 const NOISE = 0.02;
 
 /** Returns a generator of pseudo-random numbers from 0 to 1 (mulberry32). */

@@ -12,7 +12,7 @@ export interface CloudExample {
   /** Folder with the photographs that the points were made from, and their cameras. */
   photographs?: string;
   up: 'y' | 'z';
-  /** −1 to view it from behind at first; see `ReconstructionView.setCloud`. */
+  /** −1 to show the example from behind at first; by default it is seen from the front. */
   front?: -1;
   maxPoints?: number;
   keepComponents?: number;

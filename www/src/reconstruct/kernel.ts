@@ -8,7 +8,7 @@ export interface KernelParams {
   sigma: number;
 }
 
-/** Share of τ: below r = SMALL_R τ the closed form loses its digits, and φ(0) is as accurate. */
+/** Radius, as a multiple of τ, below which φ(0) replaces the closed form, which loses its digits there. */
 const SMALL_R = 1e-4;
 
 /** Returns the kernel and its constants from the method's parameters, with defaults for missing ones. */
@@ -22,7 +22,7 @@ export function kernelParams(params: ParamValues): KernelParams {
   };
 }
 
-/** Returns φ(r) of the kernel in use. */
+/** Returns φ(r) of the kernel chosen in the parameters. */
 export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): number {
   switch (kernel) {
     case 'thin-plate':

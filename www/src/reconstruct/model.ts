@@ -5,7 +5,7 @@ import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
 import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
 
-/** Least number of voxels along the shortest side of an exported grid. */
+/** Least number of voxels along each side of an exported grid. */
 const LEAST_DIM = 8;
 
 /** Returns the points of a source: computed, or read from a file. */
@@ -40,7 +40,7 @@ export function toPointEdits({ added, removed, outside }: Edits): Required<Point
   };
 }
 
-/** Returns the points in use: those loaded, without the removed and with the added ones. */
+/** Returns the loaded points without the removed and with the added ones. */
 export function applyEdits(points: Float32Array, { added, removed }: Edits): Float32Array {
   if (added.length + removed.length === 0) return points;
   const gone = new Set(removed);
@@ -62,7 +62,7 @@ export function valuesFor(model: ImplicitSurface, points: Float32Array, quantity
   return QUANTITIES[quantity](model, points);
 }
 
-/** Returns the level of f that the surface is extracted at: 0, or the mean of f over the surface constraints. */
+/** Returns the level of f at which the surface is extracted: 0, or the mean of f over the surface constraints. */
 export function levelOf(model: ImplicitSurface): number {
   if (model.params.level === 'zero') return 0;
   const values = model.evaluate(model.constraints().surface);
@@ -70,7 +70,8 @@ export function levelOf(model: ImplicitSurface): number {
 }
 
 /**
- * Returns the dimensions of a grid around the points with nearly cubic voxels, `size` of them along the longest side.
+ * Returns the dimensions of a grid around the points with nearly cubic voxels, `size` of them along the longest side
+ * and at least `LEAST_DIM` along the others.
  */
 export function cubicDims(points: Float32Array, size: number): Vec3 {
   const sides = [0, 1, 2].map((axis) => {
@@ -81,7 +82,10 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
   return sides.map((side) => Math.max(LEAST_DIM, Math.round((size * side) / longest))) as Vec3;
 }
 
-/** Collects the facts about the fit that the page displays; `complete` if there is a complete surface to measure. */
+/**
+ * Collects the facts about the fit that the page displays; distances from the surface only if `complete`, that is, if
+ * there is a complete surface.
+ */
 export function fitOf(model: ImplicitSurface, residual: number, complete: boolean): Fit {
   const { surface, exterior } = model.constraints();
   const { cell, spacing, duplicates, spuriousComponents, warning } = model;

@@ -2,7 +2,7 @@
 
 /** Target mean number of points per occupied cell: with fewer many cells are empty, with more searches take longer. */
 const PER_CELL = 4;
-/** Most cells along a side of the grid. */
+/** Largest number of cells along a side of the grid. */
 const MOST_CELLS = 96;
 
 /** Points sorted into the cells of a uniform grid. */
@@ -11,7 +11,9 @@ class PointGrid {
   readonly #low = [0, 0, 0];
   readonly #dims = [1, 1, 1];
   readonly #cell: number;
-  /** Index in `list` at which the points of each cell begin. */
+  /**
+   * Index into the list of points, sorted by cell, of the first point of each cell; one final entry is their number.
+   */
   readonly #begin: Uint32Array;
   readonly #list: Uint32Array;
 

@@ -4,16 +4,19 @@ import type { CloudViewOptions } from '../view/reconstruction';
 import { CLOUDS, type CloudExample } from './examples';
 import type { ParamValues } from './protocol';
 
-/** An expected count, or its least and largest value: how often a broken surface breaks depends on the last bit. */
+/**
+ * An expected count, or its least and largest value where rounding errors decide into how many pieces a surface falls
+ * apart.
+ */
 export type Count = number | readonly [least: number, most: number];
 
-/** Result of a run; tests compare the texts of a variant with it. */
+/** Expected result of a run of a variant; tests run the variant and compare. */
 export interface CloudOutcome {
   components: Count;
   genus: Count;
-  /** Mean curvature over the vertices; tests allow a tenth. */
+  /** Mean of |H| over the vertices, per unit of length of the points; tests allow a deviation of 10 %. */
   meanCurvature?: number;
-  /** Mean distance of the points from the surface; tests allow a tenth. */
+  /** Mean distance of the points from the surface, in the points' units; tests allow a deviation of 10 %. */
   fitness?: number;
 }
 
@@ -40,7 +43,10 @@ export interface CloudPreset extends CloudExample {
 
 const CARVED = text('reconstructPresets.carvedCredit');
 const STEREO = text('reconstructPresets.stereoCredit');
-/** Points on the voxel grid, of which a subsample is used, as in the paper. */
+/**
+ * Settings shared by the figures with the carved cow: points on a voxel grid, of which a subsample is used, as in the
+ * paper.
+ */
 const CARVED_COW = {
   source: { file: 'spot/carved.ply' },
   photographs: 'spot',
@@ -311,8 +317,8 @@ export function isCloudPreset(example: CloudExample | undefined): example is Clo
 }
 
 /**
- * Returns the variant of a figure whose settings are all in force, if there is one; unset parameters count as in
- * `defaults`.
+ * Returns the first variant of a figure whose settings are all in force, if there is one; parameters that neither it
+ * nor the figure sets must equal `defaults`.
  */
 export function variantInForce(
   preset: CloudPreset,

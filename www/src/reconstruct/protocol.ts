@@ -43,12 +43,12 @@ export interface CameraView {
 /** Source of points: a file, or a computed shape. */
 export type CloudSource = { file: NamedBytes } | { shape: PointShape };
 
-/** Points changed by hand. */
+/** Manual changes of the points. */
 export interface Edits {
   added: Vec3[];
-  /** Indices of removed points, in the order of loading. */
+  /** Indices of removed points in the cloud as loaded. */
   removed: number[];
-  /** Points known to be outside the object; they become exterior constraints. */
+  /** Points added outside the object; they become exterior constraints. */
   outside: Vec3[];
 }
 
@@ -56,7 +56,7 @@ export interface Edits {
 export interface Setup {
   /** Parameters that differ from the defaults. */
   params: ParamValues;
-  /** Largest number of points used; larger clouds are subsampled. */
+  /** Largest number of points used; larger clouds are subsampled. Undefined: the library's default. */
   maxPoints: number | undefined;
   /** Number of largest clusters of points to keep; all if undefined. */
   keepComponents: number | undefined;
@@ -82,7 +82,10 @@ export interface Fit {
   exteriorConstraints: number;
   /** Edge length of an extraction cell, in the points' units; 0 until it is known. */
   cell: number;
-  /** Mean distance to the nearest other point in use, in units of the normalised box, which is 2 long. */
+  /**
+   * Mean distance from a surface constraint to the nearest other one, in units of the normalised box, which is 2 long;
+   * 0 until the constraints are chosen.
+   */
   spacing: number;
   duplicates: number;
   strays: number;

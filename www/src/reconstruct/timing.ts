@@ -7,7 +7,10 @@ const RETIME_BELOW_MS = 2000;
 
 type TimingRequest = Requests['timing']['body'];
 
-/** Times one solve per size and kernel, and passes each timing to `onTiming`. Undefined if the signal aborts. */
+/**
+ * Measures the solve time for each size and kernel, and passes each result to `onTiming`; undefined if the signal
+ * aborts. Quick solves are timed twice.
+ */
 export async function timeSolves(
   cloud: Cloud,
   cameras: CameraView[],
@@ -56,7 +59,9 @@ async function timeOne(
   }
 }
 
-/** Runs the model until its solve has ended; returns the milliseconds spent in it. */
+/**
+ * Runs the model until its solve has ended; returns the milliseconds spent solving, or undefined if the signal aborts.
+ */
 async function solveTime(model: ImplicitSurface, signal: AbortSignal): Promise<number | undefined> {
   const solved = new AbortController();
   let milliseconds = 0;

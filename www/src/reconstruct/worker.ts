@@ -23,8 +23,9 @@ import type {
 } from './protocol';
 import { timeSolves } from './timing';
 
-/** Least milliseconds between two previews of a surface being extracted, and between two progress events. */
+/** Least milliseconds between two previews of a surface during its extraction. */
 const PREVIEW_EVERY = 100;
+/** Least milliseconds between two progress events during a run. */
 const REPORT_EVERY = 50;
 
 type Handlers = {
@@ -47,7 +48,7 @@ class Session {
   #previewedAt = 0;
   /** Whether the page has drawn the last surface it was sent. */
   #shown = true;
-  /** Version of the mesh that was sent last. */
+  /** Version of the complete mesh that was sent last; empty if there is none. */
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
@@ -103,7 +104,7 @@ class Session {
     return { params: { ...model.params } };
   }
 
-  /** Forgets reports and constraints: they belong to other points or another model. */
+  /** Discards the reports, and marks the constraints as not sent: they belong to other points or another model. */
   #startOver(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -223,7 +224,7 @@ class Session {
     }
   }
 
-  /** Sends the present surface, unless the page has it already. */
+  /** Sends the complete surface, unless the page has it already. */
   #showSurface(): void {
     const model = this.#model;
     if (!model || model.mesh.vertexCount === 0) return;

@@ -1,19 +1,19 @@
 /**
- * Immediate approximate deformation of a surface by its ellipsoids, the same as the first stage of a step of the model.
- * Keeps the surface under a dragging pointer.
+ * Approximate deformation of a surface by its ellipsoids, the same as the first stage of a step of the model. Moves the
+ * displayed surface with a dragging pointer before the model's result arrives.
  */
 import { lengthsOf } from './ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from './protocol';
 
 /**
- * Bounds the weight of an ellipsoid near its surface: there it is eleven times the weight at a distance of its shortest
- * semi-axis.
+ * Softening term of an ellipsoid's weight, added to the squared distance in units of its shortest semi-axis: at the
+ * surface of the ellipsoid the weight is eleven times that at a distance of its shortest semi-axis.
  */
 const WEIGHT_SOFTENING = 0.1;
 
 /**
- * Moves points, packed xyz, as the ellipsoids move from `before` to `after`: by the mean of the ellipsoids' affine
- * maps, weighted by proximity. Moves only the first `count` points; the returned array is as long as `points`.
+ * Moves points, packed xyz, with the ellipsoids from `before` to `after`: by the mean of the ellipsoids' affine maps,
+ * weighted by proximity. Returns an array as long as `points`, with only the first `count` points set.
  */
 export function deformPoints(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
   const maps = before.map((one, k) => mapBetween(one, after[k] ?? one));
@@ -22,12 +22,15 @@ export function deformPoints(points: Float32Array, before: Pose, after: Pose, co
   return out;
 }
 
-/** Affine map that takes one ellipsoid to another, with the data for its weight. */
+/** Affine map from one ellipsoid to another, with the data for its weight. */
 interface EllipsoidMap {
   center: Vec3;
-  /** Rows of the matrix that maps offsets from the centre to the frame in which the ellipsoid is the unit ball. */
+  /**
+   * Rows of the matrix that maps offsets from the centre of the first ellipsoid to the frame in which it is the unit
+   * ball.
+   */
   toUnit: [Vec3, Vec3, Vec3];
-  /** Centre of the other ellipsoid, and its semi-axes: they map the unit ball to it. */
+  /** Centre of the second ellipsoid; with its semi-axes `axes` it maps the unit ball to that ellipsoid. */
   newCenter: Vec3;
   axes: [Vec3, Vec3, Vec3];
   thinnest: number;

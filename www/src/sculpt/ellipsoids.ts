@@ -2,7 +2,7 @@
 import type { ControlEllipsoid } from 'vesicle';
 import type { Vec3 } from '../protocol';
 
-/** Least factor of one scaling; 0 would make the ellipsoid degenerate. */
+/** Least scale factor of a semi-axis; 0 would make the ellipsoid degenerate. */
 const LEAST_FACTOR = 1e-3;
 
 /** Returns a ball as an ellipsoid. */
@@ -37,14 +37,17 @@ export function turned({ center, axes }: ControlEllipsoid, about: Vec3, angle: n
   return { center, axes: axes.map((axis) => rotated(axis, about, angle)) as ControlEllipsoid['axes'] };
 }
 
-/** Returns the ellipsoid rotated by `angle`, in radians, about the axis through a point along a unit vector. */
+/**
+ * Returns the ellipsoid rotated by `angle`, in radians, about the axis through the point `place` in direction of the
+ * unit vector `about`.
+ */
 export function turnedAbout(ellipsoid: ControlEllipsoid, place: Vec3, about: Vec3, angle: number): ControlEllipsoid {
   const { axes } = turned(ellipsoid, about, angle);
   const arm = added(ellipsoid.center, times(place, -1));
   return { center: added(place, rotated(arm, about, angle)), axes };
 }
 
-/** Returns the ellipsoid with each semi-axis scaled by its factor. */
+/** Returns the ellipsoid with each semi-axis scaled by the absolute value of its factor, at least `LEAST_FACTOR`. */
 export function scaled({ center, axes }: ControlEllipsoid, factors: Vec3): ControlEllipsoid {
   const longer = axes.map((axis, k) => times(axis, Math.max(LEAST_FACTOR, Math.abs(factors[k] ?? 1))));
   return { center, axes: longer as ControlEllipsoid['axes'] };
@@ -71,7 +74,9 @@ export function between(from: ControlEllipsoid, to: ControlEllipsoid, t: number)
   return scaled({ center, axes: whole.axes }, factors);
 }
 
-/** Returns the rotation between the axis directions of two ellipsoids, as unit vector and angle. */
+/**
+ * Returns the rotation from the axis directions of one ellipsoid to those of another: unit vector and angle in radians.
+ */
 function rotationFrom(from: ControlEllipsoid, to: ControlEllipsoid): { about: Vec3; angle: number } {
   const [a, b] = [unitAxes(from), unitAxes(to)];
   const entry = (i: number, j: number) => a.reduce((sum, axis, k) => sum + (b[k]?.[i] ?? 0) * (axis[j] ?? 0), 0);
@@ -104,7 +109,7 @@ function cross(a: Vec3, b: Vec3): Vec3 {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
-/** Rotates a vector about a unit vector by Rodrigues' formula. */
+/** Rotates a vector about a unit vector by `angle`, in radians, with Rodrigues' formula. */
 function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
   const along = about[0] * vector[0] + about[1] * vector[1] + about[2] * vector[2];
@@ -112,7 +117,7 @@ function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
   return added(sideways, times(about, along * (1 - cosine)));
 }
 
-/** Returns an ellipsoid as twelve numbers: its centre and its semi-axes. */
+/** Returns an ellipsoid as twelve numbers: its centre and its three semi-axes. */
 export function toNumbers({ center, axes }: ControlEllipsoid): number[] {
   return [...center, ...axes.flat()];
 }
@@ -136,7 +141,7 @@ function halfWidth({ axes }: ControlEllipsoid, k: number): number {
   return Math.hypot(...axes.map((axis) => axis[k] ?? 0));
 }
 
-/** Tests whether two poses are the same up to rounding: the model stores ellipsoids in another form. */
+/** Tests whether two poses are the same up to rounding, since the model stores ellipsoids in another form. */
 export function samePose(one: readonly ControlEllipsoid[], other: readonly ControlEllipsoid[]): boolean {
   return one.length === other.length && one.every((ellipsoid, k) => isSame(ellipsoid, other[k] ?? ellipsoid));
 }

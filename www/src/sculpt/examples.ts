@@ -18,7 +18,7 @@ export interface SculptExample {
   up: 'y' | 'z';
   /** Ellipsoids at the start; if undefined, they are fitted to the mesh. */
   start?: Pose;
-  /** Names of the ellipsoids. */
+  /** Names of the ellipsoids, in the order of `start`. */
   names?: string[];
   /** Pose that the ellipsoids move to when the example opens, unless a film plays. */
   pose?: Pose;
@@ -54,17 +54,20 @@ export const BUST_NAMES = [
 ];
 export const BUST_MESHES = { detail: { file: 'nefertiti.ply' }, base: { file: 'nefertiti-base.ply' } } as const;
 
-/** Where head and neck meet. */
+/** Point where head and neck of the bust meet; the head is rotated about it. */
 const NAPE: Vec3 = [0, -40, 20];
 
-/** Returns the pose in which crown and head are rotated together about the nape, then moved by `by`. */
+/**
+ * Returns the bust's pose with crown and head rotated together about the nape, by `angle` in radians, then moved by
+ * `by`.
+ */
 function headTurned(about: Vec3, angle: number, by: Vec3): Pose {
   const [crown, head, ...others] = BUST;
   const turn = (one: Pose[number]) => moved(turnedAbout(one, NAPE, about, angle), by);
   return [...[crown, head].flatMap((one) => (one ? [turn(one)] : [])), ...others];
 }
 
-/** The bust with the head turned aside on a longer neck. */
+/** Pose of the bust with the head turned aside on a longer neck. */
 export const LOOKING_ASIDE: Pose = headTurned([0, 1, 0], 0.5, [8, 26, 0]);
 
 /** The film of the lava lamp. */

@@ -5,7 +5,7 @@ import { ball, between, lengthsOf } from './ellipsoids';
 /** Keyframes with `between` frames from each to the next, or a computed motion. */
 export type Film = { keys: ControlEllipsoid[][]; between: number; loop: boolean } | { motion: 'lava'; loop: boolean };
 
-/** Frames of one period of the lava lamp. */
+/** Number of frames in one period of the lava lamp's motion. */
 const LAVA_FRAMES = 300;
 
 /** Returns the number of the last frame; the first is 0. In a loop the last frame shows the same pose as the first. */
@@ -29,16 +29,16 @@ function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): Contr
 }
 
 /**
- * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless `MAX_GLIDE_FRAMES`
- * limits the number of frames. The model's own steps are longer.
+ * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless
+ * `MAX_GLIDE_FRAMES` limits the number of frames. Steps of the model itself are longer.
  */
 const GLIDE_STEP = 0.4;
-/** Most frames of a glide: one small ellipsoid that moves far should not delay all others. */
+/** Largest number of frames of a glide: one small ellipsoid that moves far should not delay all others. */
 const MAX_GLIDE_FRAMES = 40;
 
 /**
- * Returns the poses of a glide, in which all ellipsoids arrive together, so that the surface moves as a whole. Moved by
- * the model alone, large ellipsoids run ahead of small ones and strain the membrane between them.
+ * Returns the poses of a glide, the last of which is `to`: all ellipsoids arrive together, so that the surface moves as
+ * a whole. Moved by the model alone, large ellipsoids run ahead of small ones and strain the membrane between them.
  */
 export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): ControlEllipsoid[][] {
   const distances = to.map((one, k) => {

@@ -1,21 +1,21 @@
-/** Fits ellipsoids to an unknown mesh: a row of them along its longest principal axis. */
+/** Fits ellipsoids to an arbitrary mesh: a row of them along its longest principal axis. */
 import type { ControlEllipsoid, Mesh } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { added, times } from './ellipsoids';
 
-/** Most ellipsoids in a row. */
+/** Largest number of ellipsoids in a row. */
 const MAX_ELLIPSOIDS = 5;
 /**
- * Semi-axes as a share of the width of a slice. If larger, the membrane bulges where the mesh is concave; if smaller,
- * it is slack.
+ * Semi-axes of an ellipsoid as a share of the half widths of its slice. If larger, the membrane bulges where the mesh
+ * is concave; if smaller, it is slack.
  */
 const FILL = 0.9;
-/** Least semi-axis as a share of the size of the mesh; shorter ones would make needles. */
+/** Least semi-axis across the row, as a share of the longest extent of the mesh; shorter ones would make needles. */
 const MIN_SEMI_AXIS = 0.03;
 
 /**
  * Returns a row of ellipsoids from one end of the mesh to the other; their number is 1.5 times its length over its
- * width, within 1 and `MAX_ELLIPSOIDS`.
+ * width, between 1 and `MAX_ELLIPSOIDS`.
  */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
@@ -36,7 +36,10 @@ export function fitted(mesh: Mesh): ControlEllipsoid[] {
   }));
 }
 
-/** Returns the centre and half widths of the vertices between two planes, `isWhole` if they are all of the mesh. */
+/**
+ * Returns the centre and semi-axes, in principal coordinates, of an ellipsoid for the vertices with `from` ≤ x ≤ `to`.
+ * `least` bounds its width from below; `isWhole` tells that these are all vertices.
+ */
 function sliceEllipsoid(local: Float32Array, [from, to]: [number, number], isWhole: boolean, least: number) {
   const sums = [0, 0, 0, 0, 0];
   for (let i = 0; i < local.length; i += 3) {
@@ -76,8 +79,8 @@ function spanOf(local: Float32Array, k: number): [number, number] {
 }
 
 /**
- * Returns the eigenvectors of a symmetric 3 × 3 matrix, given row by row, by Jacobi rotations; that of the largest
- * eigenvalue first.
+ * Returns the eigenvectors of a symmetric 3 × 3 matrix, given row by row, computed by Jacobi rotations; that of the
+ * largest eigenvalue first. They are right-handed.
  */
 export function principalAxes(matrix: number[]): Vec3[] {
   const a = [matrix.slice(0, 3), matrix.slice(3, 6), matrix.slice(6, 9)];

@@ -2,7 +2,7 @@
 
 const WIDTH = 1024;
 const HEIGHT = 512;
-/** Degrees between lines of the grid. */
+/** Spacing of the map's grid lines, degrees. */
 const GRID = 15;
 
 /**
@@ -74,7 +74,9 @@ function paint(context: OffscreenCanvasRenderingContext2D): void {
 const x = (longitude: number) => ((longitude + 180) / 360) * WIDTH;
 const y = (latitude: number) => ((90 - latitude) / 180) * HEIGHT;
 
-/** Fills a disc on the globe, which is wider on the map the nearer it is to a pole. */
+/**
+ * Fills a disc given by longitude, latitude and radius in degrees; on the map it is wider the nearer it is to a pole.
+ */
 function paintLand(
   context: OffscreenCanvasRenderingContext2D,
   [longitude, latitude, radius]: [number, number, number],

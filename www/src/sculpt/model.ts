@@ -8,7 +8,7 @@ import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';
 import { computedMesh } from './shapes';
 
-/** The ellipsoid of a model that has neither a mesh nor ellipsoids: the membrane needs at least one. */
+/** Ellipsoid of a model that has neither a mesh nor ellipsoids: the membrane needs at least one. */
 const DEFAULT_ELLIPSOIDS: Pose = [
   {
     center: [0, 0, 0],
@@ -47,7 +47,10 @@ export function freeScene({ detail, base }: Scene): void {
   base?.free();
 }
 
-/** Scales tried for fitted ellipsoids: the largest for which a base can be built preserves the shape best. */
+/**
+ * Scale factors for fitted ellipsoids, tried in this order until a base can be built: the largest preserves the shape
+ * best.
+ */
 const FIT_SCALES = [1, 0.8, 0.6, 0.4];
 
 /** Builds the first model of a scene; also returns the ellipsoids it starts with, given or fitted. */
@@ -70,7 +73,7 @@ export function firstModel(scene: Scene, setup: Setup): { model: Multiresolution
   throw refusal;
 }
 
-/** Builds a model in its start pose; the caller then sends the ellipsoids elsewhere. */
+/** Builds a model in its start pose; the caller then sets the target pose. */
 export function buildModel({ detail, base }: Scene, start: Pose, { params }: Setup): MultiresolutionModel {
   return new MultiresolutionModel({
     ellipsoids: start,
@@ -80,7 +83,7 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
   });
 }
 
-/** Returns a copy of a mesh for the page to draw. */
+/** Returns a copy of a mesh for the page to draw, with `values` if there is one for each vertex. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
   const { uvs: _, ...surface } = copySurface(emptyArrays(), mesh);
   // Values computed for another mesh do not belong to these vertices.
@@ -98,8 +101,8 @@ export function texturedSurfaceOf(mesh: Mesh): Surface {
 }
 
 /**
- * Returns one value per vertex: curvature of the result, or distortion of the base as a power of two, 0 where there is
- * none.
+ * Returns one value per vertex: the mean curvature of the result, or log₂ of the area or angle distortion of the base,
+ * 0 where area or angles are preserved.
  */
 export function valuesFor(model: MultiresolutionModel, quantity: SculptQuantity): Float32Array {
   if (quantity === 'mean curvature') return model.mesh.curvature('mean');
@@ -107,7 +110,7 @@ export function valuesFor(model: MultiresolutionModel, quantity: SculptQuantity)
   return (quantity === 'area distortion' ? area : angle).map(Math.log2);
 }
 
-/** Collects the facts about the correspondence and the detail that the page displays. */
+/** Collects the facts about the map T and the detail that the page displays. */
 export function factsOf(model: MultiresolutionModel): Facts {
   const { bandCount: bands, folded, unmatchedVertices: missed, heldVertices: held } = model;
   const { area, angle } = model.distortion();

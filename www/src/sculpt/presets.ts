@@ -6,7 +6,7 @@ import { BUST, BUST_MESHES, BUST_NAMES, LAVA, LOOKING_ASIDE, NEFERTITI, SCENES, 
 import { poseAt } from './film';
 import type { ParamValues, Pose, StageKind } from './protocol';
 
-/** Result of a pose as ranges, each from least to largest; tests compare the texts of a variant with it. */
+/** Expected result of a variant's pose as ranges, each from least to largest; tests compute the pose and compare. */
 export interface SculptOutcome {
   components: [number, number];
   folded: [number, number];
@@ -31,7 +31,7 @@ export interface SculptPreset extends SculptExample {
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
   view?: Partial<SculptViewOptions>;
-  /** Meshes of restructuring stages to display; they need no model. */
+  /** Series of restructuring stages to display instead of the model's meshes. */
   stages?: StageKind;
 }
 
@@ -59,7 +59,7 @@ const WIDE_CROWN = bustWith((one, index) => (index === 0 ? scaled(one, [1.45, 1,
 
 const BALL_SCENE = { up: 'y', color: 'plain', params: {} } as const;
 const ONE_BALL: Pose = [ball(0, 0, 0, 0.98)];
-/** All in the same place: each takes its part of the map along. */
+/** Start pose of the globe in figure 10: three ellipsoids in the same place; each takes its part of the map along. */
 const GLOBE_START: Pose = [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97), ball(0, 0, 0, 0.96)];
 const APART: Pose = [ball(-0.6, 0, 0, 0.85), ball(0.1, 0.1, 0, 0.5), ball(0.8, 0.3, 0, 0.6)];
 const LENS: Pose = [0, 1, 2].map(() => upright([0, 0, 0], [1.5, 0.55, 1.2]));
@@ -260,8 +260,8 @@ export function isSculptPreset(example: SculptExample | undefined): example is S
 }
 
 /**
- * Returns all poses that an example moves its ellipsoids to, in its film and its variants, so that the view can leave
- * room for them.
+ * Returns the poses in an example's keyframes and variants, so that the view can leave room for them; poses of computed
+ * films are not included.
  */
 export function posesOf(example: SculptExample | undefined): Pose[] {
   const film = example?.film;
@@ -271,8 +271,8 @@ export function posesOf(example: SculptExample | undefined): Pose[] {
 }
 
 /**
- * Returns the variant of a figure whose settings are all in force, if there is one; unset parameters count as in
- * `usual`.
+ * Returns the first variant of a figure whose pose and parameters are all in force, if there is one; parameters that it
+ * does not set must equal `usual`.
  */
 export function variantInForce(
   preset: SculptPreset,

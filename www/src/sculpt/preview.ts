@@ -1,16 +1,16 @@
 import type { MultiresolutionModel, MultiresParams } from 'vesicle';
 
-/** Milliseconds that a frame may take during a drag; after a slower one the preview uses longer edges. */
+/** Longest duration of a step during a drag, milliseconds; after a slower one the preview uses longer edges. */
 const SLOW_FRAME_MS = 60;
-/** Factor of the edge lengths of the preview: 2 means a quarter of the triangles. */
+/** Factor by which the preview lengthens edges after a slow step of a drag: 2 means a quarter of the triangles. */
 const EDGE_FACTOR = 2;
 
 /**
- * Reduces the model's resolution during motion: the result is no finer than the base surface and, during a drag with
- * slow frames, edges are longer. Restores the set parameters at rest.
+ * Reduces the model's resolution during motion: the result is no finer than the base surface and, after a slow step of
+ * a drag, edges are longer. Restores the set parameters at rest.
  */
 export class Preview {
-  /** Set values of the parameters that the preview has changed. */
+  /** Parameters as set, while the preview has changed them; else undefined. */
   #saved: MultiresParams | undefined;
   #coarse = false;
 

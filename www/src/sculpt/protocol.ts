@@ -36,7 +36,7 @@ export type {
   Vec3,
 };
 
-/** The ellipsoids, in a fixed order. */
+/** All ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
 /** Source of a mesh: a file, or a computed shape. */
@@ -50,19 +50,23 @@ export interface SceneSource {
 
 /** All that a model is built from, besides the meshes. */
 export interface Setup {
-  /** The ellipsoids before the first step; if undefined, they are fitted to the mesh. */
+  /**
+   * The ellipsoids before the first step. If undefined, `open` fits them to the mesh (a unit ball if there is none),
+   * and `rebuild` keeps those of the previous model.
+   */
   start: Pose | undefined;
   /** Parameters that differ from the defaults. */
   params: ParamValues;
-  /** Pose that the ellipsoids then move to. */
+  /** Target pose of the ellipsoids, to which they move from the start; if undefined, they stay. */
   pose: Pose | undefined;
 }
 
 /** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** The ellipsoids at the start, and the pose they move to. */
+  /** The ellipsoids at the start. */
   start: Pose;
+  /** Pose that the ellipsoids move to. */
   pose: Pose;
 }
 
@@ -78,8 +82,8 @@ export interface OpenedScene extends Ready {
 }
 
 /**
- * The meshes displayed: the result, the base, both, all stages of figure 1, the solver's levels, or stages of
- * restructuring.
+ * The meshes displayed: the result, the base, both of them, a row with all stages of figure 1, the solver's levels, or
+ * stages of restructuring.
  */
 export type Layout = 'result' | 'base' | 'pair' | 'row' | 'levels' | 'stages';
 
@@ -95,11 +99,11 @@ export interface Stage {
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
 export type SculptQuantity = 'area distortion' | 'angle distortion' | 'mean curvature';
 
-/** Data requested for each frame. */
+/** Data that the page requests with each frame. */
 export interface FrameContents {
   layout: Layout;
   quantity: SculptQuantity | undefined;
-  /** Whether the surface is sent with texture coordinates. */
+  /** Whether the result is sent with texture coordinates; it then has no values. */
   textured: boolean;
 }
 
@@ -107,20 +111,21 @@ export interface FrameContents {
 export interface SavedPose {
   state: Uint8Array;
   iteration: number;
-  /** Frame of the film. */
+  /** Frame of the film at which the model was saved. */
   frame: number;
 }
 
-/** Facts about the correspondence and the detail, beyond the measures of the mesh. */
+/** Facts about the map T and the detail, beyond the measures of the mesh. */
 export interface Facts {
   bands: number;
   folded: number;
   missed: number;
   held: number;
-  /** 5th and 95th percentile of the area on the base over that on the deformed base. */
+  /** 5th percentile of the area distortion: area on the undeformed base over that on the deformed base. */
   areaLow: number;
+  /** 95th percentile of the area distortion: area on the undeformed base over that on the deformed base. */
   areaHigh: number;
-  /** 95th percentile of the longest over the shortest stretch. */
+  /** 95th percentile of the angle distortion: largest over smallest stretch. */
   angleHigh: number;
 }
 
@@ -143,7 +148,7 @@ export interface Requests {
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
   show: { body: FrameContents; reply: undefined };
-  /** The undeformed base and the detailed surface, as given. */
+  /** Replies with the undeformed base, and the detailed surface as loaded. */
   originals: { body: undefined; reply: { base: Surface; detail: Surface | undefined } };
   /** Saves the present state of the model, also while it is running. */
   save: { body: undefined; reply: SavedPose };
@@ -173,28 +178,29 @@ export interface PoseMessage {
 }
 export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
 
-/** The model after a step. */
+/** The model after a step, or after a change of the data requested with each frame. */
 export interface FrameEvent {
   event: 'frame';
   result: Surface;
-  /** The deformed base, and the link mesh T, if the layout includes them. */
+  /** The deformed base, unless the layout is only the result. */
   base?: Surface;
+  /** The map T: the vertices of the base at their positions on the undeformed base; in the layout `row`. */
   link?: Surface;
   /** The solver's meshes from coarse to fine, if the layout includes them. */
   levels?: Stage[];
   reports: StepReport[];
-  /** Present ellipsoids; removed ones that are still vanishing follow at the end. */
+  /** Present ellipsoids; removed ones that are still shrinking follow at the end. */
   ellipsoids: Pose;
-  /** Target pose. */
+  /** Pose that the ellipsoids move to. */
   pose: Pose;
   /** Number of the last pose received before this step. */
   poseId: number;
-  /** Frame of the film. */
+  /** Present frame of the film, from 0. */
   frame: number;
   /** Duration of the step in milliseconds. */
   durationMs: number;
   /**
-   * Whether the frame is a preview: its detail is reduced and, after slow frames of a drag, its edges are twice as long
+   * Whether the frame is a preview: its detail is reduced and, after a slow step of a drag, its edges are twice as long
    * as set.
    */
   preview: boolean;
@@ -205,7 +211,7 @@ export interface MeasuredEvent {
   measures: Measures;
   facts: Facts;
 }
-/** A pose was rejected; the ellipsoids keep their previous target, `pose`. */
+/** Reports that a pose was rejected; the ellipsoids keep their previous target, `pose`. */
 export interface RefusedEvent {
   event: 'refused';
   failure: Failure;

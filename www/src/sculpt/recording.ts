@@ -3,8 +3,8 @@ import { animationGlb, type Mesh, type MultiresolutionModel } from 'vesicle';
 import { type Film, lastFrame, poseAt } from './film';
 
 /**
- * Most steps granted to the surface to reach the first pose before recording starts; motion that remains then is
- * recorded.
+ * Largest number of steps in which the surface may reach the first pose before recording starts; motion that remains
+ * then is recorded.
  */
 const MOST_TO_START = 60;
 
@@ -37,7 +37,7 @@ export async function recorded(
   }
 }
 
-/** Lets pending messages be handled first, since one of them may cancel; returns whether it has. */
+/** Returns whether the signal has aborted, after handling pending messages, one of which may abort it. */
 async function isCancelled(signal: AbortSignal): Promise<boolean> {
   await new Promise((resolve) => setTimeout(resolve, 0));
   return signal.aborted;

@@ -4,8 +4,9 @@ import { drawnMap } from './map';
 
 export type ComputedMesh = 'globe' | 'ball';
 
-/** Numbers of meridians of the globe, and of circles of latitude between the poles. */
+/** Number of meridians of the globe. */
 const MERIDIANS = 96;
+/** Number of circles of latitude of the globe between the poles. */
 const CIRCLES = 47;
 
 /** Returns a computed mesh, with its texture if it has one. */

@@ -5,7 +5,7 @@ import { text } from '../texts';
 import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
-/** Most meshes in a row. */
+/** Largest number of solver levels displayed side by side. */
 const MAX_MESHES = 5;
 
 /** Returns the meshes that the membrane was solved on, from coarse to fine; the finest ones if there are too many. */
@@ -24,8 +24,8 @@ function sizeOf(mesh: Mesh): string {
 }
 
 /**
- * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST_SHARE` of them falls below; 1
- * is equilateral.
+ * Returns a mesh with its caption: the number of triangles, and the quality below which a share `WORST_SHARE` of them
+ * lies; 1 is equilateral.
  */
 function withCaption(mesh: Mesh, name: string): Stage {
   const surface = surfaceOf(mesh);
@@ -37,7 +37,7 @@ function withCaption(mesh: Mesh, name: string): Stage {
   };
 }
 
-/** Share of the triangles that are counted as the worst. */
+/** Share of the triangles whose quality lies below the one in the caption of a stage. */
 const WORST_SHARE = 0.05;
 
 /**
@@ -55,7 +55,7 @@ function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   });
 }
 
-/** Edge length of the ball that is deformed. */
+/** Edge length of the deformed ball, which has radius 1. */
 const EDGE = 0.16;
 /** Rounds of restructuring after which hardly any edge is out of bounds. */
 const ROUNDS = 6;
@@ -102,11 +102,12 @@ function restructured(mesh: Mesh): Stage[] {
   }
 }
 
-/** Bounds of the edge lengths for restructuring. */
+/** Bounds of the edge lengths for restructuring the deformed ball. */
 const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 
 /**
- * Returns the stages of figure 6: one pass after the other, then all of them until hardly any edge is out of bounds.
+ * Returns the stages of figure 6: after each pass in turn, then after further rounds of all passes, when hardly any
+ * edge is out of bounds.
  */
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();

@@ -2,14 +2,17 @@ import type { MultiresolutionModel } from 'vesicle';
 import { type Film, glide, lastFrame, poseAt } from './film';
 import type { Pose } from './protocol';
 
-/** Sets the ellipsoids' target of each frame: along a film while it plays, else along a glide to the last pose sent. */
+/**
+ * Sets the target pose of the ellipsoids for each frame: along a film while it plays, else along a glide to the last
+ * pose requested.
+ */
 export class TargetPath {
-  /** The film that is loaded. */
+  /** The loaded film, if any. */
   #film: Film | undefined;
-  /** Frame of the film that the ellipsoids were sent to last. */
+  /** Present frame of the film, from 0. */
   #frame = 0;
   #playing = false;
-  /** Remaining poses of the glide to the last pose sent. */
+  /** Remaining poses of the glide to the last pose requested. */
   #glide: Pose[] = [];
 
   get film(): Film | undefined {
@@ -20,7 +23,7 @@ export class TargetPath {
     return this.#frame;
   }
 
-  /** Whether poses of a film or a glide remain. */
+  /** Whether a film is playing or poses of a glide remain. */
   get isUnderWay(): boolean {
     return this.#playing || this.#glide.length > 0;
   }
@@ -30,7 +33,7 @@ export class TargetPath {
     return this.#glide.at(-1) ?? model.targets;
   }
 
-  /** Loads a film at a frame, without playing it. */
+  /** Loads a film at a frame, at most its last one, without playing it. */
   setFilm(film: Film | undefined, frame: number): void {
     this.#film = film;
     this.#frame = film ? Math.min(frame, lastFrame(film)) : 0;
@@ -45,7 +48,7 @@ export class TargetPath {
     this.#glide = [];
   }
 
-  /** Arranges for one more frame of the film, if there is one, when the user steps through it. */
+  /** Makes the next call of `next` advance the film by a frame, if one is left; used when the user steps through it. */
   playOne(): void {
     const film = this.#film;
     this.#playing = film !== undefined && (film.loop || this.#frame < lastFrame(film));
@@ -63,14 +66,14 @@ export class TargetPath {
     this.#playing = false;
   }
 
-  /** Sets the target pose at once, as during a drag. */
+  /** Sets the target pose at once, as during a drag; ends playing and gliding. */
   jumpTo(model: MultiresolutionModel, pose: Pose): void {
     model.setEllipsoids(pose);
     this.#glide = [];
     this.#playing = false;
   }
 
-  /** Starts a glide to a pose, frame by frame. If the model rejects the pose, it throws now. */
+  /** Starts a glide to a pose, frame by frame. Throws at once if the model rejects the pose. */
   glideTo(model: MultiresolutionModel, pose: Pose): void {
     const from = model.targets;
     model.setEllipsoids(pose);
@@ -79,7 +82,7 @@ export class TargetPath {
     this.#playing = false;
   }
 
-  /** Sets the model's target to the pose of the next frame, if there is one. */
+  /** Sets the model's target to the next pose of the film or glide, if there is one. */
   next(model: MultiresolutionModel): void {
     const next = this.#playing ? this.#nextOfFilm() : this.#glide.shift();
     if (next) model.setEllipsoids(next);

@@ -96,7 +96,7 @@ class Session {
     this.#wake();
   }
 
-  /** Takes a target pose at once, so that the next step uses the newest one; starts a run if none is active. */
+  /** Accepts a target pose at once, so that the next step uses the newest one; starts a run if none is active. */
   pose({ pose, poseId, dragging }: PoseMessage): void {
     if (!this.#model) return;
     try {
@@ -150,7 +150,7 @@ class Session {
     return { params: { ...model.params }, start, pose: pose ?? start };
   }
 
-  /** Forgets the reports: they belong to another run. */
+  /** Discards the reports, which belong to another run, and allows the next frame to be sent. */
   #forget(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -222,7 +222,7 @@ class Session {
     }
   }
 
-  /** Does one step of the model, and of the film while it plays. */
+  /** Does one step of the model, after moving its target by one frame of the film or glide. */
   #next(): void {
     const model = this.#current();
     this.#path.next(model);
@@ -260,7 +260,7 @@ class Session {
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
   }
 
-  /** Sets parameters, ends a preview first, and returns all set values. */
+  /** Sets parameters and returns the values of all; ends a preview before. */
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     this.#preview.end(model);

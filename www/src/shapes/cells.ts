@@ -12,7 +12,7 @@ const LOBES: { middle: Point; radius: number }[] = [
 ];
 /** Width of the blend between two lobes, voxels. */
 const BLEND = 5;
-/** Half the thickness of the marked boundary, voxels. */
+/** Distance from the surface of the nucleus, voxels, at which the brightness of its boundary has dropped to 1/e. */
 const MARK = 2.2;
 
 /** A nucleus of three lobes with only its boundary bright, and noise. */

@@ -2,10 +2,11 @@
 import { type ShapeVoxels, sample } from './sampling';
 
 const RINGS_SIZE = 64;
-/** Radii of the linked rings, voxels: of a ring's centre line, and of its tube. */
+/** Radius of the centre line of each linked ring, voxels. */
 const RING_RADIUS = 15;
+/** Radius of the tube of each linked ring, voxels. */
 const TUBE_RADIUS = 5.5;
-/** The same radii for the chain. */
+/** Size of the chain's volume, radius of the centre line of each ring, and radius of its tube; voxels. */
 const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
 /** Width of the empty margin on each side of the sponge, voxels. */
 const SPONGE_MARGIN = 4;

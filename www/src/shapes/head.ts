@@ -3,15 +3,20 @@ import { noise, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 const SIZE = 112;
 const MIDDLE = (SIZE - 1) / 2;
-/** Semi-axes of the skin and of the skull's outer surface, and the skull's thickness, voxels. */
+/** Semi-axes of the skin, voxels. */
 const SKIN = [43, 50, 48] as const;
+/** Semi-axes of the skull's outer surface, voxels. */
 const SKULL = [35, 42, 40] as const;
+/** Thickness of the skull, voxels. */
 const THICKNESS = 9;
 const SOFT_TISSUE = 75;
 const BONE = 220;
 const NOISE = 6;
 
-/** Openings of the skull as cylinders through its centre, by direction and radius: orbits, ears, nose, spinal cord. */
+/**
+ * Openings of the skull as cylinders from its centre outwards, by unit direction and radius in voxels: orbits, nose,
+ * spinal cord, ears.
+ */
 const OPENINGS: { direction: readonly [number, number, number]; radius: number }[] = [
   { direction: [0.42, 0.88, 0.22], radius: 7 },
   { direction: [-0.42, 0.88, 0.22], radius: 7 },
@@ -32,14 +37,17 @@ export function headPhantom(): ShapeVoxels {
   });
 }
 
-/** Depth of a point in an ellipsoid; first-order approximation near its surface. */
+/**
+ * Returns the approximate depth of a point below the surface of an ellipsoid at the origin, voxels; negative outside.
+ * First-order accurate near the surface.
+ */
 function depthInEllipsoid([x, y, z]: readonly [number, number, number], [a, b, c]: readonly [number, number, number]) {
   const level = Math.hypot(x / a, y / b, z / c);
   const slope = Math.hypot(x / (a * a), y / (b * b), z / (c * c)) / (level || 1);
   return slope > 0 ? (1 - level) / slope : a;
 }
 
-/** Depth of a point in the nearest opening, negative outside all. */
+/** Returns the largest depth of a point inside any opening of the skull, voxels; negative outside all of them. */
 function depthInOpenings(at: readonly [number, number, number]): number {
   return OPENINGS.reduce((deepest, { direction, radius }) => {
     const along = at[0] * direction[0] + at[1] * direction[1] + at[2] * direction[2];

@@ -1,4 +1,4 @@
-/** Sampling functions and noise shared by the computed volumes: a grid of bytes, x fastest, cubic voxels. */
+/** Sampling functions and noise shared by the computed volumes. */
 
 export interface ShapeVoxels {
   data: Uint8Array;
@@ -7,7 +7,10 @@ export interface ShapeVoxels {
 
 type Point = readonly [number, number, number];
 
-/** Samples a function of voxel indices, clamped to 0..255; a single number as `size` gives a cube. */
+/**
+ * Samples a function of voxel indices on a grid of bytes, x fastest, clamped to 0..255; a single number as `size` gives
+ * a cube.
+ */
 export function sample(
   size: number | [number, number, number],
   value: (i: number, j: number, k: number) => number,
@@ -23,7 +26,7 @@ export function sample(
   return { data, dims };
 }
 
-/** A seeded pseudo-random generator (mulberry32) of numbers in 0..1, identical on every machine. */
+/** Returns a seeded generator of pseudo-random numbers from 0 to below 1 (mulberry32), identical on every machine. */
 export function random(seed: number): () => number {
   let state = seed;
   return () => {
@@ -35,8 +38,8 @@ export function random(seed: number): () => number {
 }
 
 /**
- * A generator of approximately normal noise with mean 0 and the given standard deviation: the sum of four uniform
- * numbers.
+ * Returns a generator of approximately normal noise with mean 0 and the given standard deviation: the sum of four
+ * uniform numbers.
  */
 export function noise(seed: number, deviation: number): () => number {
   const next = random(seed);
@@ -48,7 +51,7 @@ export function distance(a: Point, b: Point): number {
 }
 
 /**
- * Smooth step from 0 (outside) to 1 (inside), ½ at the border; `depth` in voxels, positive inside, over three voxels.
+ * Linear ramp from 0 (outside) to 1 (inside), three voxels wide, ½ at the border; `depth` in voxels, positive inside.
  */
 export function smoothStep(depth: number): number {
   return Math.min(1, Math.max(0, 0.5 + depth / 3));

@@ -11,13 +11,12 @@ interface Segment {
 
 const SIZE = 112;
 const GENERATIONS = 6;
-/**
- * Radius of the trunk in voxels, and ratio of a child's radius to its parent's, by conservation of flow (Murray's law).
- */
+/** Radius of the trunk, voxels. */
 const TRUNK = 4;
+/** Ratio of a child's radius to its parent's, by conservation of flow (Murray's law). */
 const THINNER = 0.5 ** (1 / 3);
 const SHORTER = 0.8;
-/** Angle between a child and its parent, radians. */
+/** Mean angle between a child and its parent, radians. */
 const TURN = 0.62;
 /** Vessel segments not connected to the tree. */
 const ISLANDS: Segment[] = [
@@ -53,7 +52,7 @@ function tree(): Segment[] {
   return segments;
 }
 
-/** Returns a unit vector perpendicular to a given unit vector, at an angle around it. */
+/** Returns the unit vector perpendicular to a unit vector, at `angle` (radians) around it. */
 function across([x, y, z]: Point, angle: number): Point {
   const other: Point = Math.abs(x) < 0.7 ? [1, 0, 0] : [0, 1, 0];
   const u = unit([y * other[2] - z * other[1], z * other[0] - x * other[2], x * other[1] - y * other[0]]);
@@ -66,7 +65,10 @@ function unit(v: Point): Point {
   return v.map((x) => x / length) as Point;
 }
 
-/** Draws a capsule into the volume, as the maximum of both; visits only the voxels around it. */
+/**
+ * Draws a capsule into the volume: `strength` becomes the maximum of its value and the capsule's, 0 to 1. Visits only
+ * the voxels around the capsule.
+ */
 function draw({ from, to, radius }: Segment, strength: Float32Array): void {
   const reach = radius + 2;
   const length = distance(from, to) ** 2;

@@ -1,6 +1,9 @@
 import catalogue from './en.json';
 
-/** All texts of the interface are in `en.json`, by the part of the app; to translate it, translate that file, and set this to its language. */
+/**
+ * Language of the interface, for plural and number formats. All texts are in `en.json`, by the part of the app; to
+ * translate the interface, translate that file and change this constant.
+ */
 export const LANGUAGE = 'en';
 
 type Catalogue = typeof catalogue;
@@ -39,7 +42,11 @@ export function plural(key: PluralKey, count: number, values: TextValues = {}): 
   return text(known, { count: NUMBER.format(count), ...values });
 }
 
-/** Returns a text whose placeholders may be elements, as children for an element. */
+/**
+ * Returns a text whose placeholders may be elements, as a list of children for an element.
+ *
+ * Throws an Error if the value of a placeholder is missing.
+ */
 export function textNodes(key: TextKey, values: Record<string, Node | string>): (Node | string)[] {
   return template(key)
     .split(/(\{\w+\})/)

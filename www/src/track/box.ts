@@ -12,10 +12,16 @@ export interface VoxelBox {
   high: Vec3;
 }
 
-/** Margin beyond the centres of the outermost voxels, in voxels: these are inside the box, their neighbours are not. */
+/**
+ * Distance by which a box extends beyond the centres of its outermost voxels, in voxels: it contains these centres, but
+ * not those of their neighbours.
+ */
 const RIM = 0.25;
 
-/** Returns the voxels whose centres lie in a world box, clamped to the image; at least one along each axis. */
+/**
+ * Returns the voxels whose centres lie in a world box, clamped to the image; at least one along each axis. `inverse`
+ * maps world coordinates to voxel indices.
+ */
 export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Vec3): VoxelBox {
   const corners = [toWorld(inverse, min), toWorld(inverse, max)];
   const inside = (value: number, axis: number) => Math.min((dims[axis] ?? 1) - 1, Math.max(0, value));
@@ -25,7 +31,7 @@ export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Ve
   return { low, high };
 }
 
-/** Returns the corners in the world of a box of voxels. */
+/** Returns the opposite corners, in world coordinates, of a box of voxels. */
 export function boxOf({ low, high }: VoxelBox, affine: ArrayLike<number>): Box {
   return {
     min: toWorld(affine, low.map((at) => at - RIM) as Vec3),

@@ -7,10 +7,14 @@ export interface CannySettings {
   /** Standard deviation of the Gaussian, in pixels. */
   deviation: number;
   /**
-   * Hysteresis thresholds of the gradient magnitude, in intensity per pixel: local maxima above `high` are edges, and
-   * so are those above `low` that are connected to them.
+   * Lower hysteresis threshold of the gradient magnitude, in intensity per pixel: local maxima from `low` on that are
+   * connected to an edge are edges, too.
    */
   low: number;
+  /**
+   * Upper hysteresis threshold, in intensity per pixel: local maxima of the gradient magnitude from `high` on are
+   * edges.
+   */
   high: number;
 }
 
@@ -43,7 +47,8 @@ export function canny(picture: GreyImage, { deviation, low, high }: CannySetting
 }
 
 /**
- * Returns the gradient magnitude one pixel ahead (`way` 1) or behind (−1) along the gradient, bilinearly interpolated.
+ * Returns the gradient magnitude at a neighbour ahead (`direction` 1) or behind (−1) along the gradient (dx, dy),
+ * bilinearly interpolated: one pixel away along the gradient's larger component.
  */
 function along(
   slopes: Float32Array,
@@ -65,7 +70,10 @@ function along(
   );
 }
 
-/** Hysteresis: returns the local maxima above `high` and those above `low` that are connected to them. */
+/**
+ * Hysteresis: returns the edge map of the local maxima from `high` on, and of those from `low` on that are connected to
+ * them.
+ */
 function connected(
   width: number,
   height: number,

@@ -5,21 +5,23 @@ export interface CineSpec {
   dims: Vec3;
   spacing: Vec3;
   frames: number;
-  /** Standard deviation of the noise; blood is 110 brighter than muscle. */
+  /** Standard deviation of the noise, in intensity units; blood is 110 brighter than muscle. */
   noise: number;
   /** Half the length of the long axis, mm; all other lengths scale with it. */
   size: number;
-  /** Adds two papillary muscles to the cavity; the gaps between them and the wall close in systole. */
+  /** Whether the cavity contains two papillary muscles; the gaps between them and the wall close in systole. */
   papillary: boolean;
 }
 
-/** Intensities before noise. */
+/** Intensity of blood before noise, 0 to 255. */
 const BLOOD = 200;
+/** Intensity of muscle before noise. */
 const MUSCLE = 90;
+/** Intensity of lung before noise. */
 const LUNG = 45;
-/** Long half axis, mm, that the other lengths in this file refer to. */
+/** Long half axis, mm, of the heart for which the other lengths in this file hold; they scale with `size`. */
 const REFERENCE_HALF_AXIS = 42;
-/** Samples through the thickness of a slice, averaged for the partial volume effect. */
+/** Number of samples through the thickness of a slice, averaged for the partial volume effect. */
 const SAMPLES = 3;
 /** Edge of the cells that the true volume is integrated over, mm for a heart of half axis `REFERENCE_HALF_AXIS`. */
 const INTEGRATION_STEP = 1.5;
@@ -36,7 +38,10 @@ export function centreOf({ dims, spacing }: CineSpec): Vec3 {
   return dims.map((n, k) => ((n - 1) / 2) * (spacing[k] ?? 1)) as Vec3;
 }
 
-/** Returns approximate signed distances of a point to the cavity and to the heart; negative inside. */
+/**
+ * Returns approximate signed distances of a point, mm, to the wall of the cavity and to the surface of the heart;
+ * negative inside.
+ */
 function distances(spec: CineSpec, at: Vec3, contracted: number): [number, number] {
   const unit = spec.size / REFERENCE_HALF_AXIS;
   const middle = centreOf(spec);
@@ -68,7 +73,7 @@ function smoothMax(a: number, b: number, width: number): number {
   return Math.max(a, b) + near * near * width * 0.25;
 }
 
-/** Returns the voxels of all frames, x fastest; the noise is that of magnitude images, and always the same. */
+/** Returns the voxels of all frames, x fastest; the noise is that of magnitude images, and the same at every call. */
 export function cineVoxels(spec: CineSpec): Uint8Array {
   const [nx, ny, nz] = spec.dims;
   const voxels = new Uint8Array(nx * ny * nz * spec.frames);
@@ -87,7 +92,7 @@ export function cineVoxels(spec: CineSpec): Uint8Array {
   return voxels;
 }
 
-/** Returns the intensity of a voxel before noise. In thick slices it averages through the slice. */
+/** Returns the intensity of a voxel before noise; near walls it is averaged through the slice. */
 function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
   const { spacing } = spec;
   const at = (off: number): Vec3 => [index[0] * spacing[0], index[1] * spacing[1], (index[2] + off) * spacing[2]];
@@ -121,7 +126,10 @@ export function trueVolume(spec: CineSpec, frame: number): number {
   return cells * step ** 3;
 }
 
-/** Returns the distances of points, packed xyz, from the true wall of the cavity, sorted. */
+/**
+ * Returns the distances, mm, of points, packed xyz, from the true wall of the cavity, in ascending order; a first-order
+ * approximation.
+ */
 export function wallDistances(spec: CineSpec, frame: number, points: Float32Array): Float64Array {
   const contracted = contraction(spec, frame);
   const found = Float64Array.from({ length: points.length / 3 }, (_, i) => {

@@ -4,14 +4,14 @@
  */
 import type { GreyImage } from './canny';
 
-/** Least share of a window that each of its two clusters must hold. */
+/** Share of a window's pixels that each of its two clusters must exceed for a boundary. */
 const MIN_SHARE = 0.1;
 /** Most iterations of 2-means. */
 const MAX_ITERATIONS = 10;
 
 /** Result of 2-means on the values of a window. */
 export interface Clusters {
-  /** Mean of the dark cluster, and of the bright one. */
+  /** Mean of the dark cluster, and of the bright one, in intensity units. */
   means: [number, number];
   /** 1 for each value in the bright cluster, else 0. */
   bright: Uint8Array;
@@ -50,8 +50,10 @@ export function hasBoundary({ means, bright }: Clusters, threshold: number): boo
 }
 
 /**
- * Returns the boundary votes of the windows of one slice, as in the paper's 2D version: for each face between two
- * pixels, the share of the windows containing both pixels that separate them.
+ * Returns the boundary votes of the windows of one slice, as in the paper's 2D version: the centre, in pixels, of each
+ * face between two pixels that at least one window separates, and the fraction of the windows containing both pixels
+ * that separate them. Near the image border, where fewer windows contain them, it is relative to their number
+ * elsewhere.
  */
 export function sliceVotes(
   { width, height, values }: GreyImage,
@@ -102,7 +104,10 @@ function voteOf(
   }
 }
 
-/** Returns the pixels of the window around a pixel, row by row; clipped at the border. */
+/**
+ * Returns the indices of the pixels in a window, row by row: up to `halfWidth` pixels from (x, y), clipped at the
+ * border.
+ */
 export function windowAt({ width, height }: GreyImage, x: number, y: number, halfWidth: number): number[] {
   const out: number[] = [];
   for (let j = Math.max(0, y - halfWidth); j <= Math.min(height - 1, y + halfWidth); j++)
@@ -111,8 +116,8 @@ export function windowAt({ width, height }: GreyImage, x: number, y: number, hal
 }
 
 /**
- * Sums votes on pixel faces into a picture, as in the paper's figures: each pixel gets the square roots of the votes on
- * the faces to its left and above, so that slanted edges do not count twice.
+ * Accumulates votes on pixel faces in a picture, as in the paper's figures: each pixel gets the sum of the square roots
+ * of the votes on the faces to its left and above, so that slanted edges do not count twice.
  */
 export function boundaryImage(
   { width, height }: Pick<GreyImage, 'width' | 'height'>,

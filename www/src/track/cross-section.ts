@@ -1,4 +1,4 @@
-/** Intersections of a surface with a plane, and of the resulting segments with a line. */
+/** Intersects a surface with a plane, and the resulting segments with a row of a picture. */
 import type { Plane, Surface } from '../protocol';
 
 /** Returns the cross-section of a surface with a plane, as segments: pairs of points, packed xyz. */
@@ -33,7 +33,7 @@ export function crossSection(
   return Float32Array.from(out);
 }
 
-/** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row at a height. */
+/** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row y = `height`. */
 export function intersectionsWithRow(segments: Float32Array, height: number): number[] {
   const out: number[] = [];
   for (let i = 0; i + 3 < segments.length; i += 4) {

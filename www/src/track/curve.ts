@@ -2,11 +2,13 @@
 import type { FrameStatistics } from './protocol';
 
 export interface Beat {
-  /** Frames of the largest and of the smallest volume. */
+  /** Frame of the largest volume. */
   diastole: number;
+  /** Frame of the smallest volume. */
   systole: number;
-  /** The largest and the smallest volume. */
+  /** The largest volume. */
   largest: number;
+  /** The smallest volume. */
   smallest: number;
   /** Ejection fraction: (largest − smallest) / largest. */
   ejection: number;
@@ -20,11 +22,13 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
   return { diastole: volumes.indexOf(largest), systole: volumes.indexOf(smallest), largest, smallest, ejection };
 }
 
-/** Share of triangles facing the other way in a frame, above which a warning is shown. */
+/**
+ * Largest share of folded triangles in a frame, which face away from all their neighbours; above it a warning is shown.
+ */
 export const MAX_FOLDED_SHARE = 0.01;
 /**
- * Relative deviation of a frame's area from that expected from its volume, above which a warning is shown; a body that
- * only grows or shrinks changes its area as its volume to the power of 2/3.
+ * Largest relative deviation of a frame's area from the expected area; above it a warning is shown. Expected is the
+ * area of the frame before times the ratio of volumes to the power of 2/3, as for a body that only grows or shrinks.
  */
 export const MAX_AREA_JUMP = 0.15;
 
@@ -36,7 +40,10 @@ export interface FrameWarning {
 
 type CheckedFacts = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
 
-/** Returns the frames that are suspicious even if their volume and error are plausible. */
+/**
+ * Returns a warning for each frame with too many folded triangles or an unexpected area: such frames are suspicious
+ * even if their volume and error are plausible.
+ */
 export function warningsOf(facts: readonly CheckedFacts[]): FrameWarning[] {
   return facts.flatMap(({ folded, triangles, area, volume }, frame) => {
     const before = facts[frame - 1];

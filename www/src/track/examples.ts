@@ -25,9 +25,9 @@ const PLAIN: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
 /** Preparation of the user's own images: in-between slices are inserted where slices are thick. */
 export const OWN_PREPARATION: Preparation = { binning: 1, enrichment: 'flow', factor: 0 };
 
-/** A point in the blood of the left ventricle. */
+/** A point in the blood of the left ventricle of the measured heart, world coordinates (mm). */
 const LEFT_VENTRICLE: Vec3 = [1.47, 37.05, -13.99];
-/** Returns the box with faces at the distance `reach` from a point. */
+/** Returns the cube around a point, with its faces at the distance `reach`. */
 const around = (middle: Vec3, reach: number): Box => ({
   min: middle.map((x) => x - reach) as Vec3,
   max: middle.map((x) => x + reach) as Vec3,

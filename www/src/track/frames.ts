@@ -18,7 +18,7 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
   }
 }
 
-/** Returns the distances of points from the true wall of a computed image. */
+/** Returns the mean and the 95th percentile of the distances, mm, of points from the true wall of a computed image. */
 export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);

@@ -10,8 +10,8 @@ import { Refusal } from '../worker/refusal';
 import type { InterpolatedSlice } from './protocol';
 
 /**
- * Interpolates slice number `slice` across the last voxel axis as if it had not been measured, and returns it with its
- * neighbours and the errors.
+ * Interpolates slice number `slice` across the last voxel axis from its two neighbours, and returns both interpolations
+ * with the measured slice, the neighbours and the errors. Throws a `Refusal` for the first and last slice.
  */
 export function interpolateSlice(
   volume: Volume,

@@ -10,7 +10,7 @@ export interface TrackVariant {
   id: string;
   name: string;
   ourResult: string;
-  /** Parameters that differ from the figure's. */
+  /** Parameters of the picture that differ from those of the figure. */
   params: ParamValues;
   view: Partial<TrackViewOptions>;
 }
@@ -138,8 +138,8 @@ export function isTrackPreset(example: TrackExample | undefined): example is Tra
 }
 
 /**
- * Returns the variant of a figure whose parameters are all in force, if there is one; unset parameters count as in
- * `usual`.
+ * Returns the first variant of a figure whose parameters are all in force, if there is one; parameters that it does not
+ * set must equal `usual`.
  */
 export function variantInForce(preset: TrackPreset, params: ParamValues, usual: ParamValues): TrackVariant | undefined {
   return preset.variants.find((one) =>

@@ -37,19 +37,26 @@ export type {
 };
 
 /**
- * Source of a 4D image: one file, several files that are its frames in the order of their names, or a computed phantom.
+ * Source of a 4D image: files (a single one, one for each frame in the order of their names, headers with their data,
+ * or a DICOM or TIFF series), or a computed phantom.
  */
 export type ImageSource = { files: NamedBytes[] } | { cine: CineSpec };
 
-/** Method of inserting slices between slices: none, linear interpolation, or interpolation along the optical flow. */
+/**
+ * Method of inserting slices between the measured ones: none, linear interpolation, or interpolation along the optical
+ * flow.
+ */
 export type Enrichment = 'none' | 'linear' | 'flow';
 
 /** Preparation of the image before tracking. */
 export interface Preparation {
-  /** Binning factor within slices: this many pixels are averaged along both sides. */
+  /** Binning factor within slices: blocks of this many pixels along both in-plane axes are averaged. */
   binning: 1 | 2;
   enrichment: Enrichment;
-  /** Factor by which the number of slices grows; 0 chooses the one that makes voxels most nearly cubic. */
+  /**
+   * Factor by which slice interpolation increases the number of slices; 0 chooses the one that makes voxels most nearly
+   * cubic.
+   */
   factor: number;
 }
 
@@ -64,16 +71,19 @@ export interface Setup {
   preparation: Preparation;
   /** Region of interest; the whole image if undefined. */
   box: Box | undefined;
-  /** The tracked surface is the one nearest to this point; the largest if undefined. */
+  /**
+   * Point that selects the tracked surface: the component that encloses it or is nearest to it. If undefined, the
+   * largest.
+   */
   at: Vec3 | undefined;
-  /** Parameters that differ from the method's own choice. */
+  /** Parameters set by the user; the tracker derives all others from the image. */
   params: ParamValues;
 }
 
-/** Distance of a surface from the true one, in world units. */
+/** Distances of a surface's vertices from the true surface, in world units. */
 export interface SurfaceError {
   mean: number;
-  /** 95th percentile of the distances of the vertices. */
+  /** 95th percentile of the distances. */
   p95: number;
 }
 
@@ -82,7 +92,7 @@ export interface Ready {
   params: ParamValues;
   /** The tracker's default for the edge threshold τ, from the noise and the range of intensities. */
   suggested: number;
-  /** Standard deviation of the noise, in intensity units. */
+  /** Estimated standard deviation of the noise, in intensity units. */
   noise: number;
   /** The image as prepared, with the voxels of all frames; undefined if unchanged. */
   volume: VolumeView | undefined;
@@ -93,7 +103,7 @@ export interface OpenedImage extends Ready {
   /** Dimensions of the image before its preparation. */
   dims: Vec3;
   spacing: Vec3;
-  /** The true volume of each frame, if the image is computed. */
+  /** The true volume of the cavity in each frame, mm³, if the image is computed. */
   truth: number[] | undefined;
   /** Milliseconds spent opening and preparing the image. */
   openingMs: number;
@@ -108,8 +118,8 @@ export interface SavedTrack {
 }
 
 /**
- * Boundary votes of a frame: the points, packed xyz, between two voxels, and the share of windows that separate the
- * two.
+ * Boundary votes of a frame: positions of voxel faces in world coordinates, packed xyz, and for each the fraction of
+ * windows that separate its two voxels. Includes faces to the next frame.
  */
 export interface BoundaryVotes {
   frame: number;
@@ -130,16 +140,16 @@ export interface InterpolatedSlice {
   rmsError: { linear: number; flow: number };
 }
 
-/** The choice that a comparison changes: switches the prediction, or takes another enrichment. */
+/** The setting that a comparison changes: toggles the prediction, or uses another method of inserting slices. */
 export type Alternative = 'prediction' | Enrichment;
 
 /** Result of a run through all frames, for comparison. */
 export interface ComparedTrack {
   facts: FrameStatistics[];
   closing: number | undefined;
-  /** Mean over all frames, if the true surface is known. */
+  /** Errors averaged over all frames, if the true surface is known. */
   error: SurfaceError | undefined;
-  /** Milliseconds, preparation included. */
+  /** Duration of the run in milliseconds, preparation of the image included. */
   duration: number;
   selfIntersections: number;
 }
@@ -158,14 +168,14 @@ export interface Requests {
   votes: { body: { frame: number }; reply: BoundaryVotes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: InterpolatedSlice };
   save: { body: undefined; reply: SavedTrack };
-  /** Restores a saved run of the same image; the state is sent only in reply to `sendState`. */
+  /** Restores a saved run of the same image; the state event is sent only in reply to `sendState`. */
   restore: { body: SavedTrack; reply: Ready };
-  /** The image as it is prepared at present. */
+  /** Replies with the image as prepared at present, with all frames. */
   view: { body: undefined; reply: VolumeView };
-  /** Makes the worker send a state event. */
+  /** Makes the worker send a state event, `done` or `paused`. */
   sendState: { body: undefined; reply: undefined };
   export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
-  /** All tracked frames as one animated GLB. */
+  /** Replies with all tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
   /** Runs the whole tracking with another setup; undefined if cancelled. */
   compare: { body: { setup: Setup }; reply: ComparedTrack | undefined };
@@ -184,7 +194,7 @@ export interface TrackedFrame {
   error: SurfaceError | undefined;
 }
 
-/** Progress of the preparation, in words for the status line. */
+/** Step of the preparation of the image that begins, in words for the status line. */
 export interface PreparingEvent {
   event: 'preparing';
   what: string;

@@ -28,7 +28,10 @@ export async function openImage(source: ImageSource): Promise<Volume> {
   return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
 }
 
-/** Groups files by frame, in the order of their names: each header together with its data. */
+/**
+ * Groups files by frame, in the order of their names: each header together with its data files. A single header takes
+ * all data files.
+ */
 export function framesOf(files: NamedBytes[]): NamedBytes[][] {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
   const isData = ({ name }: NamedBytes) => /\.(z?raw|img)(\.gz)?$/i.test(name);
@@ -54,8 +57,8 @@ function fromParts(parts: NamedBytes[][]): Volume {
 }
 
 /**
- * Bins and enriches an image as asked; returns a new volume, or `image` itself if there is nothing to do. `onStage`
- * receives each step in words.
+ * Bins an image and inserts slices, as set in `preparation`; returns a new volume, or `image` itself if there is
+ * nothing to do. `onStage` receives each step in words.
  */
 export function prepare(image: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
@@ -82,15 +85,15 @@ export function prepare(image: Volume, preparation: Preparation, onStage: (what:
 }
 
 /**
- * Returns binning factors within slices. Slices lie across the axis with the largest spacing, or the last axis if
- * voxels are cubes.
+ * Returns the binning factors along the voxel axes, 1 across slices. Slices lie across the axis with the largest
+ * spacing, or the last axis if voxels are cubes.
  */
 function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
   const across = spacing.lastIndexOf(Math.max(...spacing));
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
 }
 
-/** Builds a tracker; also returns the threshold that it would choose by itself. */
+/** Builds a tracker; also returns its own default for the edge threshold τ. */
 export function buildTracker(
   volume: Volume,
   { box, at, params }: Setup,

@@ -59,7 +59,10 @@ class Session {
   #done = false;
   /** Number of frames whose surfaces were sent to the page. */
   #sent = 0;
-  /** Saved state of the tracker when the boundary of all frames was found, before the first surface. */
+  /**
+   * State of the tracker saved when the boundary of all frames was found, before the first surface; undefined until
+   * then.
+   */
   #boundaryState: { state: Uint8Array; iteration: number } | undefined;
   #run: Task | undefined;
   #comparison: Task | undefined;
@@ -116,7 +119,7 @@ class Session {
     return this.#build(setup);
   }
 
-  /** Builds a tracker of the present image, which is prepared again if the preparation has changed. */
+  /** Builds a tracker of the present image; prepares the image again if the preparation has changed. */
   #build(setup: Setup): Ready {
     const loaded = this.#image();
     if (same(loaded.preparation, setup.preparation))
@@ -231,7 +234,10 @@ class Session {
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
 
-  /** Changes parameters; the results that depend on them are computed again, from the first frame. */
+  /**
+   * Changes parameters; the results that depend on them are discarded, for all frames, and computed again by later
+   * steps.
+   */
   async #setParams(values: ParamValues): Promise<Requests['setParams']['reply']> {
     await this.#pause();
     const tracker = this.#current();

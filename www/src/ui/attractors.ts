@@ -7,7 +7,7 @@ const STRENGTH = 0.1;
 const PLACE = text('extractPanels.attractorPlace');
 const STRONGEST = 1000;
 
-/** Texts of the two values of an attractor: label, full name, and name of a change. */
+/** Text keys for the strength and the radius of an attractor: short label, full label, and name of a change. */
 const FIELDS = {
   strength: {
     shown: 'extractPanels.attractorStrength',

@@ -3,7 +3,10 @@ import { h, uniqueId } from './dom';
 
 const DEFAULT_MAX_POINTS = 20_000;
 
-/** Options of an implicit surface besides its parameters. */
+/**
+ * Settings of the Reconstruct lab's model besides its parameters: the largest number of points used, and the number of
+ * clusters kept; undefined for the default and for all.
+ */
 export interface CloudChoice {
   maxPoints: number | undefined;
   keepComponents: number | undefined;
@@ -15,7 +18,7 @@ interface Field {
   error: HTMLElement;
 }
 
-/** Fields for the number of points used and the number of clusters kept. */
+/** Fields for the largest number of points used and the number of clusters kept. */
 export class CloudSetup {
   readonly element: HTMLElement;
   readonly #maxPoints: Field;

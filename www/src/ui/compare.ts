@@ -138,7 +138,10 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** Creates the table of times: rows T, N, F and their sum, a column per level, for both runs. */
+/**
+ * Creates the table of durations in seconds, for both runs: rows T, N and F as in the paper, the sum of all parts, and
+ * the number of iterations; a column per pyramid level and one for the whole run.
+ */
 function timeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
   const head = [

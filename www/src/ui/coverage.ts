@@ -15,13 +15,13 @@ export interface CoverageEvents {
   onStart: () => void;
   onCancel: () => void;
   onSeed: () => void;
-  /** Called to show a position in the slices and in the 3D view. */
+  /** Called to show a position in the slices and to centre the 3D view on it. */
   onGoTo: (point: Vec3) => void;
   /** Called with the regions to mark in the views. */
   onMark: (parts: readonly UncoveredRegion[]) => void;
 }
 
-/** Shows how much of the iso-surface the surface covers, and lists the regions it does not cover. */
+/** Panel that measures which part of the iso-surface the surface covers, and lists the regions it does not cover. */
 export class CoveragePanel {
   readonly element: HTMLElement;
   /** Unit of length in the volume's world space. */
@@ -159,7 +159,7 @@ export class CoveragePanel {
   }
 }
 
-/** Formats a fraction in percent, rounded down, so that 100 % means complete coverage. */
+/** Formats a fraction in percent, rounded down to a tenth, so that 100 % means complete coverage. */
 function percent(share: number): string {
   return text('controls.percent', { value: (Math.floor(share * 1000) / 10).toFixed(1) });
 }

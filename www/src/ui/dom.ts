@@ -30,14 +30,14 @@ export function context2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D |
   return canvas.getContext('2d', { willReadFrequently: true });
 }
 
-/** Creates a titled section of a column. */
+/** Creates a section with a heading, for a column of a lab's page. */
 export function section(title: string, ...children: (Node | string)[]): HTMLElement {
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
 }
 
 /**
- * Formats a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the part after an
- * underscore.
+ * Creates an element for a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the part
+ * after an underscore.
  */
 export function symbol(text: string): HTMLElement {
   const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? /^(\w)_(\w+)$/.exec(text) ?? [];

@@ -3,10 +3,16 @@ import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
-/** Multiple of the noise below which noise alone is detected as boundary. */
+/**
+ * Multiple of the noise's standard deviation; an edge threshold τ below it lets noise alone be detected as boundary,
+ * and a warning is shown.
+ */
 const NOISE_FACTOR = 2.5;
 
-/** Control for the edge threshold τ, with the noise level it must exceed. */
+/**
+ * Control for the edge threshold τ, with the estimated noise level, a suggested value, and a warning if noise exceeds
+ * the threshold.
+ */
 export class EdgeThreshold {
   readonly element: HTMLElement;
   readonly #number: HTMLInputElement;
@@ -17,7 +23,10 @@ export class EdgeThreshold {
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   #suggested = 0;
 
-  /** `onTry` is called with the value during a drag, and with undefined at its end. */
+  /**
+   * `onTry` is called with the value while the slider is dragged, and with undefined when it is released; `onChange`
+   * once with the final value.
+   */
   constructor(
     { label, symbol: letter, help }: ParamSpec,
     onChange: (threshold: number) => void,
@@ -68,7 +77,10 @@ export class EdgeThreshold {
     );
   }
 
-  /** `largest`: the largest possible difference of intensities. */
+  /**
+   * Shows the threshold, the noise's standard deviation and the suggested threshold, all in intensity units. `largest`:
+   * the largest possible difference of intensities; the slider ends at half of it.
+   */
   show(threshold: number, noise: number, suggested: number, largest: number): void {
     this.#suggested = suggested;
     const top = rounded(Math.max(largest / 2, threshold));

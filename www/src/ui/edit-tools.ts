@@ -23,7 +23,10 @@ const TOOLS: { tool: EditTool; label: string; help: string }[] = [
   },
 ];
 
-/** Default distance of a click from the surface, in percent of the size of the point set. */
+/**
+ * Default distance of a new point from the surface, and default radius of removal, in percent of the size of the point
+ * set.
+ */
 const DISTANCE = 5;
 
 /** Tools that edit the points by clicking in the 3D view. */
@@ -89,7 +92,10 @@ export class EditTools {
     return this.#tool;
   }
 
-  /** Distance as a fraction of the size of the point set; the default if the input is invalid. */
+  /**
+   * Distance of a new point from the surface, or radius of removal, as a fraction of the size of the point set; the
+   * default if the input is invalid.
+   */
   get distance(): number {
     return (this.#distance.checkValidity() ? this.#distance.valueAsNumber : DISTANCE) / 100;
   }

@@ -126,13 +126,19 @@ export class EllipsoidControls {
     this.#error.textContent = message;
   }
 
-  /** Focuses the button of the selected ellipsoid, because the one that was pressed may have been removed. */
+  /**
+   * Focuses the button of the selected ellipsoid, or of the first if none is selected: the focused one may have been
+   * removed.
+   */
   focus(): void {
     const button = this.#list.children[this.#chosen ?? 0];
     if (button instanceof HTMLElement) button.focus();
   }
 
-  /** Existing buttons are kept, so that the focus stays. */
+  /**
+   * Shows a button for each ellipsoid; while the names are unchanged, the existing buttons are kept, so that the focus
+   * stays.
+   */
   #showNames(names: string[]): void {
     if (names.length === this.#names.length && names.every((name, k) => name === this.#names[k])) return;
     this.#names = names;
@@ -261,7 +267,7 @@ export class EllipsoidControls {
   }
 }
 
-/** Formats a number with as many digits as can be set by dragging. */
+/** Formats a number with four significant digits; dragging is no more precise. */
 function short(value: number): string {
   return String(Number(value.toPrecision(4)));
 }

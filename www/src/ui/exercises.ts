@@ -3,7 +3,7 @@ import { h } from './dom';
 
 export interface Exercise {
   title: string;
-  /** The example or figure to start from. */
+  /** Id of the example or figure that the exercise starts from. */
   example: string;
   steps: string[];
   look: string;

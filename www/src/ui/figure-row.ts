@@ -23,17 +23,21 @@ const CANNY_FIELDS = [
   { name: 'high', label: text('trackPanels.cannyHigh'), min: 0 },
 ] as const;
 
-/** Data for the figures, as far as it is available. */
+/** Data for the paper's figures in the Track lab; undefined while it is not available. */
 export interface FigureData {
   subject: Subject;
-  /** Window size k, and edge threshold τ. */
+  /** Half width k of the window, in voxels. */
   window: number;
+  /** Edge threshold τ, in intensity units. */
   threshold: number;
   votes: BoundaryVotes | undefined;
   between: InterpolatedSlice | undefined;
-  /** The slice that `between` replaces, and the number of slices. */
+  /** The index of the slice that `between` replaces, from 0, and the number of slices of the image as measured. */
   pair: [number, number];
-  /** Returns the outline in the slice for each frame; called only while it is shown. */
+  /**
+   * Returns for each frame the surface's outline in the slice at the crosshair, undefined without a surface; called
+   * only while the figure over time is shown.
+   */
   outlines: () => readonly (Float32Array | undefined)[];
 }
 

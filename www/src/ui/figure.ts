@@ -1,24 +1,27 @@
 import { text } from '../texts';
 import { h } from './dom';
 
-/** One of several images of a figure. */
+/** One of the images of a paper's figure, with its own settings. */
 interface FigureVariant {
-  /** Name on its button. */
+  /** Label of its button. */
   name: string;
-  /** The result here. */
+  /** Describes the result of the lab for comparison with the paper. */
   ourResult: string;
 }
 
 /** A figure of a paper. */
 interface PaperFigure<One extends FigureVariant> {
-  /** The result in the paper. */
+  /** Describes the result in the paper. */
   paperResult: string;
   variants: [One, ...One[]];
   /** Hint at further details to observe. */
   hint?: string;
 }
 
-/** Describes the figure of the paper that is open: the paper's result, the result here, and its other images. */
+/**
+ * Panel that describes the paper's figure that is open: the paper's result, the lab's result, and a button for each
+ * image of the figure.
+ */
 export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
   readonly #onVariant: (preset: Preset, variant: Variant) => void;
@@ -30,7 +33,10 @@ export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigu
     this.#onVariant = onVariant;
   }
 
-  /** Shows a figure and marks the current variant, if any; undefined hides the panel. */
+  /**
+   * Shows a figure and marks the variant in force; without one, the text says that the settings were changed. Without a
+   * figure, the panel is hidden.
+   */
   show(preset: Preset | undefined, variant?: Variant): void {
     this.element.hidden = preset === undefined;
     // Existing buttons are kept, so that the focus stays.

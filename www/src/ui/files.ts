@@ -48,7 +48,7 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
   );
 }
 
-/** Returns a common name for files that belong together. */
+/** Returns a name for one or several files that belong together, for display. */
 export function nameOf(files: File[]): string {
   const [first, second] = files.map(({ name }) => name);
   if (files.length === 2) return text('controls.twoFiles', { first: first ?? '', second: second ?? '' });

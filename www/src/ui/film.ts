@@ -2,14 +2,15 @@ import { type Film, lastFrame } from '../sculpt/film';
 import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
 
-/** Default and largest number of frames from one keyframe to the next. */
+/** Default number of frames from one keyframe to the next. */
 export const FRAMES_BETWEEN = 24;
+/** Largest number of frames from one keyframe to the next. */
 const MOST_BETWEEN = 600;
 
 export interface FilmEvents {
   /** Called to add the current pose as a keyframe. */
   onAddKey: () => void;
-  /** Called to remove a keyframe. */
+  /** Called to remove the keyframe with this index. */
   onRemoveKey: (index: number) => void;
   onBetween: (frames: number) => void;
   onLoop: (loop: boolean) => void;

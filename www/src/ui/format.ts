@@ -6,7 +6,10 @@ export function count(value: number): string {
   return COUNT.format(value);
 }
 
-/** Formats a number with four significant digits, and with powers of ten if it is very large or very small. */
+/**
+ * Formats a number with up to four significant digits; magnitudes below 10⁻³ and from 10⁷ on as three digits times a
+ * power of ten; a dash if it is not finite.
+ */
 export function figure(value: number): string {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);

@@ -6,10 +6,10 @@ const PLAY = 'M7 4.5v15l12-7.5z';
 const PAUSE = 'M6 5h4.5v14H6zM13.5 5H18v14h-4.5z';
 const BACK = 'M6 5h2.5v14H6zM18 5v14l-9-7z';
 const ON = 'M6 5v14l9-7zM16 5h2.5v14H16z';
-/** Duration of a frame in milliseconds: slower than a heartbeat, so that the eye can follow. */
+/** Milliseconds for which a frame is shown during playback: slower than a heartbeat, so that the eye can follow. */
 const FRAME_MS = 110;
 
-/** Controls of the Track lab to step through the tracked frames, or play them in a loop. */
+/** Controls of the Track lab to step through the frames of the image, or play those that have a surface in a loop. */
 export class FrameBar {
   readonly element: HTMLElement;
   readonly #onFrame: (frame: number) => void;
@@ -18,7 +18,7 @@ export class FrameBar {
   readonly #text = h('span');
   readonly #buttons: HTMLButtonElement[];
   readonly #slider: HTMLInputElement;
-  /** The slider announces its value already. */
+  /** Number of the frame shown; not announced, because the slider announces its value already. */
   readonly #at = h('output', { 'aria-live': 'off', 'data-frames': '' });
   #frame = 0;
   #count = 1;
@@ -60,7 +60,10 @@ export class FrameBar {
     return this.#pending !== 0;
   }
 
-  /** `done` is the number of frames that have a surface. */
+  /**
+   * Shows the index of the current frame and the number of frames; `done` is the number of frames that have a surface
+   * and can be played.
+   */
   show(frame: number, frames: number, done: number): void {
     this.#frame = Math.min(frame, frames - 1);
     this.#count = frames;
@@ -76,7 +79,7 @@ export class FrameBar {
     this.#label();
   }
 
-  /** Moves by `by` frames, cyclically. */
+  /** Stops playback and moves by `by` frames, cyclically through all frames. */
   go(by: number): void {
     this.#byHand((this.#frame + by + this.#count) % this.#count);
   }

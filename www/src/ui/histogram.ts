@@ -119,7 +119,10 @@ function describeHistogram(
   });
 }
 
-/** Returns a slider step that integral intensities are multiples of, and that is fine enough for any other range. */
+/**
+ * Returns the step of the slider for the iso value: 1 for integer ends at least 50 apart, else a thousandth of the
+ * range.
+ */
 function stepOf(low: number, high: number): number {
   const span = high - low;
   return Number.isInteger(low) && Number.isInteger(high) && span >= 50 ? 1 : span / 1000;

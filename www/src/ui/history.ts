@@ -2,7 +2,7 @@ import type { StepReport } from '../protocol';
 import { plural, text } from '../texts';
 import { count } from './format';
 
-/** Numbers of topology changes at one iteration. */
+/** Numbers of topology changes at one iteration: joins (axial), cuts (annular), components that vanished, and seeds. */
 export interface Change {
   iteration: number;
   axial: number;
@@ -11,7 +11,7 @@ export interface Change {
   seeds: number;
 }
 
-/** A position in a history, for undo. */
+/** A position in the history of a run, to return to by undo. */
 export interface HistoryMark {
   reports: readonly StepReport[];
   /** Iteration of the last report included. */
@@ -35,7 +35,7 @@ export class History {
     this.rewind({ reports: [], iteration: 0 });
   }
 
-  /** Returns a function that marks this run at an iteration that is known only later. */
+  /** Returns a function that creates a mark in the current run, for an iteration that becomes known only later. */
   marker(): (iteration: number) => HistoryMark {
     const reports = this.#reports;
     return (iteration) => ({ reports, iteration });

@@ -6,11 +6,11 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 132;
-/** Number of sampled distances, from 0 to the side of the box. */
+/** Number of sampled distances r, from 0 to 2, the side of the model's box. */
 const SAMPLES = 201;
 const FARTHEST = 2;
 
-/** Plots the current kernel, normalised to its own maximum, because only its shape matters. */
+/** Plots the current kernel φ(r), divided by its largest magnitude, because only its shape matters. */
 export class KernelPlot {
   readonly element: HTMLElement;
   readonly #plot: uPlot;
@@ -50,7 +50,7 @@ function describeKernel(kernel: string, value: (r: number) => number): string {
   });
 }
 
-/** Returns the zero of a decreasing function. */
+/** Returns the zero of a decreasing function, between 0 and 100, by bisection. */
 function bisect(f: (r: number) => number): number {
   let [low, high] = [0, 100];
   for (let i = 0; i < 60; i++) {

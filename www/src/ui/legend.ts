@@ -4,7 +4,7 @@ import { figure } from './format';
 
 const STEPS = 64;
 
-/** Title and labels of a colour scale. */
+/** Title of a colour scale, and labels of its lower and upper end. */
 export interface LegendText {
   title: string;
   below: string;
@@ -29,7 +29,7 @@ export class Legend {
     h('span', { class: 'ends' }, ...this.#words),
   );
 
-  /** `color` maps −1 to 1 to sRGB. */
+  /** `color` maps −1 to 1 to sRGB, 0..255. */
   constructor(color: (t: number) => [number, number, number]) {
     this.#color = color;
   }
@@ -44,7 +44,7 @@ export class Legend {
     for (const [i, end] of this.#ends.entries()) if (end.textContent !== texts[i]) end.textContent = texts[i] ?? '';
   }
 
-  /** Draws the colours from `low` to 1. */
+  /** Draws the colour bar from `low`, −1 or 0, to 1. */
   #draw(low: number): void {
     const context = context2d(this.#bar);
     for (let i = 0; i < STEPS; i++) {

@@ -26,7 +26,7 @@ export class EventLog {
     this.#summary.textContent = text('measures.noEvents');
   }
 
-  /** Appends the new entries of the history. */
+  /** Adds the new entries of the history at the top. */
   update(history: History): void {
     const fresh = [
       ...history.phases

@@ -4,7 +4,10 @@ import { text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
 
-/** All measures, also available to other programs as JSON in the element's `data-measures`. */
+/**
+ * Measures of every surface, also available to other programs as JSON in the element's `data-measures`. `crossings` is
+ * the number of crossing pairs of triangles.
+ */
 export interface MeasureValues {
   vertices: number;
   triangles: number;
@@ -76,7 +79,7 @@ export class MeasurePanel {
     return cell;
   }
 
-  /** Shows the lab's own values; not every value has a row. */
+  /** Shows the lab's own measures; values without a row appear only in `data-measures`. */
   showExtra(values: Record<string, unknown>): void {
     this.#extraValues = values;
     for (const { measure, cell } of this.#extra) {
@@ -104,8 +107,8 @@ export class MeasurePanel {
   }
 
   /**
-   * Shows the values that every step reports. Results of checks are reset, because they do not hold once the surface
-   * has moved.
+   * Shows the values that every step reports; area and volume stay as last measured. Results of checks are reset,
+   * because they do not hold once the surface has moved.
    */
   showReport({ vertices, triangles, components, euler }: StepReport): void {
     const { volume, area } = this.#values;
@@ -152,8 +155,8 @@ function textOf(name: Name, value: number | boolean, unit: Unit): string {
 }
 
 /**
- * Formats an area (power 2) or volume (power 3) with its unit; large values in millimetres are converted to
- * centimetres.
+ * Formats an area (power 2) or volume (power 3) with its unit; from 10 cm² or 10 cm³ on, values in millimetres are
+ * converted to centimetres.
  */
 function sized(value: number, power: 2 | 3, unit: Unit): string {
   const raised = power === 2 ? '²' : '³';

@@ -3,7 +3,9 @@ import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
-/** Number of slider positions of a parameter with a logarithmic scale. */
+/**
+ * Number of steps of a slider with a nonlinear scale, or with a linear one for which the specification gives no step.
+ */
 const LOG_STEPS = 200;
 /** Upper bound from which a range counts as unbounded and has no slider. */
 const ENDLESS = 1e9;
@@ -54,7 +56,7 @@ export class ParamControls {
     }
   }
 
-  /** Hides the controls of parameters that currently have no effect. */
+  /** Hides or shows controls by name; used to hide parameters that currently have no effect. */
   hide(names: Record<string, boolean>): void {
     for (const [name, hidden] of Object.entries(names)) {
       const control = this.#controls.get(name);

@@ -4,7 +4,7 @@ import { h } from './dom';
 import { count, figure } from './format';
 import type { Curve } from './plots';
 
-/** Number of iterations listed: few enough to be read, or listened to. */
+/** Largest number of iterations listed: few enough to be read, or listened to. */
 const ROWS = 12;
 
 /**

@@ -9,9 +9,9 @@ import { totals } from './log';
 import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
-/** Space above a plot for the names of the levels. */
+/** Space above a plot for the names of the levels, pixels. */
 const MARK_HEIGHT = 16;
-/** Height of the tick marks of one kind of event. */
+/** Height of the tick marks of one kind of event, pixels. */
 const MARK_LANE = 6;
 
 export interface Curve {
@@ -29,7 +29,7 @@ export interface PlotKind {
   describe: (history: History) => string;
 }
 
-/** Plots of the deformable model. */
+/** Plots of the deformable model: kinetic energy, number of vertices, Euler characteristic. */
 export const ENERGY_PLOTS: PlotKind[] = [
   {
     title: text('measures.kineticEnergy'),
@@ -65,7 +65,7 @@ export class Plots {
   readonly #stale = new Set<Plot>();
   #pending = 0;
 
-  /** `events`: whether topology events are marked and described. */
+  /** `events`: whether a legend and a description of the topology events are shown. */
   constructor(history: History, kinds: PlotKind[], events: boolean) {
     this.#history = history;
     this.#plots = kinds.map((kind) => new Plot(kind, history));
@@ -156,7 +156,9 @@ function emptyData(kind: PlotKind): uPlot.AlignedData {
   return [[], ...kind.curves.map(() => [])] as uPlot.AlignedData;
 }
 
-/** Returns null for values that a logarithmic axis cannot show: zero and below. */
+/**
+ * Returns null for values that cannot be drawn: those that are not finite and, on a logarithmic axis, zero and below.
+ */
 function plottable(value: number, log: boolean): number | null {
   return Number.isFinite(value) && (!log || value > 0) ? value : null;
 }

@@ -36,7 +36,10 @@ export class PyramidPanel {
     this.#follow.addEventListener('change', () => this.#choose(this.#follow.checked ? (this.#inUse ?? 0) : 0));
   }
 
-  /** `volume` are the dimensions of the volume itself, `levels` its coarser levels, finest first. */
+  /**
+   * Shows the levels of a volume: `volume` are the dimensions of the volume itself, `levels` its coarser levels, finest
+   * first, and `inUse` is the level of the model.
+   */
   setLevels(volume: readonly number[], levels: LevelView[], inUse: number): void {
     this.#levels = levels;
     const dims = [volume, ...levels.map((level) => level.dims)].map((sizes) => sizes.join(' × '));

@@ -43,7 +43,10 @@ export class RegionControls {
     );
   }
 
-  /** `names` are the names of the slices across each axis. */
+  /**
+   * Shows the region of interest, and whether it is the `whole` image. The component tracked is the one nearest to the
+   * world point `nearest`, or the largest if undefined. `names`: names of the slices across each voxel axis.
+   */
   show(
     region: VoxelBox,
     dims: Vec3,

@@ -107,7 +107,9 @@ function shortcutDialog(
   return dialog;
 }
 
-/** Links open in new tabs, so that the model stays open. */
+/**
+ * Creates the list of links to the documentation and other pages; they open in new tabs, so that the model stays open.
+ */
 function furtherHelp(guide: string): HTMLElement {
   const link = (href: string, text: string) => h('li', {}, h('a', { class: 'link', href, target: '_blank' }, text));
   return h(

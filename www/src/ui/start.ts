@@ -91,7 +91,7 @@ export class StartControls {
     return this.#inForce;
   }
 
-  /** Shows the current values and clears error messages, without reporting a change. */
+  /** Shows the initial surface of the current model and clears error messages, without reporting a change. */
   show(choice: StartChoice): void {
     this.#inForce = choice;
     this.#shape.control.value = choice.kind;
@@ -102,7 +102,7 @@ export class StartControls {
     this.#explain();
   }
 
-  /** Shows an error beside the field changed last, and restores the current values. */
+  /** Shows an error beside the field changed last, and restores the values in force. */
   reject(message: string): void {
     this.show(this.#inForce);
     this.#changed.showError(message);

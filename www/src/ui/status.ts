@@ -1,7 +1,10 @@
 import { text } from '../texts';
 import { h } from './dom';
 
-/** Milliseconds between two progress reports: rarely enough for screen readers, and for the rest of the page. */
+/**
+ * Milliseconds between the last message and a progress report: rarely enough for screen readers, and for the rest of
+ * the page.
+ */
 const REPORT_EVERY = 10_000;
 
 /**

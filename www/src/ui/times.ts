@@ -2,7 +2,10 @@ import { text } from '../texts';
 import { h } from './dom';
 import type { History } from './history';
 
-/** Rows of the paper's tables 1 and 2: the paper's letter, the name here, and the parts of a step that are summed. */
+/**
+ * Rows of the paper's tables 1 and 2: the paper's letter, the name on the page, and the parts of a step that are
+ * summed.
+ */
 export const TIME_ROWS = [
   { letter: 'T', name: text('extractPanels.timeTopology'), parts: ['topology', 'embedding'] },
   { letter: 'N', name: text('extractPanels.timeNormals'), parts: ['normals'] },
@@ -34,7 +37,7 @@ export function seconds(ms: number): string {
   return (ms / 1000).toFixed(ms < 9950 ? 2 : 1);
 }
 
-/** Table of the time spent by part and level, in the layout of the paper's tables 1 and 2. */
+/** Table of the time spent by part and level, in seconds, in the layout of the paper's tables 1 and 2. */
 export class TimeTable {
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });

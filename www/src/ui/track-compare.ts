@@ -11,7 +11,7 @@ const ALTERNATIVES: { value: Alternative; label: string }[] = [
   { value: 'flow', label: text('trackPanels.otherFlow') },
 ];
 
-/** One of the two runs of a comparison. */
+/** One of the two tracking runs of a comparison. */
 export interface TrackingRun {
   name: string;
   facts: readonly FrameStatistics[];
@@ -133,7 +133,7 @@ export class TrackComparePanel {
   }
 }
 
-/** Returns the figures of the table, also for other programs. */
+/** Returns the numbers in a run's column of the table, also published as JSON in the element's `data-comparison`. */
 function summary({ name, facts, closing, error, duration }: TrackingRun) {
   const mean = (of: (one: FrameStatistics) => number) =>
     facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
@@ -211,7 +211,7 @@ function tableOf(runs: [TrackingRun, TrackingRun]): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** Converts a tracked run to an entry of a comparison. */
+/** Names a tracked run for the comparison. */
 export function comparedRun(name: string, { facts, closing, error, duration }: ComparedTrack): TrackingRun {
   return { name, facts, closing, error, duration };
 }

@@ -5,7 +5,7 @@ import { h, uniqueId } from './dom';
 /** Placement of the slices in the 3D view: on the walls behind the surface, in place, or hidden. */
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
-/** Colouring of the surface in the Extract lab. */
+/** Colouring of the surface: plain, by connected component, or by a quantity at the vertices. */
 export type ColorMode = 'plain' | 'component' | VertexQuantity;
 
 export interface ViewOptions {

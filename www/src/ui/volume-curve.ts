@@ -11,9 +11,9 @@ const MARK_HEIGHT = 18;
 
 export interface VolumeCurves {
   volumes: number[];
-  /** True volumes, if the image is computed. */
+  /** True volume of each frame, if the image is synthetic. */
   truth: number[] | undefined;
-  /** Result of a comparison, and its name. */
+  /** Volume of each frame in the run tracked for comparison, and its name. */
   other: { volumes: number[]; name: string } | undefined;
   /** The frame shown in the view. */
   frame: number;
@@ -87,7 +87,7 @@ export class VolumeCurve {
       beat && volumes.length === frames ? describeBeat(beat, this.#curves) : text('trackPanels.curveUnfinished');
   }
 
-  /** Draws vertical lines at the current frame, and at the largest and smallest volume. */
+  /** Draws vertical lines at the current frame and, once all frames are tracked, at the largest and smallest volume. */
   #mark(plot: uPlot): void {
     const { ctx, bbox } = plot;
     const { volumes, frames, frame } = this.#curves;

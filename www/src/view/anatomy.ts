@@ -4,7 +4,10 @@ import { text } from '../texts';
 export type Axis = 0 | 1 | 2;
 export type Grid = Pick<VolumeView, 'dims' | 'spacing' | 'affine' | 'space'>;
 
-/** One side of a slice image: the voxel axis along it, and whether its index decreases instead of increasing. */
+/**
+ * The horizontal or vertical side of a slice image: the voxel axis along it, and whether the voxel index decreases from
+ * left to right or from top to bottom.
+ */
 export interface ImageAxis {
   axis: Axis;
   flip: boolean;
@@ -32,7 +35,7 @@ const ENDS = [
 ] as const;
 const NAMES = ['Sagittal', 'Coronal', 'Axial'] as const;
 
-/** Names of the slices as shown. */
+/** Displayed names of the slice directions, in the language of the page. */
 export const SLICE_NAMES: Record<SliceOrientation['name'], string> = {
   Sagittal: text('view.sagittal'),
   Coronal: text('view.coronal'),
@@ -55,7 +58,10 @@ export function anatomicalSigns(space: 'RAS' | 'LPS'): Vec3 {
   return space === 'LPS' ? [-1, -1, 1] : [1, 1, 1];
 }
 
-/** Returns for each voxel axis the anatomical axis it is most nearly parallel to, and its direction. */
+/**
+ * Assigns each voxel axis the anatomical axis it is most nearly parallel to, each of them once. `positive`: whether the
+ * voxel index increases towards the right, front or head.
+ */
 export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[] {
   const signs = anatomicalSigns(grid.space);
   const along = (voxel: number, world: number) =>
@@ -85,7 +91,10 @@ export function sliceOrientations(grid: Grid): SliceOrientation[] {
   });
 }
 
-/** Transforms a voxel index (centres at integers) to world space. */
+/**
+ * Applies a 4 × 4 affine map, column-major, to a point: with the volume's map, a voxel index (centres at integers) to
+ * world space; with the inverse, a world point to voxel index.
+ */
 export function toWorld(affine: ArrayLike<number>, index: Vec3): Vec3 {
   const row = (r: number) =>
     (affine[r] ?? 0) * index[0] +

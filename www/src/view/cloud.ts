@@ -16,12 +16,12 @@ export class PointCloud {
     this.#paint();
   }
 
-  /** Diameter in world units for a field of view of 90°; a narrower view shows smaller discs. */
+  /** Diameter of the discs in world units, exact for a field of view of 90°; a narrower view shows smaller discs. */
   set size(size: number) {
     this.#material.size = size;
   }
 
-  /** Shows packed points; `colors` are rgb, 0..1. */
+  /** Shows points, packed xyz; `colors` are sRGB of each point, 0..1. */
   show(points: Float32Array, colors?: Float32Array): void {
     this.object.geometry.dispose();
     const geometry = new BufferGeometry();

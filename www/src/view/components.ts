@@ -9,7 +9,10 @@ const PALETTE: [number, number, number][] = [
   [0.835, 0.369, 0],
 ].map((rgb) => rgb.map((c) => c ** 2.2) as [number, number, number]);
 
-/** Returns for each vertex the smallest vertex of its connected component. */
+/**
+ * Returns for each vertex the smallest vertex index of its connected component. The first `length` of the indices are
+ * used.
+ */
 export function componentRoots(indices: Uint32Array, length: number, vertices: number): Uint32Array {
   const parent = Uint32Array.from({ length: vertices }, (_, i) => i);
   const find = (start: number) => {
@@ -32,8 +35,9 @@ export function componentRoots(indices: Uint32Array, length: number, vertices: n
 }
 
 /**
- * Writes a colour per vertex, rgb, into `out`, one for each connected component. Components are ranked by size, so that
- * colours stay the same as the largest grows.
+ * Writes a colour per vertex, linear rgb, into `out`: the same for all vertices of a connected component. Components
+ * are ranked by number of vertices, so that the largest keeps its colour as it grows; after the seventh, the colours
+ * repeat.
  */
 export function componentColors(indices: Uint32Array, length: number, vertices: number, out: Float32Array): void {
   const roots = componentRoots(indices, length, vertices);

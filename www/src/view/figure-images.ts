@@ -41,8 +41,9 @@ export class FigureImage {
   }
 
   /**
-   * Draws a small image magnified, with pixels of the given width and height; `over` draws on top, in its pixels times
-   * the scales.
+   * Draws `small` magnified, to the scale at which its longer side is {@link IMAGE_SIZE}; `wide` × `high` is the shape
+   * of its pixels. `over` draws on top: a position in pixels of `small`, times the scales, is the position on the
+   * canvas.
    */
   paint(
     small: HTMLCanvasElement,
@@ -67,15 +68,18 @@ export interface Subject {
   voxel: Vec3;
 }
 
-/** The voxel axis across the slices, in the scanner's order. */
+/** Voxel axis perpendicular to the slices: the third, as acquired by the scanner. */
 const ACROSS = 2;
-/** Width and height of the section of a slice that shows a window, pixels. */
+/**
+ * Width and height of the section of a slice that is shown around the crosshair, pixels; less if the slice is smaller.
+ */
 const SECTION_SIZE = 28;
 
 /**
- * Paints the section of the slice around the crosshair, with the voxels of the window there classified as bright and
- * dark: green and red, as in figure 4 a. Returns whether the window contains a
- * boundary: both clusters are large enough, and their means differ by more than the threshold.
+ * Paints a section of the slice around the crosshair and, in the window at the crosshair, outlines the voxels
+ * classified as bright in green and those classified as dark in red, as in figure 4 a. Returns whether the window
+ * contains a boundary: both clusters are large enough, and their means differ by more than the threshold (in intensity
+ * units).
  */
 export function paintWindow(
   picture: FigureImage,
@@ -111,7 +115,7 @@ export function paintWindow(
   return split;
 }
 
-/** Paints the accumulated votes of all windows: figure 4 b. */
+/** Paints the boundary votes in the slice at the crosshair, summed per pixel by {@link boundaryImage}: figure 4 b. */
 export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, votes: BoundaryVotes): void {
   const side = sliceSide(volume);
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
@@ -129,7 +133,7 @@ export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, 
   );
 }
 
-/** Paints Canny's edges of the same slice: figure 4 c. */
+/** Paints the edges that Canny's detector finds in the slice at the crosshair: figure 4 c. */
 export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subject, settings: CannySettings): void {
   const side = sliceSide(volume);
   const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
@@ -142,8 +146,8 @@ export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subje
 }
 
 /**
- * Paints one line of the slice in all frames, time to the right, and its intersections with the surfaces: `outlines` by
- * frame. Returns their number.
+ * Paints the row of pixels through the crosshair in all frames, one column per frame, and marks its intersections with
+ * the outlines of the surface; `outlines` by frame. Returns the number of intersections.
  */
 export function paintTime(
   picture: FigureImage,
@@ -176,7 +180,10 @@ export function paintTime(
   return count;
 }
 
-/** Paints figure 5: a slice, its neighbours, and the interpolations in its place. */
+/**
+ * Paints figure 5: the slice before, the slice interpolated by optical flow, the measured slice, the slice interpolated
+ * linearly, and the slice after.
+ */
 export function paintBetween(
   pictures: readonly FigureImage[],
   volume: VolumeView,
@@ -204,7 +211,10 @@ export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: n
   return out;
 }
 
-/** Returns the upper left corner of the section of the slice centred on the crosshair. */
+/**
+ * Returns the upper left corner, in pixels of the slice, of the section centred on the crosshair; the section is moved
+ * to lie within the slice.
+ */
 function cornerOf({ dims }: VolumeView, { horizontal, vertical }: Side, voxel: Vec3): [number, number] {
   const from = (side: Side['horizontal']) =>
     Math.max(0, Math.min(dims[side.axis] - SECTION_SIZE, placeIn(side, voxel, dims) - (SECTION_SIZE >> 1)));

@@ -19,7 +19,10 @@ import type { ControlEllipsoid } from '../sculpt/protocol';
 export type HandleMode = 'move' | 'turn' | 'size';
 
 const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
-/** Opacities: high enough to find the ellipsoids, low enough to see the surface through them. */
+/**
+ * Opacities of an ellipsoid, of the selected one, and of their wireframes: high enough to find the ellipsoids, low
+ * enough to see the surface through them.
+ */
 const ELLIPSOID_OPACITY = 0.05;
 const SELECTED_OPACITY = 0.16;
 const WIRE_OPACITY = 0.13;
@@ -32,7 +35,7 @@ export class EllipsoidHandles {
   readonly object = new Group();
   /** Called while a handle is dragged, and once more when it is released. */
   onDrag: (ellipsoid: ControlEllipsoid, dragging: boolean) => void = () => undefined;
-  /** Called before the first move of a drag. */
+  /** Called when a handle is pressed, before it is moved. */
   onDragStart: () => void = () => undefined;
   /** Called when the pointer enters or leaves a handle. */
   onHover: (hovered: boolean) => void = () => undefined;
@@ -101,7 +104,9 @@ export class EllipsoidHandles {
     if (!this.dragging) this.#placeHandles();
   }
 
-  /** Returns the index of the first ellipsoid that a ray intersects. */
+  /**
+   * Returns the index of the ellipsoid that a ray intersects first; undefined if it intersects none or they are hidden.
+   */
   pick(ray: Raycaster): number | undefined {
     if (!this.object.visible) return undefined;
     const solids = this.#marks.children.flatMap(({ children: [solid] }) => (solid ? [solid] : []));

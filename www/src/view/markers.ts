@@ -16,8 +16,8 @@ const POINT = 0.12;
 const MARK_RADII = [0.008, 0.04] as const;
 
 /**
- * Marks of uncovered regions in the 3D view, drawn over everything: a ball where object lies outside the surface, a
- * wireframe where background lies inside it.
+ * Marks of uncovered regions in the 3D view, drawn over everything: a ball where a part of the object lies outside the
+ * surface, a wireframe where background lies inside it.
  */
 export class UncoveredMarks {
   readonly object = new Group();
@@ -31,7 +31,10 @@ export class UncoveredMarks {
     this.#cavity.color.set(cavity);
   }
 
-  /** Shows a mark for each region, sized by its area, within bounds relative to `side`, the volume's smallest side. */
+  /**
+   * Shows a mark for each region, with half the radius of a disc of the region's area, within {@link MARK_RADII} times
+   * `side`, the volume's smallest side.
+   */
   show(parts: readonly UncoveredRegion[], side: number): void {
     this.object.clear();
     const [least, most] = MARK_RADII;

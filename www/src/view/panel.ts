@@ -16,8 +16,8 @@ export interface PanelEvents {
    */
   onPoint: (index: Vec3, pressed: boolean) => void;
   /**
-   * Called first with the position and the tolerance of the pointer in voxels; a returned grip follows the pointer
-   * until it is released.
+   * Called when the image is pressed, with the position of the pointer and the tolerance for grabbing, in voxels. A
+   * returned grip follows the pointer until it is released, and `onPoint` is not called.
    */
   grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
 }
@@ -28,10 +28,10 @@ export interface Grip {
   drop: () => void;
 }
 
-/** Draws over a slice image, in its pixels times the scales. */
+/** Draws over a slice image: a position in pixels of the image, times the scales, is the position on the canvas. */
 export type Overlay = (context: CanvasRenderingContext2D, scaleX: number, scaleY: number) => void;
 
-/** Distance within which an edge can be grabbed, pixels of the screen. */
+/** Distance within which a side of the region can be grabbed, CSS pixels. */
 const SLACK = 7;
 
 /** A slice as an image with the surface's outline over it, its crosshair, and a slider. */
@@ -86,7 +86,7 @@ export class SlicePanel {
     this.draw();
   }
 
-  /** Sets the cross-section of the surface with this slice, as pairs of world points. */
+  /** Shows the cross-section of the surface with this slice, given as pairs of world points. */
   setOutline(segments: Float32Array): void {
     this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.orientation);
     this.draw();
@@ -110,7 +110,10 @@ export class SlicePanel {
     this.draw();
   }
 
-  /** Draws the image and all overlays on the visible canvas, in its own resolution. */
+  /**
+   * Draws the image, the crosshair, the outline and all overlays on the visible canvas, at the resolution of the
+   * screen.
+   */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
     const context = context2d(this.#canvas);
@@ -180,7 +183,10 @@ export class SlicePanel {
     );
   }
 
-  /** Returns position and scale of the image in the canvas, with voxels in their true proportions. */
+  /**
+   * Returns the position of the image in the canvas and the voxel size, in CSS pixels; voxels have their true
+   * proportions.
+   */
   #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
     const { width, height } = this.picture;
     const { spacing } = this.#volume;
@@ -221,8 +227,8 @@ export class SlicePanel {
   }
 
   /**
-   * Draws the circle in which each attractor's ball of influence intersects this slice, and a dot that is larger if the
-   * point itself is near.
+   * Draws the circle in which each attractor's ball of influence intersects this slice, and a dot at its centre, larger
+   * if the attractor lies within half a voxel of the slice.
    */
   #drawAttractors(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
@@ -248,8 +254,8 @@ export class SlicePanel {
   }
 
   /**
-   * Marks the parts of the iso-surface near this slice that the surface does not cover: a dot where object lies outside
-   * the surface, a ring where background lies inside it.
+   * Marks the uncovered regions within half a voxel of this slice: a dot where a part of the object lies outside the
+   * surface, a ring where background lies inside it.
    */
   #drawUncovered(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
@@ -300,7 +306,10 @@ export class SlicePanel {
     return slack;
   }
 
-  /** Converts a canvas position, also outside the image, to voxels; the centre of the first voxel is at 0. */
+  /**
+   * Converts a canvas position, also outside the image, to voxel coordinates, not rounded; the centre of the first
+   * voxel is at 0.
+   */
   #placeAt(canvasX: number, canvasY: number): Vec3 {
     const { x, y, scaleX, scaleY } = this.#placement();
     const place: Vec3 = [...this.#crosshair];
@@ -319,7 +328,10 @@ export class SlicePanel {
   }
 }
 
-/** Describes the size of the surface's cross-section. Points as in {@link projectSegments}. */
+/**
+ * Describes width and height of the surface's cross-section in voxels, for screen readers. Points as returned by
+ * {@link projectSegments}.
+ */
 function describeOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
   if (points.length === 0) return text('view.noOutline');
   const side = (first: 0 | 1) => {

@@ -16,7 +16,7 @@ export interface Pose {
   right: Vector3;
   down: Vector3;
   forward: Vector3;
-  /** Focal lengths along x and y, and the principal point, pixels. */
+  /** Focal lengths along x and y, in pixels like the principal point. */
   focal: [number, number];
   principalPoint: [number, number];
 }
@@ -46,7 +46,7 @@ export function poseOf({ projection }: PinholeCamera): Pose {
   };
 }
 
-/** Returns the camera centre: the point whose projection is 0. */
+/** Returns the camera centre: the point that the projection matrix maps to the zero vector. */
 function centreOf(p: ArrayLike<number>): Vector3 {
   const at = (i: number) => p[i] ?? 0;
   const left = new Matrix4();
@@ -55,8 +55,8 @@ function centreOf(p: ArrayLike<number>): Vector3 {
 }
 
 /**
- * Gives `eye` the pose and projection of `camera`. If the view has another aspect ratio than the image, it shows more
- * on both sides.
+ * Gives `target` the pose and projection of `camera`. If the view has another aspect ratio than the camera's image, it
+ * shows more at the left and right, or at the top and bottom. `world` maps the camera's world space to the scene.
  */
 export function applyPinhole(
   target: PerspectiveCamera,

@@ -24,7 +24,7 @@ export interface PlaneColors {
 
 /**
  * A slice in the 3D view: a textured rectangle with a coloured frame and the surface's outline, either at its position
- * in the volume or on a wall behind it.
+ * in the volume or on a side of the volume's box behind it.
  */
 export class SlicePlane {
   readonly object = new Group();
@@ -38,7 +38,7 @@ export class SlicePlane {
   readonly #section: Lines;
   #index = 0;
 
-  /** `picture` shows the slice in reading order, oriented as specified by `orientation`. */
+  /** `picture` contains the slice image, oriented as specified by `orientation`; it is the rectangle's texture. */
   constructor(grid: Grid, orientation: SliceOrientation, picture: HTMLCanvasElement, colors: PlaneColors) {
     this.#grid = grid;
     this.#frame = orientation;
@@ -64,7 +64,7 @@ export class SlicePlane {
     this.object.add(rectangle, new LineLoop(this.#outline, this.#line), this.#section.object);
   }
 
-  /** Moves the rectangle to the slice with the given index, after its image was repainted. */
+  /** Moves the rectangle to the slice with the given index, and uploads the image, which the caller has repainted. */
   moveTo(index: number): void {
     this.#index = index;
     const position = this.#geometry.getAttribute('position') as BufferAttribute;

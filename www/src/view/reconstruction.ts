@@ -16,7 +16,7 @@ const OUTLIER_FRACTION = 0.02;
  * larger ones hide the surface.
  */
 const DISC = 0.014;
-/** With more points than this the discs are smaller, so that they do not cover everything. */
+/** Number of points above which the discs are smaller, so that they do not cover everything. */
 const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
 
@@ -29,14 +29,14 @@ export interface CloudViewOptions {
   color: SurfaceColor;
 }
 
-/** Points to show, and their orientation. */
+/** Points to show, their cameras, and the orientation of the view. */
 export interface ShownCloud {
   points: Float32Array;
-  /** rgb of each point, 0..1. */
+  /** sRGB of each point, 0..1. */
   colors?: Float32Array | undefined;
   cameras: readonly PinholeCamera[];
   up: 'y' | 'z';
-  /** The visible side: 1 where objects face along −y, or along z where y is up; −1 from behind. */
+  /** Side shown at first: 1 for objects that face −y, or z where y is up; −1 for the opposite side. */
   front: 1 | -1;
 }
 
@@ -148,7 +148,7 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Sets the view to the pose of a camera, or back to free rotation. */
+  /** Sets the view to the pose of a camera and highlights the pyramid with this index, or returns to free rotation. */
   lookThrough(camera: PinholeCamera | undefined, index: number | undefined): void {
     this.#cameras.choose(index);
     // Photographs contain shading already: next to one, colours are shown unlit.
@@ -157,7 +157,7 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Diagonal of the box that contains most points. */
+  /** Diagonal of the box that contains most points, world units. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
@@ -178,8 +178,8 @@ export class ReconstructionView {
   }
 
   /**
-   * Reports the intersection of a ray with the surface, or else with the plane through the middle that faces the
-   * viewer.
+   * Reports the intersection of a ray with the surface, or else with the plane through the centre of the points' box,
+   * perpendicular to the ray.
    */
   #pick(ray: Raycaster): void {
     if (!this.onPick) return;
@@ -215,7 +215,10 @@ export class ReconstructionView {
   }
 }
 
-/** Returns the bounding box of all points but the outermost. */
+/**
+ * Returns the bounding box of the points without the outermost {@link OUTLIER_FRACTION} at either end of each axis,
+ * enlarged on all sides by 3 % of its diagonal.
+ */
 function robustBox(points: Float32Array): Box3 {
   const box = new Box3();
   const count = points.length / 3;

@@ -21,8 +21,8 @@ export class RegionGrips {
   }
 
   /**
-   * Returns a grip on the sides of the box near `place` (voxels), on a slice across the axis `across`; undefined if
-   * none is within `slack`.
+   * Returns a grip on the sides of the box that are within `slack` of the position `place` (both in voxels), on a slice
+   * across the axis `across`; undefined if there are none.
    */
   grab(place: Vec3, slack: Vec3, across: Axis, dims: Vec3): Grip | undefined {
     const start = this.region;
@@ -53,7 +53,7 @@ export class RegionGrips {
     };
   }
 
-  /** Draws the intersection of the box with a slice, in pixels of the slice times the scales. */
+  /** Draws the box's outline on a slice image; the scales are the voxel size on the canvas. */
   draw(
     context: CanvasRenderingContext2D,
     orientation: SliceOrientation,

@@ -35,7 +35,7 @@ export class WebGlRendering {
     else this.#showNote(NONE);
   }
 
-  /** Whether rendering is done by the processor. Queried on first use only, because it blocks the page. */
+  /** Whether rendering is done without a GPU. Queried on first use only, because it blocks the page. */
   get inSoftware(): boolean {
     if (!this.#renderer) return false;
     this.#inSoftware ??= isSoftware(this.#renderer.getContext());
@@ -69,7 +69,7 @@ function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
   return renderer;
 }
 
-/** Whether rendering is done by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+/** Whether the context renders without a GPU: with SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
 function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
   const info = context.getExtension('WEBGL_debug_renderer_info');
   const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);

@@ -12,7 +12,9 @@ import { Viewport } from './viewport';
 
 /** Distance between the centres of adjacent meshes in a row, relative to their width. */
 const ROW_SPACING = 1.25;
-/** Initial rotation to the side, so that a face is seen almost from the front. */
+/**
+ * Tangent of the angle by which the initial view is rotated to the side, so that a face is seen almost from the front.
+ */
 const VIEW_ANGLE = 0.35;
 
 export interface SculptViewOptions {
@@ -23,8 +25,8 @@ export interface SculptViewOptions {
 }
 
 /**
- * Names of the meshes that can be shown: as in the paper, with a dash for the deformed ones, and up to five stages of a
- * computation.
+ * Names of the meshes that can be shown: as in the paper, with `dash` for the prime of the deformed ones, and A to E
+ * for up to five stages of a computation.
  */
 const MESHES = ['S1', 'S0', 'T', 'S0dash', 'S1dash', 'A', 'B', 'C', 'D', 'E'] as const;
 type MeshName = (typeof MESHES)[number];
@@ -55,12 +57,14 @@ export class SculptureView {
   readonly handles: EllipsoidHandles;
   /** Called with the index of the ellipsoid that was clicked, or with undefined. */
   onPick: (index: number | undefined) => void = () => undefined;
-  /** Called when other meshes are in the row, with their captions. */
+  /**
+   * Called whenever the captions of the meshes in the row may have changed; without captions if a single mesh is shown.
+   */
   onCaptions: (captions: string[]) => void = () => undefined;
   readonly #viewport: Viewport;
   readonly #meshes = new Map<MeshName, { holder: Group; surface: SurfaceObject; has: boolean }>();
   #options: SculptViewOptions;
-  /** Captions of the stages. */
+  /** Captions of the stages shown, from left to right. */
   #stages: string[] = [];
   /** Whether y points upwards. */
   #upright = false;
@@ -97,7 +101,8 @@ export class SculptureView {
   }
 
   /**
-   * Opens another scene and discards everything of the previous one. The view is fitted to the surface in all `poses`.
+   * Opens another scene and discards everything of the previous one. The view is fitted to the surface in the pose
+   * `start`, whose bounding box is `box`, and in all `poses`.
    */
   setScene(box: { min: Vec3; max: Vec3 }, up: 'y' | 'z', start: Pose, poses: Pose[]): void {
     this.#box = boxOfAllPoses(box, start, poses);
@@ -109,7 +114,10 @@ export class SculptureView {
     this.#fitView();
   }
 
-  /** Shows a surface; its arrays are kept until the next one is shown. */
+  /**
+   * Shows a surface as the mesh `name`, or does nothing without one; its arrays are used without a copy until the next
+   * one is shown.
+   */
   show(name: MeshName, surface: Surface | undefined): void {
     const mesh = this.#meshes.get(name);
     if (!mesh || !surface) return;
@@ -146,7 +154,7 @@ export class SculptureView {
     this.#viewport.changeAndDraw(change);
   }
 
-  /** The texture of the result, or null. */
+  /** Texture of all meshes that have texture coordinates; null for none. */
   set texture(texture: Texture | null) {
     for (const { surface } of this.#meshes.values()) surface.texture = texture;
     this.#viewport.invalidate();
@@ -169,12 +177,12 @@ export class SculptureView {
     if (refit) this.#fitView();
   }
 
-  /** Diagonal of the scene's bounding box as it was opened. */
+  /** Diagonal of the bounding box of the surface in all poses with which the scene was opened. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
 
-  /** Centre of the scene's bounding box as it was opened. */
+  /** Centre of the bounding box of the surface in all poses with which the scene was opened. */
   get middle(): Vec3 {
     return this.#box.getCenter(new Vector3()).toArray();
   }
@@ -262,7 +270,10 @@ export class SculptureView {
   }
 }
 
-/** Returns a box for the surface in all poses: with the same margin around the ellipsoids as at the start. */
+/**
+ * Returns an estimated bounding box of the surface in all poses: the margin around the ellipsoids is that of the start
+ * pose.
+ */
 function boxOfAllPoses(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
   const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));
   const first = boxOf(start);

@@ -20,7 +20,7 @@ const STOPS: readonly Rgb[] = [
  * Quantile of the magnitudes that bounds the range shown, so that a few extreme vertices do not make all others pale.
  */
 const WITHIN = 0.98;
-/** Number of values sampled to find the range. */
+/** Number of values sampled to find the range of the colour scale; up to twice as many if they do not divide evenly. */
 const SAMPLES = 4096;
 /** Number of steps of the colour table. */
 const TABLE = 256;
@@ -67,11 +67,13 @@ export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
 
 interface QuantityText {
   title: string;
-  /** Power of inverse length in the unit; −1 for a length. */
+  /**
+   * Unit of the values, as a power of inverse length: −1 for lengths, 2 for inverse areas; undefined if none is shown.
+   */
   power?: 1 | 2 | -1;
   below: string;
   above: string;
-  /** Smallest range shown. */
+  /** Smallest magnitude at the ends of the colour scale. */
   least: number;
   /** Whether values are never negative: only the upper half of the colours is used. */
   positive?: boolean;
@@ -90,7 +92,7 @@ export function quantityTitle(quantity: ShownQuantity, unit: string): string {
   return text(power === 2 ? 'view.perUnitSquared' : 'view.perUnit', { title, unit: unit || text('view.unknownUnit') });
 }
 
-/** Returns the colour for t in −1..1, sRGB 0..255. */
+/** Returns the colour for t, clamped to −1..1, as sRGB 0..255. */
 export function diverging(t: number): [number, number, number] {
   const at = (Math.min(1, Math.max(-1, t)) + 1) * 2;
   const i = Math.min(STOPS.length - 2, Math.floor(at));
@@ -104,8 +106,8 @@ const LINEAR = Float32Array.from({ length: 3 * (TABLE + 1) }, (_, i) => {
 });
 
 /**
- * Returns the range of the colour scale: a magnitude that bounds nearly all values, rounded up to 1, 2 or 5 times a
- * power of ten.
+ * Returns the magnitude at the ends of the colour scale: one that bounds nearly all values and is at least `least`,
+ * rounded up to 1, 2 or 5 times a power of ten.
  */
 export function robustRange(values: Float32Array, least: number): number {
   const stride = Math.max(1, Math.floor(values.length / SAMPLES));
@@ -124,7 +126,10 @@ function roundUp(value: number): number {
   return Number((step * power).toPrecision(1));
 }
 
-/** Writes the colour of each value into `out`, linear rgb, three numbers each. */
+/**
+ * Writes the colour of each value into `out`, linear rgb, three numbers each; ±`range` are the ends of the colour
+ * scale.
+ */
 export function shadeColors(values: Float32Array, range: number, out: Float32Array): void {
   for (let vertex = 0; vertex < values.length; vertex++) {
     // NaN is drawn as zero.

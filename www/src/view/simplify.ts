@@ -3,9 +3,12 @@
  * and Borrel 1993).
  */
 
-/** Number of edges sampled for the mean edge length. */
+/** Number of edges sampled for the mean edge length; up to twice as many if they do not divide evenly. */
 const SAMPLES = 1000;
-/** Number of triangles that remain per cell area, so that their total is close to the target. */
+/**
+ * Factor of the area of a cell's side, relative to the squared mean edge length times the ratio of triangles before and
+ * after; with it, the number of remaining triangles is close to the target.
+ */
 const TRIANGLES_PER_CELL = 1.5;
 /** Ratio of triangles to the target above which larger cells are tried. */
 const MOST_EXCESS = 1.5;
@@ -20,8 +23,8 @@ export interface FineMesh {
 }
 
 /**
- * Returns the corners of about `triangles` triangles. The vertices in a grid cell are merged into one of them; the two
- * sides of a thin sheet stay separate, by the directions of their normals.
+ * Returns the corners of about `triangles` triangles. The vertices in a grid cell are merged into one of them,
+ * separately for the six main directions of their normals, so that the two sides of a thin sheet stay apart.
  */
 export function simplifiedIndices(fine: FineMesh, triangles: number): Uint32Array {
   const cell = meanEdge(fine) * Math.sqrt((TRIANGLES_PER_CELL * fine.corners) / 3 / triangles);
@@ -60,7 +63,7 @@ function meanEdge({ positions, indices, corners }: FineMesh): number {
   return sum / Math.max(1, count) || 1;
 }
 
-/** Returns for each vertex the first one in its cell. */
+/** Returns for each vertex the first vertex in its cell whose normal has the same main direction. */
 function clusterRepresentatives({ positions, normals, vertices }: FineMesh, cell: number): Uint32Array {
   const [low, wide] = extent(positions, vertices);
   const side = Math.floor(wide / cell) + 1;
@@ -88,7 +91,7 @@ function extent(positions: Float32Array, vertices: number): [number[], number] {
   return [low, Math.max(0, ...low.map((value, axis) => high[axis] - value))];
 }
 
-/** Returns the face of a cube that the normal intersects, 0 to 5. */
+/** Returns the face of a cube around the origin that the normal intersects: 0 to 5 for −x, x, −y, y, −z, z. */
 function dominantFace(normals: Float32Array, i: number): number {
   const [x, y, z] = [normals[i] ?? 0, normals[i + 1] ?? 0, normals[i + 2] ?? 0];
   const [ax, ay, az] = [Math.abs(x), Math.abs(y), Math.abs(z)];

@@ -10,8 +10,8 @@ export function pictureSize(volume: Voxels, orientation: SliceOrientation): { wi
 }
 
 /**
- * Paints a slice as grey RGBA pixels in reading order, oriented as specified by `orientation`. `out` holds 4 × width × height
- * bytes.
+ * Paints a slice as grey RGBA pixels, row by row, oriented as specified by `orientation`. `out` holds 4 × width ×
+ * height bytes.
  */
 export function paintSlice(volume: Voxels, orientation: SliceOrientation, index: number, out: Uint8ClampedArray): void {
   const { width, height } = pictureSize(volume, orientation);
@@ -33,7 +33,7 @@ export function paintSlice(volume: Voxels, orientation: SliceOrientation, index:
   }
 }
 
-/** Returns the grey values of a slice in reading order. */
+/** Returns the grey values of a slice, 0..255, row by row, oriented as specified by `orientation`. */
 export function greysOf(volume: Voxels, orientation: SliceOrientation, index: number): Uint8Array {
   const { width, height } = pictureSize(volume, orientation);
   const rgba = new Uint8ClampedArray(4 * width * height);
@@ -41,13 +41,16 @@ export function greysOf(volume: Voxels, orientation: SliceOrientation, index: nu
   return Uint8Array.from({ length: width * height }, (_, i) => rgba[4 * i] ?? 0);
 }
 
-/** Returns the index of the slice of a coarser level at the position of the volume's slice with the given index. */
+/** Returns the index of the slice of a coarser pyramid level at the position of the volume's slice `index`. */
 export function levelIndex(volume: Voxels, level: LevelView, orientation: SliceOrientation, index: number): number {
   const last = level.dims[orientation.axis] - 1;
   return Math.min(last, Math.floor(((index + 0.5) * level.dims[orientation.axis]) / volume.dims[orientation.axis]));
 }
 
-/** Paints a slice of a coarser level, stretched to the size of the volume's slices so that its voxels are visible. */
+/**
+ * Paints the slice of a coarser pyramid level at the position of the volume's slice `index`, stretched to the size of
+ * the volume's slices so that its voxels are visible.
+ */
 export function paintLevel(
   volume: Voxels,
   level: LevelView,
@@ -75,8 +78,8 @@ export function slicePicture(volume: Voxels, orientation: SliceOrientation, inde
 }
 
 /**
- * Returns the intersection of an attractor's ball of influence with a slice, in the coordinates of
- * {@link projectSegments}, or undefined if there is none. `near`: the point itself lies within half a voxel of the
+ * Returns the ellipse in which an attractor's ball of influence intersects a slice, in the coordinates of
+ * {@link projectSegments}, or undefined if there is none. `near`: the attractor itself lies within half a voxel of the
  * slice.
  */
 export function ballSection(

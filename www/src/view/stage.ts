@@ -22,7 +22,7 @@ interface Scene {
   box: VolumeBox;
 }
 
-/** The 3D view and the three slices of a volume, synchronised by a common crosshair. */
+/** The 3D view and the three slices of a volume in the Extract lab, synchronised by a common crosshair. */
 export class Stage {
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
@@ -97,14 +97,14 @@ export class Stage {
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
 
-  /** Shows a surface; its arrays are kept until the next one is shown. */
+  /** Shows a surface; its arrays are used without a copy until the next one is shown. */
   showSurface(surface: Surface): void {
     this.#surface.show(surface);
     this.#showLegend();
     this.#viewport.invalidate();
   }
 
-  /** Shows the cross-sections of the surface with the slice planes last reported, in the same order. */
+  /** Shows the cross-sections of the surface with the slice planes last passed to `onPlanes`, in the same order. */
   showSections(sections: Float32Array[]): void {
     sections.forEach((section, axis) => {
       this.#scene?.panels[axis]?.setOutline(section);
@@ -200,7 +200,10 @@ export class Stage {
     this.#viewport.invalidate();
   }
 
-  /** The crosshair follows the pointer; while an object is being placed, only the press counts. */
+  /**
+   * Moves the crosshair to the voxel under the pointer; while attractors are being placed, only a press counts, and
+   * places one.
+   */
   #point(index: Vec3, pressed: boolean): void {
     if (this.onPlace && !pressed) return;
     this.#moveTo(index);

@@ -53,7 +53,10 @@ export class SurfaceObject {
   readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
   #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
-  /** Has normals from the start: a shader compiled for a surface without them would always draw flat triangles. */
+  /**
+   * The surface's geometry. It has normals from the start: a shader compiled for a surface without them would always
+   * draw flat triangles.
+   */
   #fine = emptyGeometry();
   /** Simplified geometry, drawn in place of the fine one while it exists. */
   #coarse: BufferGeometry | undefined;
@@ -68,7 +71,7 @@ export class SurfaceObject {
   #hasUvs = false;
   /** Values at the vertices that are shown as colours; empty if there are none. */
   #values: Float32Array = new Float32Array(0);
-  /** rgb of the vertices; empty if the surface has no colours. */
+  /** The surface's own colours, sRGB of each vertex, 0..1; empty if it has none. */
   #colors: Float32Array = new Float32Array(0);
   /** The value at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
@@ -81,7 +84,7 @@ export class SurfaceObject {
     this.object.add(this.#mesh, this.#edges);
   }
 
-  /** Shows a surface; its arrays are kept until the next one is shown. */
+  /** Shows a surface; its arrays are used without a copy until the next one is shown. */
   show(surface: Surface): void {
     this.#dropCoarse();
     this.#vertices = surface.vertices;
@@ -103,18 +106,21 @@ export class SurfaceObject {
     refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
   }
 
-  /** Whether a simplified surface is drawn, for rotating a large surface in a software renderer. */
+  /**
+   * Whether a surface with more than {@link SMOOTH} triangles is drawn simplified, for rotating it in a software
+   * renderer.
+   */
   set coarse(on: boolean) {
     if (!on) this.#dropCoarse();
     else if (this.#corners > 3 * SMOOTH && !this.#coarse) this.#makeCoarse();
   }
 
-  /** The value of the strongest colours; 0 if colours represent no values. */
+  /** The magnitude at the ends of the colour scale; 0 if the colours represent no values. */
   get range(): number {
     return this.#range;
   }
 
-  /** The mesh to test for intersections with a ray. */
+  /** The unsimplified mesh, to test for intersections with a ray. */
   get target(): Mesh {
     this.#dropCoarse();
     return this.#mesh;
@@ -135,7 +141,7 @@ export class SurfaceObject {
     this.#fillColors();
   }
 
-  /** Whether the surface's own colours are lit. */
+  /** Whether the surface's own colours are lit; colours from photographs already contain shading. */
   set lit(lit: boolean) {
     this.#lit = lit;
     this.#fillColors();
@@ -312,7 +318,9 @@ function listEdges(indices: Uint32Array, length: number, out: Uint32Array): numb
   return count;
 }
 
-/** Assigns an array of the same length to a buffer attribute; only the part in use is uploaded. */
+/**
+ * Assigns an array of the same length to a buffer attribute; only its first `length` entries are uploaded to the GPU.
+ */
 function refill(buffer: BufferAttribute, array: Float32Array | Uint32Array, length: number): void {
   buffer.array = array;
   buffer.clearUpdateRanges();

@@ -45,12 +45,15 @@ interface Scene {
 const DISC = 1.1;
 /** Distance from a vertex within which votes are near the surface, in shortest voxel sides. */
 const NEAR_DISTANCE = 2;
-/** Scale of the box to which the view is fitted, because the object leaves a margin in it. */
+/**
+ * Half the fraction of the region's sides to which the view is fitted; below ½, because the object leaves a margin in
+ * the region.
+ */
 const FIT_SCALE = 0.44;
 
 /** The 3D view and the slices of the Track lab for one frame at a time, synchronised by a common crosshair. */
 export class TrackView {
-  /** Called when the region of interest was dragged to other voxels. */
+  /** Called when a drag of the region of interest ends, with the region in voxels. */
   onRegion: (region: VoxelBox) => void = () => undefined;
   /** Called whenever the slices have moved. */
   onMoved: () => void = () => undefined;
@@ -68,7 +71,7 @@ export class TrackView {
   #shown: Surface | undefined;
   #votes: BoundaryVotes | undefined;
   #frame = 0;
-  /** Previewed votes by voxel axis. */
+  /** Boundary votes previewed for an edge threshold, by voxel axis across the slice. */
   #preview: ReturnType<typeof sliceVotes>[] = [];
   #crosshair: Vec3 = [0, 0, 0];
 
@@ -83,8 +86,8 @@ export class TrackView {
   }
 
   /**
-   * Shows another image, or the same with other preprocessing: `keep` leaves slices and camera unchanged in world
-   * space.
+   * Shows another image, or, with `keep`, the same with other preprocessing: slices and camera then stay unchanged in
+   * world space.
    */
   setVolume(volume: VolumeView, keep: boolean): void {
     const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
@@ -120,7 +123,7 @@ export class TrackView {
     if (at) this.goTo(at);
   }
 
-  /** Fits a box of voxels closely into the view. */
+  /** Fits a box of voxels closely into the 3D view. */
   fitRegion(region: VoxelBox): void {
     if (!this.#scene) return;
     const { space, affine } = this.#scene.volume;
@@ -158,8 +161,8 @@ export class TrackView {
   }
 
   /**
-   * Previews the boundary for an edge threshold, found in each slice separately with windows of half width `halfWidth`, in pixels
-   * to each side; undefined removes the preview.
+   * Previews the boundary for an edge threshold, found in each slice separately with windows of half width `halfWidth`,
+   * in pixels to each side; undefined removes the preview.
    */
   preview(threshold: number | undefined, halfWidth: number): void {
     const level = this.#level;
@@ -174,7 +177,7 @@ export class TrackView {
     this.#redraw();
   }
 
-  /** Shows the region of interest. */
+  /** Sets the region of interest, shown if the view options include it. */
   showRegion(region: VoxelBox): void {
     this.#grips.region = region;
     this.#redraw();
@@ -204,7 +207,7 @@ export class TrackView {
     return { point: this.#scene ? toWorld(this.#scene.volume.affine, voxel) : [0, 0, 0], voxel };
   }
 
-  /** Redraws the overlays of the slices. */
+  /** Redraws the slices with their overlays, and the region in the 3D view. */
   refresh(): void {
     this.#redraw();
   }
@@ -226,7 +229,7 @@ export class TrackView {
     this.#viewport.dispose();
   }
 
-  /** The voxels of the current frame. */
+  /** The current frame as a volume of its own. */
   get #level(): LevelView | undefined {
     const volume = this.#scene?.volume;
     return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
@@ -251,7 +254,7 @@ export class TrackView {
     this.#viewport.invalidate();
   }
 
-  /** Updates the surface's outlines on the slices. */
+  /** Updates the surface's outlines on the slices, in the panels and in the 3D view. */
   #updateSections(): void {
     const scene = this.#scene;
     if (!scene) return;

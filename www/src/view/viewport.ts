@@ -42,13 +42,13 @@ export class Viewport {
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
   /**
-   * Called before each rendering, with the camera position. `interactive`: whether the view is being rotated without a GPU,
-   * so that simplified objects are preferable.
+   * Called before each rendering, with the position of the orbit camera. `interactive`: whether the view is being
+   * rotated without a GPU, so that simplified objects are preferable.
    */
   onDraw: (viewer: Vector3, interactive: boolean) => void = () => undefined;
   /** Called with the ray through the point that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
-  /** Handler called first for key events; returns true for keys that are not for the view. */
+  /** Handler called first for key events; returns true if it has handled the key, which the view then ignores. */
   takesKey: (event: KeyboardEvent) => boolean = () => false;
   /** Called when the view leaves the pose of a photograph. */
   onLeave: () => void = () => undefined;
@@ -158,8 +158,8 @@ export class Viewport {
   }
 
   /**
-   * Fits a box in the coordinates of the objects shown into the view, a little from above and from the side. `front`:
-   * the visible side, along the horizontal axis towards the viewer.
+   * Fits a box, in the coordinates of the objects shown, into the view, a little from above and from the side. `front`
+   * is 1 to look along the scene's y, −1 against it; `aside` is the tangent of the angle to the side.
    */
   fitBox(box: Box3, front: 1 | -1, aside = 0.7): void {
     this.#fitView(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));

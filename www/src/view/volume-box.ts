@@ -19,9 +19,12 @@ const LETTERS = [
   ['A', 'P'],
   ['S', 'I'],
 ] as const;
-/** Distance of the letters from the box, as a fraction of the box. */
+/** Distance of the letters from the box, as a fraction of the box's side in this direction. */
 const LETTER_DISTANCE = 0.06;
-/** Height of a letter as a fraction of the view's height. */
+/**
+ * Side of a letter's square sprite divided by its distance from the camera: about 8 % of the height of the view, whose
+ * field of view is 30°.
+ */
 const LETTER_SIZE = 0.045;
 
 /** The bounding box of a volume in the 3D view, with anatomical directions at its six faces. */
@@ -69,8 +72,8 @@ function boxOf(grid: Grid, color: ColorRepresentation): LineSegments<EdgesGeomet
 }
 
 /**
- * Returns the world position of the middle of the box, except along one axis, where it is the given fraction of the way
- * through.
+ * Returns a point on an axis through the centre of the volume's box, in world space: `part` is 0 at the first voxel's
+ * face, 1 at the last one's.
  */
 function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   const at = grid.dims.map((n) => (n - 1) / 2) as Vec3;

@@ -1,9 +1,9 @@
-/** Boundary votes as points, coloured by the number of windows that voted for them, in space and on slices. */
+/** Boundary votes as points in space and on slices, coloured by the share of windows that voted for them. */
 import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { BoundaryVotes } from '../track/protocol';
 import { type SliceOrientation, toWorld } from './anatomy';
 
-/** Colours of the fewest and of the most votes, sRGB 0..1. */
+/** Colours of votes by none and by all of the windows, sRGB 0..1. */
 const FEW: Vec3 = [0.99, 0.82, 0.38];
 const MANY: Vec3 = [0.78, 0.1, 0.24];
 /** Number of colour steps of votes on slices. */
@@ -18,7 +18,10 @@ export function voteColors(weights: Float32Array): Float32Array {
   return out;
 }
 
-/** Returns the votes within about `reach` (world units) of a vertex of the surface. */
+/**
+ * Returns the votes near the surface: all within `reach` (world units) of a vertex, and some up to twice as far along
+ * an axis.
+ */
 export function votesNear(
   { frame, points, weights }: BoundaryVotes,
   { positions, vertices }: Surface,
@@ -51,7 +54,7 @@ interface OnSlice {
   scaleY: number;
 }
 
-/** Returns the votes that lie in a slice, in pixels of its image. */
+/** Returns the votes that lie within a quarter of a voxel of a slice, with positions in pixels of its image. */
 export function votesIn(
   { points, weights }: BoundaryVotes,
   { volume, inverse, orientation, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
@@ -77,7 +80,7 @@ export function drawVotes(context: CanvasRenderingContext2D, votes: BoundaryVote
   drawFaces(context, votesIn(votes, on), on.scaleX, on.scaleY);
 }
 
-/** Draws votes, given in pixels of a slice's image, as small squares. */
+/** Draws votes, given in pixels of a slice's image, as small squares coloured by weight. */
 export function drawFaces(
   context: CanvasRenderingContext2D,
   faces: readonly { x: number; y: number; weight: number }[],

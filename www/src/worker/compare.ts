@@ -5,12 +5,12 @@ import { buildModel } from './models';
 
 /** Largest number of iterations of a run; one that has not converged by then is compared in its present state. */
 const MOST_ITERATIONS = 4000;
-/** Milliseconds between two reports to the page. */
+/** Least milliseconds between two reports to the page; a report of convergence is sent at once. */
 const TELL_EVERY = 150;
 
 type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => void;
 
-/** Compares the two runs; resolves with undefined when the signal aborts. */
+/** Runs the extraction directly and coarse to fine, and returns both results; undefined if the signal aborts. */
 export async function compare(
   volume: Volume,
   setup: Setup,

@@ -1,4 +1,7 @@
-/** Creates deformable models from the page's settings, and computes the values shown on their surfaces. */
+/**
+ * Creates deformable models from the page's settings, and computes the values at their vertices by which surfaces are
+ * coloured.
+ */
 import { DeformableModel, type Volume } from 'vesicle';
 import type { Setup, VertexQuantity } from '../protocol';
 import { otsu } from '../threshold';
@@ -40,11 +43,11 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
 }
 
 /**
- * Computes one value per vertex for each quantity, in the order of the mesh's arrays. A new quantity needs an entry here and
- * one in `view/shading`.
+ * For each quantity, a function that returns one value per vertex, in the order of the mesh's arrays. A new quantity
+ * needs an entry here and one in `view/shading`.
  */
 const QUANTITIES: Record<VertexQuantity, (model: DeformableModel) => Float32Array> = {
-  /** Speed along the normal, δ per iteration. */
+  /** Speed along the normal as displacement per iteration, in units of δ. */
   speed: (model) => {
     const factor = model.params.timeStep / model.delta;
     return model.speeds().map((speed) => speed * factor);

@@ -1,7 +1,10 @@
 import { VesicleError } from 'vesicle';
 import type { Failure } from '../protocol';
 
-/** Error for a request that is invalid in the current state and was rejected before the library was called. */
+/**
+ * Error for a request that the app's own code rejects, such as a bad file or a request without a model; has the code of
+ * a VesicleError.
+ */
 export class Refusal extends Error {
   readonly code: string;
 
@@ -11,7 +14,9 @@ export class Refusal extends Error {
   }
 }
 
-/** Converts an error to a message for the page. Errors other than the library's and refusals are internal failures. */
+/**
+ * Converts an error to a message for the page; errors other than the library's and refusals get the code 'internal'.
+ */
 export function toFailure(error: unknown): Failure {
   if (error instanceof VesicleError || error instanceof Refusal) return { code: error.code, message: error.message };
   return { code: 'internal', message: error instanceof Error ? error.message : String(error) };

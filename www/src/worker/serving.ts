@@ -17,7 +17,7 @@ export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
   return arrays.map((array) => array.buffer as ArrayBuffer);
 }
 
-/** Buffers to transfer with a reply. */
+/** For each reply marked by `withTransfer`, the buffers to transfer with it. */
 const transferLists = new WeakMap<object, Transferable[]>();
 
 /** Marks arrays of a reply to be transferred to the page instead of copied; they become unusable in the worker. */

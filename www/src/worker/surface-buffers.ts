@@ -24,7 +24,7 @@ export function emptyArrays(): Arrays {
 
 /**
  * Copies a mesh into arrays with spare capacity, which are transferred to the page and uploaded to the GPU unchanged.
- * The given arrays are reused if their lengths match.
+ * Reuses given arrays whose length is the required capacity.
  */
 export function copySurface({ positions, normals, indices }: Arrays, mesh: Mesh): Surface {
   const [numbers, corners] = [3 * capacityFor(mesh.vertexCount), 3 * capacityFor(mesh.triangleCount)];
@@ -37,7 +37,7 @@ export function copySurface({ positions, normals, indices }: Arrays, mesh: Mesh)
   return { ...arrays, ...counts };
 }
 
-/** Copies a mesh with its texture coordinates into arrays with the same spare capacity. */
+/** Copies a mesh into new arrays with spare capacity, with its texture coordinates if it has any. */
 export function texturedSurface(mesh: Mesh): Surface {
   const capacity = capacityFor(mesh.vertexCount);
   const surface = copySurface(emptyArrays(), mesh);
@@ -47,7 +47,7 @@ export function texturedSurface(mesh: Mesh): Surface {
   return { ...surface, uvs };
 }
 
-/** Returns the buffers of a surface that are transferred instead of copied. */
+/** Returns all buffers of a surface, to be transferred to the page instead of copied. */
 export function transferOf({ positions, normals, indices, values, colors, uvs }: Surface): Transferable[] {
   return buffersOf([positions, normals, indices, values, colors, uvs].filter((array) => array !== undefined));
 }

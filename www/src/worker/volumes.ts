@@ -1,4 +1,4 @@
-/** Opens volumes in the worker, and reduces them to what the page shows. */
+/** Opens volumes in the worker, and reduces them to the data that the page displays. */
 import { VesicleError, Volume } from 'vesicle';
 import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
@@ -24,7 +24,7 @@ function parseFile(file: NamedBytes): Volume {
   }
 }
 
-/** Parses a volume from one file, or from a header and its data in either order. */
+/** Parses a volume from one file, or from a header and its data in either order; rejects any other number of files. */
 export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
@@ -43,7 +43,7 @@ export async function volumeFrom(source: VolumeSource): Promise<Volume> {
   return foreign ? new Volume(foreign) : parseFiles(source.files);
 }
 
-/** Reduces a volume to what the page shows: grey values of its first `pictures` frames, and metadata. */
+/** Reduces a volume to the data that the page displays: grey values of its first `pictures` frames, and metadata. */
 export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   const { range } = volume;
   const histogram = volume.histogram(HISTOGRAM_BINS);
@@ -65,7 +65,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   };
 }
 
-/** Returns the coarser pyramid levels for a model with `levels` levels, with the grey scale of the volume itself. */
+/** Returns the `levels` pyramid levels coarser than the volume, the finest first, with the volume's grey scale. */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
   const [, ...coarser] = volume.pyramid(levels + 1);
   return coarser.map((level) => {
@@ -77,7 +77,7 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
   });
 }
 
-/** Converts frames to grey values, slice by slice to avoid a second full copy in floats. */
+/** Converts the first `frames` frames to grey values, slice by slice to avoid a second full copy in floats. */
 function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
   const [nx, ny, nz] = volume.dims;
   const voxels = new Uint8Array(nx * ny * nz * frames);

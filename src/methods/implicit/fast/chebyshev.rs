@@ -3,22 +3,23 @@
 use crate::math::DVec3;
 use std::f64::consts::PI;
 
-/// Number of Chebyshev nodes along an axis. With 4, errors reach a tenth of a cell; with 6, evaluation takes twice as
-/// long.
+/// Number of Chebyshev nodes along an axis. With 4, errors reach a tenth of an extraction cell; with 6, evaluation
+/// takes twice as long.
 pub const NODES: usize = 5;
-/// Number of nodes of a cube, ordered x fastest.
+/// Number of Chebyshev nodes of a cube; they are ordered x fastest.
 pub const CUBE: usize = NODES * NODES * NODES;
 
-/// Values at the nodes of a cube.
+/// Values, or strengths of sources, at the Chebyshev nodes of a cube.
 pub type Nodal = [f32; CUBE];
 
 /// The Chebyshev nodes of [−1, 1], with tables for interpolation between them.
 #[derive(Clone, Debug)]
 pub struct Chebyshev {
     nodes: [f64; NODES],
-    /// The Chebyshev polynomials at the nodes: Tₘ at node k is in row k.
+    /// The Chebyshev polynomials Tₘ at the nodes: row k, column m holds Tₘ at node k.
     polynomials: [[f64; NODES]; NODES],
-    /// Weights of a cube's nodes, along an axis, in interpolation at the nodes of its lower and of its upper half.
+    /// Interpolation from a cube to its lower (index 0) and upper half (1) along an axis: row k holds the weights of
+    /// the cube's nodes at node k of the half.
     halves: [[[f64; NODES]; NODES]; 2],
 }
 
@@ -55,7 +56,7 @@ impl Chebyshev {
         self.combined(&t)
     }
 
-    /// Returns the derivative of each interpolation weight at `x`.
+    /// Returns the derivative of each node's interpolation weight at `x` in [−1, 1].
     pub fn slopes(&self, x: f64) -> [f64; NODES] {
         // Tₘ′ = m Uₘ₋₁
         let mut u = [1.0; NODES];
@@ -70,7 +71,8 @@ impl Chebyshev {
         self.combined(&derivatives)
     }
 
-    /// Returns (1/n)(t₀ + 2 Σ Tₘ(node) tₘ) for each node.
+    /// Returns (1/n)(t₀ + 2 Σ tₘ Tₘ(node)) for each of the n nodes: its interpolation weight if `t` holds Tₘ at a
+    /// point, and the derivative of that weight if `t` holds Tₘ′.
     fn combined(&self, t: &[f64; NODES]) -> [f64; NODES] {
         std::array::from_fn(|k| {
             let sum: f64 = (1..NODES).map(|m| self.polynomials[k][m] * t[m]).sum();
@@ -78,8 +80,8 @@ impl Chebyshev {
         })
     }
 
-    /// Interpolates values at the nodes of a cube at the nodes of one of its octants (the local-to-local translation);
-    /// `half` is the side of the octant, 0 or 1, along each axis.
+    /// Interpolates the values at the nodes of a cube, and returns those at the nodes of one of its octants (the
+    /// local-to-local translation); `half` is the side of the octant, 0 or 1, along each axis.
     pub fn local_to_local(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -88,8 +90,8 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// Moves sources at the nodes of an octant to the nodes of the whole cube (the multipole-to-multipole translation),
-    /// by the transpose of [`Self::local_to_local`].
+    /// Returns the sources at the nodes of a whole cube that replace those at the nodes of one of its octants (the
+    /// multipole-to-multipole translation), by the transpose of [`Self::local_to_local`].
     pub fn multipole_to_multipole(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = part.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -98,13 +100,14 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// Returns the interpolated value at a point in [−1, 1]³.
+    /// Returns the value at a point in [−1, 1]³, interpolated from those at the nodes.
     pub fn value(&self, nodal: &Nodal, at: DVec3) -> f64 {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         contracted(nodal, &x, &y, &z)
     }
 
-    /// Returns the interpolated value at a point in [−1, 1]³, and its gradient there.
+    /// Returns the value at a point in [−1, 1]³, interpolated from those at the nodes, and its gradient in these
+    /// coordinates.
     pub fn value_and_gradient(&self, nodal: &Nodal, at: DVec3) -> (f64, DVec3) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         let [dx, dy, dz] = at.to_array().map(|t| self.slopes(t));
@@ -116,7 +119,8 @@ impl Chebyshev {
         (contracted(nodal, &x, &y, &z), gradient)
     }
 
-    /// Spreads a source of strength `weight`, at a point in [−1, 1]³, to the nodes.
+    /// Adds a source of strength `weight`, at a point in [−1, 1]³, to the sources at the nodes, by their interpolation
+    /// weights.
     pub fn spread_source(&self, nodal: &mut Nodal, at: DVec3, weight: f64) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         for (index, value) in nodal.iter_mut().enumerate() {
@@ -126,17 +130,17 @@ impl Chebyshev {
     }
 }
 
-/// Returns the index of a node along each axis.
+/// Returns the index along x, y and z of node number `index` of a cube; the inverse of [`node_index`].
 pub fn node_coords(index: usize) -> [usize; 3] {
     [index % NODES, index / NODES % NODES, index / (NODES * NODES)]
 }
 
-/// Returns the number of the node with the given index along each axis.
+/// Returns the number of the node of a cube with the given indices along x, y and z; x varies fastest.
 pub fn node_index([i, j, k]: [usize; 3]) -> usize {
     (k * NODES + j) * NODES + i
 }
 
-/// Applies a matrix to nodal values along one axis.
+/// Multiplies the nodal values on each line along `axis` by a matrix; `entry` returns its entry, given row and column.
 fn apply_along(values: &[f64; CUBE], axis: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; CUBE] {
     std::array::from_fn(|index| {
         let node = node_coords(index);

@@ -15,8 +15,8 @@ use crate::math::DVec3;
 use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{CubeSymmetries, Translations};
 
-/// Approximate number of terms in a finest cube. With more, sums of near terms take longer; with fewer, there are more
-/// cubes.
+/// Maximum mean number of terms in the finest cubes that contain any. With more, sums of near terms take longer; with
+/// fewer, there are more cubes.
 const TERMS_A_CUBE: usize = 24;
 /// Maximum depth of the octree of cubes: tables of the finest level have 8^this entries.
 const MAX_LEVELS: usize = 6;
@@ -31,21 +31,21 @@ pub struct FastField {
     field: Field,
     chebyshev: Chebyshev,
     turns: CubeSymmetries,
-    /// Lowest corner and edge length of the root cube, in box units.
+    /// Lowest corner of the root cube, in box units; `edge` is the length of its edges.
     origin: DVec3,
     edge: f64,
     levels: Vec<Level>,
-    /// The terms (centre and weight), grouped by finest cube.
+    /// The terms (centre and weight); grouped by finest cube, unless all are summed directly.
     terms: Vec<(DVec3, f64)>,
-    /// For each finest cube with terms, the start and the end of its range in `terms`.
+    /// For each finest cube with terms, numbered as its `sources`, the start and the end of its range in `terms`.
     ranges: Vec<[usize; 2]>,
-    /// Whether all terms are summed directly.
+    /// Whether all terms are summed directly, as kernels that grow with the distance require.
     direct: bool,
     /// The cube of the last evaluation, with its near terms: consecutive points often share a cube.
     cached: CachedCube,
 }
 
-/// A cube, and the ranges of the terms near it.
+/// A cube with its index in `targets`, and the ranges of the terms near it.
 #[derive(Clone, Debug)]
 struct CachedCube {
     level: usize,
@@ -122,7 +122,7 @@ impl FastField {
         fast
     }
 
-    /// Writes f at each of `targets` to `out`.
+    /// Writes f at each of the points `targets`, in box units, to `out`.
     pub fn values(&mut self, targets: &[DVec3], out: &mut [f64]) {
         for (p, value) in targets.iter().zip(out) {
             *value = self.value(*p);
@@ -140,7 +140,7 @@ impl FastField {
         sum + self.field.polynomial(p)
     }
 
-    /// Returns f and ∇f at `p`.
+    /// Returns f and ∇f at `p`, in box units.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
         let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
@@ -168,13 +168,14 @@ impl FastField {
         ((p - self.origin) / self.cube_edge(level)).floor().to_array().map(|x| x as i32)
     }
 
-    /// Returns the position of `p` in the cube at `cube`, as coordinates in [−1, 1]³.
+    /// Returns the position of `p` relative to the cube with coordinates `cube` at `level`, in [−1, 1]³ if inside.
     fn within(&self, p: DVec3, cube: CubeCoords, level: usize) -> DVec3 {
         let middle = DVec3::from_array(cube.map(|k| f64::from(k) + 0.5));
         ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
     }
 
-    /// Adds levels until the finest cubes that contain terms contain few each.
+    /// Adds levels to the octree, three at least, until the finest cubes that contain terms contain [`TERMS_A_CUBE`] or
+    /// fewer on average, or the depth is [`MAX_LEVELS`].
     fn choose_levels(&mut self) {
         for depth in 0..=MAX_LEVELS {
             self.levels.push(Level::new(1 << depth));
@@ -261,8 +262,8 @@ impl FastField {
         Some(self.within(p, self.cached.cube, self.cached.level))
     }
 
-    /// Downward pass: computes the sum of all far terms at the nodes of a cube, unless it exists. Returns the cube's
-    /// index in `targets`.
+    /// Downward pass: computes the sum of all far terms at the nodes of a cube, unless that was done before. Returns
+    /// the cube's index in `targets`.
     fn target(&mut self, level: usize, cube: CubeCoords) -> usize {
         let Some(slot) = self.levels[level].index(cube) else { return 0 };
         let number = self.levels[level].target_ids[slot];
@@ -290,7 +291,7 @@ impl FastField {
     }
 }
 
-/// Returns the cube and its 26 neighbours.
+/// Returns the coordinates of the cube and of its 26 neighbours.
 fn around(cube: CubeCoords) -> impl Iterator<Item = CubeCoords> {
     (0..27).map(move |k| [cube[0] + k % 3 - 1, cube[1] + k / 3 % 3 - 1, cube[2] + k / 9 - 1])
 }

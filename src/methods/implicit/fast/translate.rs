@@ -13,8 +13,8 @@ const TOLERANCE: f64 = 1e-5;
 /// one. Reflections and permutations of the axes leave 16 of them.
 #[derive(Clone, Debug)]
 pub struct Translations {
-    /// By canonical offset, with descending components of at least 0; `None` for other offsets, and where cubes would
-    /// touch.
+    /// Matrices by canonical offset, whose components are non-negative and in descending order; `None` for other
+    /// offsets, and where cubes would touch.
     matrices: Vec<Option<LowRank<f32>>>,
 }
 
@@ -84,7 +84,8 @@ fn dot(a: &Nodal, b: &Nodal) -> f32 {
 /// matrices.
 #[derive(Clone, Debug)]
 pub struct CubeSymmetries {
-    /// By signs (three bits) and order of the axes (six): the new number of each node.
+    /// For each symmetry, the new number of each node. The index of a symmetry is 6 × reflections (three bits) + the
+    /// index of the axes' permutation in [`ORDERS`].
     nodes: Vec<[u8; CUBE]>,
 }
 
@@ -92,7 +93,7 @@ pub struct CubeSymmetries {
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl CubeSymmetries {
-    /// Computes all 48 permutations.
+    /// Computes the permutations of all 48 symmetries.
     pub fn new() -> Self {
         let symmetry = |number: usize| {
             let (signs, order) = (number / 6, ORDERS[number % 6]);
@@ -109,8 +110,8 @@ impl CubeSymmetries {
         Self { nodes: (0..48).map(symmetry).collect() }
     }
 
-    /// Returns the permutation that makes the components of an offset non-negative and descending, and the resulting
-    /// offset.
+    /// Returns the permutation of nodes whose symmetry makes the components of an offset non-negative and descending,
+    /// and the resulting offset.
     fn find(&self, offset: Offset) -> (&[u8; CUBE], Offset) {
         let signs = (0..3).map(|axis| usize::from(offset[axis] < 0) << axis).sum::<usize>();
         let size = offset.map(i32::abs);

@@ -3,8 +3,8 @@
 use crate::math::order::{combined_rank, rank_f32};
 use crate::math::{Bounds, Vec3};
 
-/// Maximum number of centres in a leaf of the cluster tree. 32 doubles the number of blocks, 128 the numbers that are
-/// stored in full.
+/// Maximum number of centres in a leaf of the cluster tree. With 32, there are twice as many blocks; with 128, twice as
+/// many numbers are stored in full.
 const LEAF: usize = 64;
 
 /// A binary tree over points: each cluster is a range of [`ClusterTree::order`], each child about half of it.
@@ -19,13 +19,13 @@ pub struct ClusterTree {
 /// A cluster of points that are near each other.
 #[derive(Clone, Debug)]
 pub struct Cluster {
-    /// Start of its range in the order.
+    /// Start of its range in [`ClusterTree::order`].
     pub start: usize,
-    /// End of its range, exclusive.
+    /// End, exclusive, of its range in [`ClusterTree::order`].
     pub end: usize,
     /// Bounding box of its points.
     pub bounds: Bounds,
-    /// Its two children; `None` for a leaf.
+    /// Indices of its two children in [`ClusterTree::clusters`]; `None` for a leaf.
     pub halves: Option<[usize; 2]>,
 }
 
@@ -40,7 +40,7 @@ impl Cluster {
         self.bounds.min.distance(self.bounds.max)
     }
 
-    /// Returns the distance between the bounding boxes of two clusters.
+    /// Returns the distance between the bounding boxes of two clusters, 0 if they overlap.
     pub fn distance(&self, other: &Self) -> f32 {
         let gap = (self.bounds.min - other.bounds.max).max(other.bounds.min - self.bounds.max);
         gap.max(Vec3::ZERO).length()
@@ -48,7 +48,7 @@ impl Cluster {
 }
 
 impl ClusterTree {
-    /// Builds the tree of `points`, by halving clusters along their widest axis.
+    /// Builds the tree of `points`, by halving clusters at the median along their widest axis.
     pub fn new(points: &[Vec3]) -> Self {
         let mut tree = Self { order: (0..points.len() as u32).collect(), clusters: Vec::new() };
         let mut order = std::mem::take(&mut tree.order);

@@ -5,8 +5,8 @@
 use super::precondition::SparseInverse;
 use crate::methods::implicit::vectors::{add, dot};
 
-/// The polynomials B at the centres, column by column, with MB: what is needed to project onto the weights orthogonal
-/// to B.
+/// The matrix B of the polynomials at the centres and its product MB with the preconditioner, both by columns; used to
+/// project weights onto those orthogonal to the polynomials.
 #[derive(Clone, Debug)]
 pub struct Polynomials {
     columns: Vec<Vec<f64>>,
@@ -24,7 +24,8 @@ impl Polynomials {
         Some(Self { columns, preconditioned, inverse })
     }
 
-    /// Projects `weights` onto those orthogonal to the polynomials, by the smallest change in the norm of M⁻¹.
+    /// Returns the projection of `weights` onto those orthogonal to the polynomials: the nearest ones in the norm of
+    /// M⁻¹.
     pub fn project(&self, mut weights: Vec<f64>) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, &weights)).collect();
         for (row, preconditioned) in self.inverse.chunks_exact(moments.len()).zip(&self.preconditioned) {
@@ -33,12 +34,12 @@ impl Polynomials {
         weights
     }
 
-    /// Returns the value at a centre of the polynomial with these coefficients.
+    /// Returns the value of the polynomial with these coefficients at the centre with index `centre`.
     pub fn value(&self, centre: usize, coefficients: &[f64]) -> f64 {
         self.columns.iter().zip(coefficients).map(|(column, c)| c * column[centre]).sum()
     }
 
-    /// Returns the coefficients c that minimise r − Bc in the norm of M; `preconditioned` is Mr.
+    /// Returns the coefficients c for which r − Bc has the least norm, that of M; `preconditioned` is Mr.
     fn coefficients(&self, preconditioned: &[f64]) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, preconditioned)).collect();
         self.inverse.chunks_exact(moments.len()).map(|row| dot(row, &moments)).collect()
@@ -48,19 +49,20 @@ impl Polynomials {
 /// The state of the conjugate gradient iteration.
 #[derive(Clone, Debug)]
 pub struct ConjugateGradients {
-    /// w, one weight per centre.
+    /// The weights w, one per centre.
     pub weights: Vec<f64>,
-    /// p, one coefficient per polynomial.
+    /// The coefficients p, one per polynomial.
     pub coefficients: Vec<f64>,
-    /// y − (Φ+Λ)w − Bp.
+    /// The residual y − (Φ+Λ)w − Bp.
     pub residual: Vec<f64>,
     direction: Vec<f64>,
-    /// Squared norm of the residual r in the norm of M, rᵀMr.
+    /// Squared norm of the residual r in the norm of M: rᵀMr.
     energy: f64,
 }
 
 impl ConjugateGradients {
-    /// Starts from `weights`, which must be orthogonal to the polynomials; `residual` is y − (Φ+Λ)w for them.
+    /// Starts the iteration from `weights`, which must be orthogonal to the polynomials; `residual` is y − (Φ+Λ)w for
+    /// them.
     pub fn new(
         weights: Vec<f64>,
         residual: Vec<f64>,
@@ -98,8 +100,8 @@ impl ConjugateGradients {
         true
     }
 
-    /// Moves the part of the residual that polynomials explain to their coefficients. Returns M times the rest, which
-    /// is orthogonal to the polynomials.
+    /// Changes the polynomials' coefficients such that the residual r is least in the norm of M. Returns Mr, which is
+    /// then orthogonal to the polynomials.
     fn project_residual(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
         let mut preconditioned = inverse.product(&self.residual);
         let more = polynomials.coefficients(&preconditioned);

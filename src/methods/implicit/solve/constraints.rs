@@ -9,7 +9,7 @@ use crate::methods::implicit::cloud::Cloud;
 pub struct Constraints {
     /// Centres, in box units, all distinct; those on the surface come first.
     pub centres: Vec<Vec3>,
-    /// Prescribed values: 0 on the surface, −1 outside.
+    /// Prescribed values of f: 0 on the surface, −1 outside.
     pub values: Vec<f64>,
     /// Regularisation λ of each constraint, at least 0.
     pub lambda: Vec<f64>,
@@ -53,7 +53,7 @@ impl Constraints {
         shared.map(|pair| self.centres[pair[0].1 as usize])
     }
 
-    /// Returns the radius of a ball that contains all centres.
+    /// Returns the radius of a ball that contains all centres, in box units.
     pub fn radius(&self) -> f64 {
         let bounds = Bounds::from_points(&self.centres);
         0.5 * f64::from(bounds.max.distance(bounds.min))
@@ -80,7 +80,7 @@ impl PositionIndex {
         Self(all)
     }
 
-    /// Returns the index of the first of the points that equals `p`.
+    /// Returns the index of the first of the points that equals `p`; `None` if there is none.
     pub fn find(&self, p: Vec3) -> Option<usize> {
         let at = self.0.partition_point(|(position, _)| *position < bits(p));
         self.0.get(at).filter(|(position, _)| *position == bits(p)).map(|&(_, i)| i as usize)

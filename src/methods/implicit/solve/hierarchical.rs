@@ -15,18 +15,18 @@ const ADMISSIBILITY: f32 = 3.0;
 /// A block on or above the diagonal, which also represents its mirror image.
 #[derive(Clone, Debug)]
 struct Block {
-    /// Cluster of the rows.
+    /// Index of the cluster of the rows.
     rows: usize,
-    /// Cluster of the columns.
+    /// Index of the cluster of the columns.
     columns: usize,
     content: Content,
 }
 
 #[derive(Clone, Debug)]
 enum Content {
-    /// All entries, row by row.
+    /// A near block: all entries, row by row.
     Full(Span),
-    /// Columns and rows of a low-rank product.
+    /// A far block: the columns, then the rows of its low-rank approximation ([`LowRank`]).
     Far(Span, Span),
 }
 
@@ -71,13 +71,14 @@ impl<T: Copy> Store<T> {
     }
 }
 
-/// A symmetric kernel matrix in the order of its cluster tree, with entries stored as `T`.
+/// A symmetric kernel matrix Φ, with rows and columns in the order of its cluster tree, and entries stored as `T`.
 #[derive(Clone, Debug)]
 pub struct HierarchicalMatrix<T> {
     centres: Vec<DVec3>,
     tree: ClusterTree,
     tolerance: f64,
-    /// Pairs of clusters whose blocks are still to be computed, and whether they are far; the next pair is last.
+    /// Pairs of clusters (of rows, of columns) whose blocks are still to be computed, and whether they are far; the
+    /// next pair is last.
     pending: Vec<(usize, usize, bool)>,
     blocks: Vec<Block>,
     store: Store<T>,
@@ -115,13 +116,13 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         self.progress()
     }
 
-    /// Returns the share of blocks computed.
+    /// Returns the share of blocks computed, 0 to 1.
     pub fn progress(&self) -> f64 {
         let done = self.blocks.len();
         done as f64 / (done + self.pending.len()) as f64
     }
 
-    /// Returns the size of all blocks, in bytes.
+    /// Returns the size of all blocks computed, in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.store.chunks.iter().map(Vec::len).sum::<usize>()
     }
@@ -145,7 +146,7 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         )
     }
 
-    /// Returns Φx.
+    /// Returns the product Φx; both vectors are in the order of the cluster tree.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for block in &self.blocks {
@@ -162,8 +163,9 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
     }
 }
 
-/// Divides the matrix block between two clusters, and appends its parts to `out`: the clusters of rows and columns, and
-/// whether they are far. The cluster of the lower index has the rows.
+/// Divides the matrix block between clusters `a` and `b` into far blocks and full blocks between leaves, and appends
+/// these to `out`: the clusters of rows and of columns, and whether they are far. The cluster of the lower index has
+/// the rows.
 fn divide(clusters: &[Cluster], a: usize, b: usize, out: &mut Vec<(usize, usize, bool)>) {
     let [first, second] = [a, b].map(|c| &clusters[c]);
     let [size, other] = [first, second].map(Cluster::diameter);

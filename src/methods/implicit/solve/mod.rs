@@ -25,9 +25,9 @@ use system::{System, WORK};
 /// The solution of the system: weights and polynomial of f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
-    /// w, in the order of the constraints.
+    /// The weights w, in the order of the constraints.
     pub weights: Vec<f64>,
-    /// Coefficients of p: the constant, and with a thin plate those of x, y and z.
+    /// Coefficients of the polynomial p: the constant, and with a thin plate those of x, y and z.
     pub coefficients: Vec<f64>,
 }
 
@@ -35,12 +35,13 @@ pub struct Solution {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// Share of the tolerance at which iterations stop, since the true residual is a little larger than theirs.
+/// Share of the tolerance at which iterations stop, since the true residual is a little larger than the one that
+/// iterations compute.
 const ITERATE_TO: f64 = 0.5;
 /// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
 const MAX_ITERATIONS: u32 = 500;
-/// Share of the residual that a round of iterations may leave; if it leaves more, rounding limits it, and the solve
-/// fails.
+/// Share of the true residual that a round of iterations may leave; if it leaves more, rounding limits it, and the
+/// solve fails.
 const MAX_REMAINING: f64 = 0.7;
 /// Maximum number of rounds of iterations, each from a recomputed residual.
 const MAX_ROUNDS: u32 = 6;
@@ -60,7 +61,7 @@ pub struct Solver {
     iterations: u32,
     rounds: u32,
     residual: f64,
-    /// The true residual after the round before.
+    /// The true relative residual after the previous round of iterations; infinite in the first.
     previous_residual: f64,
 }
 
@@ -68,15 +69,15 @@ pub struct Solver {
 enum Stage {
     Build,
     Iterate(Box<Polynomials>, ConjugateGradients),
-    /// Recomputing the residual of some rows; holds those done so far.
+    /// Recomputing the residual of some rows from the kernel, as an estimate for all; holds those done so far.
     Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
-    /// Recomputing all of y − (Φ+Λ)w; holds the rows done so far.
+    /// Recomputing y − (Φ+Λ)w for all rows from the kernel; holds those done so far.
     RecomputeResidual(Box<Polynomials>, ConjugateGradients, Vec<f64>),
     Done(ConjugateGradients),
 }
 
 impl Solver {
-    /// Creates a solver for the system of `constraints`, to a relative residual of `tolerance`.
+    /// Creates a solver for the system of `constraints`; it stops at a relative residual of `tolerance`.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         Self {
             system: System::new(constraints, kernel, tolerance, seed),
@@ -91,9 +92,9 @@ impl Solver {
         }
     }
 
-    /// Switches to other constraints, most of which are the same: keeps what was computed for the first ones, and
-    /// starts from `weights`, in the order of the new ones. The result depends on the first constraints, these and the
-    /// weights, not on others in between. Returns false, and does nothing, if too many differ.
+    /// Switches to other constraints, most of which must be those given to [`Self::new`]: keeps what was computed for
+    /// these, and starts from `weights`, in the order of `constraints`. The result depends on the first constraints,
+    /// these and the weights, not on others in between. Returns false, and does nothing, if too many differ.
     pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
         if !self.system.can_revise(constraints) {
             return false;
@@ -124,7 +125,7 @@ impl Solver {
         Ok(matches!(self.stage, Stage::Done(_)))
     }
 
-    /// Returns whether the constraints differ from the first ones, by [`Self::revise`].
+    /// Returns whether the constraints were replaced by [`Self::revise`].
     pub fn is_revised(&self) -> bool {
         self.revision.is_some() || self.system.is_revised()
     }
@@ -158,7 +159,8 @@ impl Solver {
         self.system.kernel()
     }
 
-    /// Returns the relative residual: during iterations the one they compute, at the end the true one.
+    /// Returns the relative residual |y − (Φ+Λ)w − Bp| / |y|: during iterations the one they compute, at the end the
+    /// true one, estimated from some rows.
     pub fn residual(&self) -> f64 {
         self.residual
     }
@@ -279,7 +281,7 @@ impl Solver {
 pub struct SolverPosition {
     /// Whether matrix and preconditioner are complete.
     built: bool,
-    /// Slices since then, or, before that, since the start.
+    /// Slices of work since `built` became true, or, before that, since the start.
     slices: u32,
 }
 

@@ -7,8 +7,8 @@ use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
-/// Number of predecessors from which each centre is predicted. With 16, half as many iterations again are needed; 32
-/// take twice as long to compute.
+/// Number of predecessors from which each centre is predicted. With 16, half as many iterations again are needed; with
+/// 32, the inverse takes twice as long to compute.
 const NEIGHBOURS: usize = 24;
 
 /// A sparse approximate inverse of the system's matrix: (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ, with a sparse gᵢ for each centre. It
@@ -25,11 +25,11 @@ pub struct SparseInverse {
     weights: Vec<f64>,
 }
 
-/// The centres in their order, each with some of its predecessors, called its neighbours.
+/// The centres in their order, from coarse to fine, each with some of its predecessors, called its neighbours.
 #[derive(Clone, Debug, Default)]
 struct Rows {
     centres: Vec<u32>,
-    /// Neighbours of all centres, one row after the other; `ends` holds the end of each row.
+    /// Neighbours of all centres, one row after the other; `ends` holds the end of each row in this list.
     neighbours: Vec<u32>,
     ends: Vec<usize>,
 }
@@ -49,8 +49,8 @@ impl Rows {
 }
 
 impl SparseInverse {
-    /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last`; together these
-    /// lists name each centre once. Nothing is computed yet.
+    /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last` in its order;
+    /// together these lists hold the index of each centre once. Nothing is computed yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
         let ordering = MaximinOrdering::new(centres, first, last);
         Self { rows: Rows::default(), ordering, computed: 0, weights: Vec::new() }
@@ -69,13 +69,14 @@ impl SparseInverse {
         self.computed == centres.len()
     }
 
-    /// Returns the share of the work that is done: of rows ordered and computed.
+    /// Returns the share of the work that is done, 0 to 1: of rows ordered and of rows computed.
     pub fn progress(&self) -> f64 {
         0.5 * (self.rows.centres.len() + self.computed) as f64 / self.ordering.centres.len() as f64
     }
 
-    /// Returns the inverse for edited centres, from one that is complete: without those flagged in `removed`, and with
-    /// those appended to `centres`, each predicted from the nearest of all before it that remain.
+    /// Returns a complete inverse for other centres, derived from this one, which must be complete: those flagged in
+    /// `removed` are left out. Those that `centres` has beyond the length of `removed` are added at the end, each
+    /// predicted from its nearest remaining or added predecessors.
     pub fn revised(&self, removed: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
         let mut revised = Self {
             rows: Rows::default(),
@@ -141,8 +142,8 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
     found.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Appends the row of one centre to `out`: with A the matrix of its neighbours' system, b its own entries there, and c
-/// = A⁻¹b, the row is (1, −c)/√(φ(0) + λ − bᵀc).
+/// Appends the entries of gᵢ for one centre to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b, where A is the matrix
+/// Φ+Λ of its neighbours, and b holds its entries of Φ with them.
 fn row(
     centre: u32,
     neighbours: &[u32],
@@ -173,10 +174,12 @@ fn row(
     out.extend(b.iter().map(|x| -x * scale));
 }
 
-/// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: anything less is rounding.
+/// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: a lower one is due to rounding, and is
+/// raised to it.
 const MIN_PIVOT: f64 = 1e-12;
 
-/// Replaces the lower triangle of a positive definite `n` by `n` matrix by its Cholesky factor.
+/// Replaces the lower triangle of a symmetric positive definite `n` by `n` matrix by its Cholesky factor; pivots are at
+/// least [`MIN_PIVOT`] of their diagonal entry.
 fn cholesky(a: &mut [f64], n: usize) {
     for i in 0..n {
         let (done, rest) = a.split_at_mut(i * n);
@@ -219,11 +222,11 @@ fn max(a: f64, b: f64) -> f64 {
 const FIRST_SPACING: f32 = 2.0;
 /// Ratio of the minimum distance of one round of the ordering to that of the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Minimum distance of a round below which centres are taken in their given order.
+/// Minimum distance of a round, in box units, at or below which all centres left are taken in their given order.
 const MIN_SPACING: f32 = 1e-6;
-/// Edge length of the cells of the grid of taken centres, in minimum distances of the round.
+/// Edge length of the cells of the grid that holds the centres taken, in minimum distances of the round.
 const CELL: f32 = 3.6;
-/// Radius in which predecessors are searched first, in minimum distances of the round.
+/// Initial search radius for the nearest predecessors of a centre, in minimum distances of the round.
 const SEARCH_RADIUS: f32 = 3.6;
 
 /// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors.
@@ -232,13 +235,14 @@ const SEARCH_RADIUS: f32 = 3.6;
 #[derive(Clone, Debug, Default)]
 struct MaximinOrdering {
     centres: Vec<Vec3>,
-    /// The centres taken so far, in order.
+    /// Positions of the centres taken so far, in their order.
     grid: PointGrid,
     spacing: f32,
-    /// Centres to be tested in this round, the next one last, and those left for the next round.
+    /// Centres to be tested in this round, the next one last.
     pending: Vec<u32>,
+    /// Centres left for the next round.
     deferred: Vec<u32>,
-    /// Centres that are ordered after all others.
+    /// Centres that are ordered after all others: those of exterior constraints.
     last: Vec<u32>,
 }
 
@@ -255,7 +259,8 @@ impl MaximinOrdering {
         }
     }
 
-    /// Tests up to `count` centres for the rounds of the ordering. Returns whether all are ordered.
+    /// Tests up to `count` centres in the rounds of the ordering, and appends those taken to `rows`. Returns whether
+    /// all are ordered.
     fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
             while self.pending.is_empty() {

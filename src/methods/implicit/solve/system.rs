@@ -12,15 +12,17 @@ use crate::methods::implicit::vectors::{add, dot};
 pub const WORK: usize = 2_000_000;
 /// Cost of a row of the sparse inverse, in kernel evaluations.
 const ROW_WORK: usize = 4_000;
-/// Relative error of far blocks, as a share of the tolerance: with it, the final residual is seldom above the
-/// tolerance.
+/// Relative error of far blocks of the matrix, as a share of the solver's tolerance: with it, the final residual is
+/// seldom above the tolerance.
 const FAR_ERROR: f64 = 0.1;
 /// Number of constraints above which far blocks are more accurate, in proportion to the number: errors add up, and a
 /// residual that is too large has to be recomputed from all pairs of constraints.
 const USUAL_CONSTRAINTS: f64 = 25_000.0;
-/// Relative error of far blocks for kernels that are only conditionally positive definite, whose large values cancel.
+/// Relative error of far blocks of the matrix for kernels that are only conditionally positive definite, whose large
+/// values cancel.
 const CONDITIONAL_ERROR: f64 = 1e-11;
-/// Maximum number of constraints whose matrix is stored in double precision; beyond, memory matters more.
+/// Maximum number of constraints whose matrix is stored in double precision; with more, memory matters more. For
+/// kernels that are only conditionally positive definite it always is.
 const DOUBLE_BELOW: usize = 6000;
 /// Maximum number of constraints added, and of constraints removed, for which the system is revised and not rebuilt.
 /// Each added one costs a row of the full matrix.
@@ -117,7 +119,7 @@ impl System {
         own.len() - kept <= MAX_CHANGES && constraints.centres.len() - kept <= MAX_CHANGES
     }
 
-    /// Revises the system to other constraints, reusing the matrix, which must be complete.
+    /// Revises the system to other constraints, reusing the matrix, which must be complete, and the preconditioner.
     pub fn revise(&mut self, constraints: &Constraints) {
         let own = self.base_centres().len();
         self.centres.truncate(own);
@@ -156,7 +158,7 @@ impl System {
         self.centres[..count].iter().map(move |c| self.table.value(self.centres[i].distance_squared(*c)))
     }
 
-    /// Returns the kernel.
+    /// Returns the kernel φ of the matrix Φ.
     pub fn kernel(&self) -> Kernel {
         self.table.kernel()
     }
@@ -197,7 +199,7 @@ impl System {
         all
     }
 
-    /// Returns the columns of B: 1, and with a thin plate x, y and z, at the centres.
+    /// Returns the columns of B, by row: 1, and with a thin plate x, y and z, at the centres; 0 in removed rows.
     pub fn polynomials(&self) -> Vec<Vec<f64>> {
         let column = |power: usize| {
             let entry = |(centre, &i): (&DVec3, &u32)| match power {
@@ -210,7 +212,7 @@ impl System {
         (0..self.kernel().polynomials()).map(column).collect()
     }
 
-    /// Returns (Φ+Λ)x with the approximated Φ.
+    /// Returns (Φ+Λ)x, with Φ approximated as a hierarchical matrix.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let own = self.base_centres().len();
         let mut out = match &self.matrix {
@@ -229,7 +231,8 @@ impl System {
         out
     }
 
-    /// Returns yᵢ − ((Φ+Λ)w)ᵢ for row `i`, from the kernel itself.
+    /// Returns yᵢ − ((Φ+Λ)w)ᵢ for row `i`, with Φ from the kernel itself, not from the approximated matrix; 0 for a
+    /// removed row.
     pub fn row_residual(&self, i: usize, weights: &[f64]) -> f64 {
         if self.constraint_of_row[i] == REMOVED {
             return 0.0;
