@@ -387,7 +387,7 @@ describe('files', () => {
   test('four points give no surface, and the lab says what may help', async () => {
     const bytes = new TextEncoder().encode('0 0 0\n1 0 0\n0 1 0\n0 0 1\n');
     await drop(app.page, [{ name: 'four.xyz', bytes }]);
-    await expect.poll(() => text('.banner')).toContain('There is no surface. f is nowhere above the level.');
+    await expect.poll(() => text('.banner')).toContain('There is no surface. f does not exceed the iso-value anywhere.');
     expect(await app.page.isDisabled('[data-export=ply]')).toBe(true);
     await app.page.keyboard.press('Escape');
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
@@ -508,7 +508,7 @@ describe('a link', () => {
     ['outside=0,0,1e30', 'exterior'],
   ])('with %s opens its example without the settings, and gives the reason', async (settings, why) => {
     await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
-    expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
+    expect(await text('.banner')).toMatch(new RegExp(`settings were ignored.*${why}`));
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
   });

@@ -174,7 +174,7 @@ describe('dragging', () => {
 
   test('ellipsoids can be selected, moved and rotated by keys, with announcements', async () => {
     await view().press('2');
-    expect(await text('.status')).toBe('Ellipsoid 2, small is chosen.');
+    expect(await text('.status')).toBe('Ellipsoid 2, small: selected.');
     const before = await app.page.inputValue('[aria-label="Centre, x"]');
     const news = await recordNews(app.page);
     await view().press('ArrowRight');

@@ -98,7 +98,7 @@ describe('a heartbeat', () => {
         meanFinalCorrection: 10,
       },
     };
-    const frame = { facts, surface: {}, measures: {}, error: { mean: 0.5, most: 1 } };
+    const frame = { facts, surface: {}, measures: {}, error: { mean: 0.5, p95: 1 } };
     const lines = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5]).split('\n');
     expect(lines[0]).toMatch(/^frame,volume,area,triangles,folded,.*,error,error \(95 %\),true volume$/);
     expect(lines[1]).toBe('1,2,3,4,5,6,7,8,9,10,,0.5,1,2.5');

@@ -4,7 +4,7 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { cineVoxels } from '../../www/src/track/cine';
-import { type App, cancelAtOnce, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+import { type App, cancelAtOnce, drop, openApp, overflow, reach, recordNews, recordStates, unnamedControls } from './browser';
 
 let app: App;
 
@@ -144,7 +144,7 @@ describe('the computed ventricle', () => {
     expect([present?.name, other?.name]).toEqual(['with prediction', 'without prediction']);
     expect(other?.steps).toBeGreaterThanOrEqual(present?.steps ?? 0);
     expect(other?.error).toBeLessThan(1);
-    await expect.poll(() => text('[data-beat]')).toContain('not predicted:');
+    await expect.poll(() => text('[data-beat]')).toContain('without prediction:');
     expect(await state()).toBe('done');
   });
 
@@ -206,6 +206,17 @@ describe('changes', () => {
     await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
     await app.page.click('[data-transport=undo]');
     await expect.poll(async () => (await measured()).volume).toBe(volume);
+  });
+
+  test('to the value in force keep the tracked surfaces', async () => {
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    const value = await threshold.inputValue();
+    const states = await recordStates(app.page);
+    await threshold.fill(`${value}.0`);
+    await threshold.press('Enter');
+    await expect.poll(() => threshold.inputValue()).toBe(value);
+    expect(await measured()).toMatchObject({ frames: 4, tracked: 4 });
+    expect(await states()).toEqual([]);
   });
 
   test('that are invalid are refused beside their control', async () => {

@@ -86,7 +86,7 @@ impl Cloud {
         if first.len() == self.len() { self.clone() } else { self.select(&first) }
     }
 
-    /// Checks that there are at least [`MIN_POINTS`] points.
+    /// Checks that there are at least `MIN_POINTS` points.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for fewer.

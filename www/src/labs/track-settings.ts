@@ -119,6 +119,11 @@ export class TrackSettings {
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
+      // A value entered again changes nothing, and the surfaces tracked with it remain.
+      if (Object.entries(values).every(([name, value]) => Object.is(this.params[name], value))) {
+        this.#onChange();
+        return;
+      }
       const forget = this.checkpoint(text('labs.changeOf', { name: what }), what);
       try {
         const { params, iteration } = await this.#client.request('setParams', values);
