@@ -4,7 +4,17 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { cineVoxels } from '../../www/src/track/cine';
-import { type App, cancelAtOnce, drop, openApp, overflow, reach, recordNews, recordStates, unnamedControls } from './browser';
+import {
+  type App,
+  cancelAtOnce,
+  drop,
+  openApp,
+  overflow,
+  reach,
+  recordNews,
+  recordStates,
+  unnamedControls,
+} from './browser';
 
 let app: App;
 
@@ -210,11 +220,14 @@ describe('changes', () => {
 
   test('to the value in force keep the tracked surfaces', async () => {
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
-    const value = await threshold.inputValue();
-    const states = await recordStates(app.page);
-    await threshold.fill(`${value}.0`);
+    await threshold.fill('80');
     await threshold.press('Enter');
-    await expect.poll(() => threshold.inputValue()).toBe(value);
+    await expect.poll(hash).toContain('p.threshold=80');
+    await tracked(4);
+    const states = await recordStates(app.page);
+    await threshold.fill('80.0');
+    await threshold.press('Enter');
+    await expect.poll(() => threshold.inputValue()).toBe('80');
     expect(await measured()).toMatchObject({ frames: 4, tracked: 4 });
     expect(await states()).toEqual([]);
   });
