@@ -202,7 +202,7 @@ function sizes({ vertices, triangles, volume, minAngleDegrees, selfIntersections
   if (triangles) words.push(`${triangles} triangles`);
   if (volume) words.push(`${(volume / 1000).toFixed(0)} cm³`);
   if (minAngleDegrees !== undefined) words.push(`${minAngleDegrees.toFixed(1)}° at least`);
-  if (selfIntersections !== undefined) words.push(`${selfIntersections} crossings`);
+  if (selfIntersections !== undefined) words.push(`${selfIntersections} self-intersections`);
   if (refused) words.push(`no closed surface: ${refused}`);
   return words.join(', ');
 }

@@ -98,7 +98,7 @@ function headRows({ host, cubes, model, ratio }) {
     ['  marching cubes', seconds(cubes.milliseconds), `${cubes.vertices} vertices`],
     ['  deformable model', seconds(model.milliseconds), `${model.vertices} vertices, ${model.iterations} iterations`],
     ['  model / marching cubes', ratio.toFixed(1), model.converged ? 'converged' : 'NOT CONVERGED'],
-    ['  crossing pairs', String(model.selfIntersections), model.closed ? 'closed' : 'NOT CLOSED'],
+    ['  self-intersections', String(model.selfIntersections), model.closed ? 'closed' : 'NOT CLOSED'],
     ...parts.map(([part, milliseconds]) => [`    ${part}`, seconds(milliseconds), '']),
   ];
 }
@@ -128,7 +128,7 @@ function remeshRows({ host, rows }) {
     `  ${name}, edges x ${factor}`,
     `${((1000 * milliseconds) / triangles).toFixed(2)} µs`,
     `a triangle, ${before} to ${triangles}; ${minAngleDegrees.toFixed(0)}° at least, ${distance.toFixed(2)} edges away, ` +
-      `${selfIntersections} crossings`,
+      `${selfIntersections} self-intersections`,
   ];
   return [[host, '', `best of ${REPEATS}`], ...rows.map(row)];
 }
@@ -160,7 +160,7 @@ function trackRows({ host, dims, frames, cubes, run, ratio, trueEjection, bytes 
     ['  all surfaces', seconds(run.tracked), `and ${seconds(run.closingTime)} back to the first`],
     ['  the whole', seconds(run.milliseconds), found],
     ['  whole / marching cubes', ratio.toFixed(0), `closing ${run.closing.toFixed(2)} mm`],
-    ['  crossing pairs', String(run.selfIntersections), run.closed ? 'closed' : 'NOT CLOSED'],
+    ['  self-intersections', String(run.selfIntersections), run.closed ? 'closed' : 'NOT CLOSED'],
     ['  memory', `${(bytes / 1e6).toFixed(0)} MB`, 'of the module, at the end'],
   ];
 }

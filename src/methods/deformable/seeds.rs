@@ -80,11 +80,11 @@ impl DeformableModel {
         self.check_vertex_limit(parts)?;
         let sampling = self.sampling();
         let guard = self.resolver.embedding(&self.mesh, sampling);
-        let (mut added, crossing) = guard.append(&mut self.mesh, parts)?;
+        let (mut added, intersecting) = guard.append(&mut self.mesh, parts)?;
         let mut count = parts.component_count();
         let mut is_new = vec![false; self.mesh.slots()];
         added.iter().for_each(|v| is_new[v.index()] = true);
-        for v in crossing {
+        for v in intersecting {
             if is_new[v.index()] && self.mesh.is_live(v) {
                 guard.remove_component(&mut self.mesh, v);
                 count -= 1;

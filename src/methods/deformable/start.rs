@@ -152,8 +152,8 @@ impl DeformableModel {
             resolved?;
             let sampling = self.sampling();
             let guard = self.resolver.embedding(&self.mesh, sampling);
-            let crossing = guard.intersecting_vertices(&self.mesh);
-            if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
+            let intersecting = guard.intersecting_vertices(&self.mesh);
+            if intersecting.is_empty() || guard.separate(&mut self.mesh, &intersecting) {
                 self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
             }
@@ -162,9 +162,9 @@ impl DeformableModel {
                 return Err(MeshError::SelfIntersecting { pairs }.into());
             }
             runs += 1;
-            crossing.into_iter().for_each(|v| tested.insert_around(self.mesh.position(v)));
-            let intersecting = std::mem::replace(&mut self.mesh, contour.clone());
-            self.mesh.advance_versions_past(&intersecting);
+            intersecting.into_iter().for_each(|v| tested.insert_around(self.mesh.position(v)));
+            let failed = std::mem::replace(&mut self.mesh, contour.clone());
+            self.mesh.advance_versions_past(&failed);
             self.resolver.set_pending(Pending::default());
             self.convergence.sized = false;
         }

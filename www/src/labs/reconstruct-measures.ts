@@ -42,7 +42,7 @@ export const FIT_ROWS: ExtraMeasure[] = [
   { name: 'cell', label: text('reconstruct.cell'), help: text('reconstruct.cellHelp'), text: figure },
   { name: 'duplicates', label: text('reconstruct.duplicates'), help: text('reconstruct.duplicatesHelp'), text: count },
   {
-    name: 'strays',
+    name: 'spuriousComponents',
     label: text('reconstruct.spuriousComponents'),
     help: text('reconstruct.spuriousComponentsHelp'),
     text: count,

@@ -96,7 +96,7 @@ export function fitOf(model: ImplicitSurface, residual: number, complete: boolea
     cell,
     spacing,
     duplicates,
-    strays: spuriousComponents,
+    spuriousComponents,
     residual,
     ...(warning !== undefined && { warning }),
   };

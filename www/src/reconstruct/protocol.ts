@@ -88,7 +88,7 @@ export interface Fit {
    */
   spacing: number;
   duplicates: number;
-  strays: number;
+  spuriousComponents: number;
   residual: number;
   warning?: string;
 }
