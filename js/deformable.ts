@@ -66,8 +66,9 @@ export interface DeformableParams {
    */
   topology?: 'adaptive' | 'fixed';
   /**
-   * Local adaptation of the surface to the image, 0..1; default 1: walls and gaps visible in the image are kept,
-   * however thin. 0 is the paper's behaviour: sheets closer than the contact distance are joined.
+   * Local adaptation of the surface to the image, 0..1; default 1. Above 0, walls and gaps visible in the image are kept,
+   * however thin, and edge lengths vary with the curvature, in proportion to the value. At 0, or if `isoForce` is 0,
+   * sheets closer than the contact distance are joined, as in the paper.
    */
   adaptivity?: number;
   /**

@@ -63,7 +63,10 @@ export interface ImplicitOptions {
   confidence?: Float32Array;
   /** Packed rgb of each point, 0..1: colours vertices that no camera sees. */
   colors?: Float32Array;
-  /** Points known to be outside, packed. By default made from cameras, normals, or the points alone. */
+  /**
+   * Points known to be outside, packed. By default made towards the cameras, without cameras along the normals, given or
+   * estimated. Points on a sphere around all are always added.
+   */
   exterior?: Float32Array;
   /** The cameras from which the points were reconstructed. */
   cameras?: Camera[];

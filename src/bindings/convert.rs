@@ -49,7 +49,7 @@ pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
     Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
 }
 
-/// Converts packed uv to texture coordinates.
+/// Converts packed uv to texture coordinates; an incomplete last pair is dropped.
 pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
     Ok(floats(array)?.chunks_exact(2).map(Vec2::from_slice).collect())
 }

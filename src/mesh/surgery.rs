@@ -8,9 +8,9 @@ use crate::math::Vec3;
 /// The two triangles that cap the surface after [`Mesh::cut`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The original vertices, which bound the surface to the left of the directed cycle of edges.
+    /// The vertices of the cycle, in the order given: the corners of the triangle that caps the surface to its left.
     pub kept: [VertexId; 3],
-    /// The copies of the original vertices, in the same order, which bound the surface to the right of the cycle.
+    /// Their copies, in the same order: the corners of the triangle that caps the surface to the right of the cycle.
     pub copies: [VertexId; 3],
 }
 

@@ -387,7 +387,9 @@ describe('files', () => {
   test('four points give no surface, and the lab says what may help', async () => {
     const bytes = new TextEncoder().encode('0 0 0\n1 0 0\n0 1 0\n0 0 1\n');
     await drop(app.page, [{ name: 'four.xyz', bytes }]);
-    await expect.poll(() => text('.banner')).toContain('There is no surface. f does not exceed the iso-value anywhere.');
+    await expect
+      .poll(() => text('.banner'))
+      .toContain('There is no surface. f does not exceed the iso-value anywhere.');
     expect(await app.page.isDisabled('[data-export=ply]')).toBe(true);
     await app.page.keyboard.press('Escape');
     expect(await app.page.locator('.banner').isVisible()).toBe(false);

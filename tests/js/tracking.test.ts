@@ -503,7 +503,12 @@ const REFUSED: [string, string, string, () => unknown][] = [
   ['no options', 'invalid-argument', 'volume', () => new SurfaceTracker(wrong(undefined))],
   ['no volume', 'invalid-argument', 'volume', () => new SurfaceTracker(wrong({}))],
   ['a volume that is none', 'invalid-argument', 'volume', () => tracker({ volume: wrong(closed) })],
-  ['one frame', 'invalid-argument', 'volume: must have at least two frames', () => tracker({ volume: beating({ frames: 1 }) })],
+  [
+    'one frame',
+    'invalid-argument',
+    'volume: must have at least two frames',
+    () => tracker({ volume: beating({ frames: 1 }) }),
+  ],
   ['no contrast', 'invalid-argument', 'volume', () => tracker({ volume: flat() })],
   ['slanted axes', 'invalid-argument', 'volume', () => tracker({ volume: slanted() })],
   ['a misspelled option', 'invalid-argument', 'bounds', () => tracker(wrong({ bounds: REACH }))],

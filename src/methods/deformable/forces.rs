@@ -73,7 +73,8 @@ impl ForceScale {
         }
     }
 
-    /// Returns δ |α_I|: the image force per unit of |π_I − Π|.
+    /// Returns the image force per unit of difference between the iso value and the intensity: δ |α_I|, times the level's
+    /// gain.
     pub(super) fn iso_stiffness(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }

@@ -71,7 +71,8 @@ impl<'a> ImageGuide<'a> {
     }
 }
 
-/// Returns the guide for topology changes: the image if sampling and topology adapt to it, else the rules of the paper.
+/// Returns what decides which topology changes are made: the image, if the parameters adapt the surface to it; else, as in
+/// the paper, all are allowed.
 pub(super) fn guide<'a>(
     image: &'a LevelImage,
     iso: f32,

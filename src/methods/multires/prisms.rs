@@ -96,7 +96,8 @@ fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
 struct Prism {
     /// The corners moved to either side.
     points: [DVec3; 6],
-    /// The normals of the lateral faces.
+    /// For each edge, the outward unit vector at right angles to it and to the mean normal: about the normal of the lateral
+    /// face.
     axes: [DVec3; 3],
     margin: f64,
 }

@@ -55,11 +55,12 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// Extracts the voxels of `volume` within `bounds`, by default all, with padding around them.
+    /// Extracts the voxels of `volume` within `bounds`, by default all, with padding from the volume around them, and
+    /// quantises their intensities to one byte.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for voxel axes that are not at right angles, a box outside the volume, too few
-    /// voxels, too many, or no contrast.
+    /// voxels, too many, or no contrast; [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(volume: &Volume, bounds: Option<Bounds>) -> Result<Self, MethodError> {
         let spacing = DVec3::from(volume.spacing());
         let axes = volume.affine().matrix3;

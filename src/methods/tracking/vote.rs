@@ -366,8 +366,8 @@ impl Histogram {
     }
 }
 
-/// For each x, a histogram of the voxels at this x within a window's half-width of a row (y, z), in several frames. A
-/// window is the sum of consecutive slabs.
+/// Histograms of intensities around a row (y, z), one for each x: of the voxels at this x, in all given frames, that are at
+/// most a window's half-width from the row along y and along z. That of a window is the sum of consecutive ones.
 struct Slabs<'a> {
     dims: [usize; 3],
     half_width: usize,

@@ -7,8 +7,8 @@ use crate::mesh::{Mesh, VertexId};
 use crate::remesh::restructure::faces_alike;
 use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The cost of moving along the surface relative to moving off it. Higher values wear off sharp edges; with lower ones
-/// vertices on curved regions hardly move.
+/// The weight of missing the wanted displacement, relative to leaving the planes of the triangles. Higher values wear off
+/// sharp edges; with lower ones, vertices on curved regions hardly move.
 const SLACK: f32 = 0.04;
 
 /// The one-ring of a vertex as needed for moves along the surface: its centroid and a tangential projection.

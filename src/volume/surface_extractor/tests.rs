@@ -31,8 +31,8 @@ fn extracted(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3)
     extractor
 }
 
-/// Returns the measures of a mesh, after asserting that it is closed, oriented, manifold and free of
-/// self-intersections.
+/// Returns the measures of a mesh, after asserting that it is closed, oriented, manifold, free of
+/// self-intersections and degenerate triangles, and uses all its vertices.
 fn healthy(mesh: &TriangleMesh) -> Measures {
     let report = report(mesh).unwrap();
     assert!(report.is_healthy(), "{report:?}");

@@ -163,7 +163,7 @@ export interface Requests {
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
-  /** Changes parameters; replies with all parameters and with the iteration that the run was set back to. */
+  /** Changes parameters, which may set the run back; replies with all parameters and the iteration it is at now. */
   setParams: { body: ParamValues; reply: { params: ParamValues; iteration: number } };
   votes: { body: { frame: number }; reply: BoundaryVotes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: InterpolatedSlice };

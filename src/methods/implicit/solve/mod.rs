@@ -35,8 +35,8 @@ pub struct Solution {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// Share of the tolerance at which iterations stop, since the true residual is a little larger than the one that
-/// iterations compute.
+/// Share of the tolerance at which iterations stop: the rest is a margin, since the true residual is larger than the one
+/// that iterations compute.
 const ITERATE_TO: f64 = 0.5;
 /// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
 const MAX_ITERATIONS: u32 = 500;
