@@ -308,7 +308,7 @@ mod tests {
             (ply("", "float").replace("vertex 2", "vertex 4000000000"), "PLY: element vertex: needs"),
             (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: the file has no points"),
             ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: point 0"),
-            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: at least 3 numbers"),
+            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: must have at least 3 numbers"),
             (String::new(), "point file: content: needs 1 bytes"),
             (
                 "solid made\nendsolid\n".into(),
