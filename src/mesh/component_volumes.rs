@@ -9,7 +9,8 @@ impl TriangleMesh {
     /// of the mesh, whatever their orientation.
     ///
     /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
-    /// shell is removed together with its cavity. Only positions and triangles are kept.
+    /// shell is removed together with its cavity, and a small cavity in a larger solid is filled. Only positions and
+    /// triangles are kept.
     pub fn without_components_below(&self, volume: f64) -> Self {
         let component_of = self.component_of_each_vertex();
         let enclosed = self.enclosed_volumes(&component_of);

@@ -7,8 +7,8 @@ use super::{Mesh, VertexId};
 const LINEAR_SEARCH_LIMIT: usize = 64;
 
 impl Mesh {
-    /// Returns the vertices of the connected component of `v` in breadth-first order, at most `limit` of them; none if
-    /// `v` is not live.
+    /// Returns the vertices of the connected component of `v` in breadth-first order, at most `limit` of them, but at
+    /// least `v`; none if `v` is not live.
     pub fn component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
         if !self.is_live(v) {
             return Vec::new();

@@ -14,7 +14,7 @@ pub struct Curvature {
     /// The Gaussian curvature K = κ₁ κ₂ per vertex, an inverse area: 1/r² on a ball of radius r, negative on a saddle.
     pub gaussian: Vec<f64>,
     /// The mixed Voronoi area around each vertex; their sum is the area of the mesh. K times this area is the angle
-    /// deficit from 2π; the deficits of a closed mesh sum to 2πχ.
+    /// deficit from 2π, except on the boundary of an open mesh; the deficits of a closed mesh sum to 2πχ.
     pub areas: Vec<f64>,
 }
 

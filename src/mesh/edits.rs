@@ -38,7 +38,7 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`], [`EditError::Full`].
+    /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent; [`EditError::Full`] if no vertex ids are left.
     pub fn split(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<VertexId, EditError> {
         let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
         if !self.has_ids_for(1) {
@@ -68,8 +68,8 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`]
-    /// if `u` or `v` has three neighbours only.
+    /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent; [`EditError::Adjacent`] if the new edge exists
+    /// already; [`EditError::ValenceTooLow`] if `u` or `v` has three neighbours only.
     pub fn flip(&mut self, u: VertexId, v: VertexId) -> Result<(), EditError> {
         let OppositeVertices { left: a, right: b } = self.opposite_vertices(u, v)?;
         if self.ring(a).contains(b) {
@@ -88,8 +88,8 @@ impl Mesh {
         Ok(())
     }
 
-    /// Tests whether [`Mesh::collapse`] of `uv` is possible (the link condition) and returns the vertices opposite the
-    /// edge.
+    /// Tests whether [`Mesh::collapse`] of `uv` is possible, by the link condition and the valences of the opposite
+    /// vertices, and returns the vertices opposite the edge.
     ///
     /// # Errors
     /// As [`Mesh::collapse`].
@@ -111,8 +111,9 @@ impl Mesh {
     /// Lachaud & Montanvert).
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::LinkCondition`] if `u` and `v` have more than two common neighbours;
-    /// [`EditError::ValenceTooLow`] if a vertex opposite the edge has three neighbours only, as on a tetrahedron.
+    /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent; [`EditError::LinkCondition`] if `u` and `v` have more
+    /// than two common neighbours; [`EditError::ValenceTooLow`] if a vertex opposite the edge has three neighbours
+    /// only, as on a tetrahedron.
     pub fn collapse(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<(), EditError> {
         let OppositeVertices { left: a, right: b } = self.can_collapse(u, v)?;
         self.touch(u);

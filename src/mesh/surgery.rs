@@ -10,7 +10,8 @@ use crate::math::Vec3;
 pub struct Cut {
     /// The vertices of the cycle, in the order given: the corners of the triangle that caps the surface to its left.
     pub kept: [VertexId; 3],
-    /// Their copies, in the same order: the corners of the triangle that caps the surface to the right of the cycle.
+    /// The copies of the vertices of the cycle, in the same order: the corners of the triangle that caps the surface to
+    /// the right of the cycle.
     pub copies: [VertexId; 3],
 }
 
@@ -30,8 +31,8 @@ impl Mesh {
     /// The copies have the positions of their originals; the caller moves the two sides apart.
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::IsTriangle`] if the cycle bounds a triangle of the surface;
-    /// [`EditError::Full`].
+    /// [`EditError::NotAnEdge`] if two of the vertices are not adjacent; [`EditError::IsTriangle`] if the cycle bounds
+    /// a triangle of the surface; [`EditError::Full`] if no vertex ids are left.
     pub fn cut(&mut self, u: VertexId, v: VertexId, o: VertexId) -> Result<Cut, EditError> {
         for (a, b) in [(u, v), (v, o), (o, u)] {
             let opposite = self.opposite_vertices(a, b)?;
@@ -82,7 +83,7 @@ impl Mesh {
     ///
     /// # Errors
     /// [`EditError::Adjacent`] if `u` and `v` are adjacent or the same; [`EditError::NotAnEdge`] if either is not live;
-    /// [`EditError::Full`].
+    /// [`EditError::Full`] if no vertex ids are left.
     pub fn join(&mut self, u: VertexId, v: VertexId, reach: f32) -> Result<TubeRims, EditError> {
         for w in [u, v] {
             if !self.is_live(w) {

@@ -206,8 +206,8 @@ impl Columns {
         }
     }
 
-    /// Calls `test` with the pairs of own balls and balls of `other` in the same or adjacent columns whose heights
-    /// differ by at most `reach`.
+    /// Calls `test` with the pairs of one ball of `self` and one of `other` in the same or adjacent columns whose
+    /// heights differ by at most `reach`.
     fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {

@@ -14,7 +14,8 @@ pub struct TriangleTree {
 /// A point on a surface found by a query, with its distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The index of a triangle that contains the point; a query of [`TriangleTree`] returns the lowest.
+    /// The index of a triangle that contains the point; a query of [`TriangleTree`] returns the lowest of those found
+    /// at the same distance.
     pub triangle: u32,
     /// The barycentric coordinates in the triangle: not negative, with a sum of 1.
     pub barycentric: Vec3,
@@ -77,7 +78,7 @@ impl TriangleTree {
     }
 
     /// Sets `found` to the distinct labels of all triangles within `distance` of `p`; `label` maps a triangle to its
-    /// label.
+    /// label, such as the component that it belongs to.
     pub fn labels_within(&self, p: Vec3, distance: f64, label: impl Fn(u32) -> u32, found: &mut Vec<u32>) {
         let reach = distance * distance;
         found.clear();

@@ -13,7 +13,7 @@ const LEVELS: usize = 10;
 const FACTOR: f32 = 4.0;
 
 /// The side of a cell, as a multiple of the largest ball radius on its level: twice the usual query radius, so that
-/// such a query visits eight cells.
+/// such a query visits at most eight cells.
 const CELL: f32 = 1.5;
 
 /// The largest mean number of vertices per hash bucket when [`VertexGrid::link_cells`] creates the buckets.
@@ -82,11 +82,11 @@ struct Entry {
 /// max(`least`, `margin` + `share` × longer edge).
 #[derive(Clone, Copy, Debug)]
 pub struct Proximity {
-    /// The lower bound of the distance.
+    /// The lower bound of the distance, in units of the mesh.
     pub least: f32,
-    /// The constant term of the distance.
+    /// The term of the distance that does not depend on edges, in units of the mesh.
     pub margin: f32,
-    /// The factor of the longer one of the two longest edges.
+    /// The factor of the longer one of the two longest edges; a number without unit.
     pub share: f32,
 }
 

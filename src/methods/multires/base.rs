@@ -1,5 +1,6 @@
-//! Makes a base where none is given: the detailed surface is smoothed towards the ellipsoids as long as it remains a
-//! graph over the result (end of section 2); without detail, a membrane is built around the ellipsoids.
+//! Makes a base where none is given: the detailed surface is smoothed towards the ellipsoids as long as it can be
+//! described by distances along the normals of the result (Kobbelt, Bareuther & Seidel, end of section 2); without
+//! detail, a membrane is built around the ellipsoids.
 
 use super::TOLERANCE;
 use super::correspondence::{BasePoint, normal_at};
@@ -23,7 +24,8 @@ const ROUNDS: usize = 40;
 const MAX_MISSED: f64 = 0.02;
 
 /// Decomposes `detail` into surfaces from coarse to fine, the base first and `detail` last, by smoothing it over the
-/// ellipsoids. Each is a graph over the one before, except for up to [`MAX_MISSED`] of its normals.
+/// ellipsoids. Each is a graph over the one before: the normals of the one before hit it from its inside, except for a
+/// share of up to [`MAX_MISSED`] of them.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`] if
@@ -101,8 +103,11 @@ fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     missed.count() as f64 / (2 * count).max(1) as f64
 }
 
-/// Builds a membrane around the ellipsoids, for a model without detail: solved if the result has no self-intersections,
-/// otherwise the union of the ellipsoids.
+/// Builds the base of a model without detail: the surface of the union of the ellipsoids, tightened to a membrane
+/// unless that would intersect itself.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] if the ellipsoids span too many edges, see [`MAX_NODES`].
 pub(super) fn membrane_around(
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
@@ -153,8 +158,8 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
 /// Longest edge of a lattice cell, as a share of the shortest semi-axis of all ellipsoids.
 const CELL: f64 = 0.4;
 
-/// Maximum number of lattice nodes along an axis: a surface across the whole lattice then has some ten million
-/// triangles.
+/// Maximum number of lattice nodes along an axis for the union of the ellipsoids: a surface across the whole lattice
+/// then has some ten million triangles.
 const MAX_NODES: f64 = 1024.0;
 
 /// Returns the edge length of equilateral triangles of which `triangles` have the total area `area`.

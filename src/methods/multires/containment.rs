@@ -6,7 +6,7 @@ use crate::math::{DVec3, Vec3};
 use crate::mesh::Mesh;
 
 /// Returns for each ellipsoid whether its centre is inside the closed mesh, by the parity of the hits of a ray from it.
-/// Used to detect a membrane that has slipped off an ellipsoid.
+/// Used to detect a membrane that has slipped off an ellipsoid, and to decide where a new ellipsoid starts.
 pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
     let centres: Vec<[f32; 2]> = ellipsoids.iter().map(|e| project_along_ray(e.center.as_vec3())).collect();
     let projected: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| project_along_ray(p)).collect();
@@ -27,7 +27,7 @@ pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<boo
 /// as two hits.
 const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
 
-/// Two directions perpendicular to the ray.
+/// Two directions perpendicular to [`RAY`], the coordinate axes of points projected along it.
 const ACROSS: [Vec3; 2] = [Vec3::new(-0.6929, 0.5772, 0.0), Vec3::new(-0.2492, -0.2992, 0.8132)];
 
 /// Projects a point along the ray, to two coordinates.

@@ -1,5 +1,5 @@
 //! The map T from the deformed surface S to the base M₀: projected from frame to frame by the operator P, and evened
-//! out by the operator D (sections 3 and 6).
+//! out by the operator D (Kobbelt, Bareuther & Seidel, sections 3 and 6).
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
@@ -50,11 +50,12 @@ pub(super) struct Current<'a> {
     pub correspondence: &'a [BasePoint],
 }
 
-/// Operator P: maps each vertex of `mesh` to the closest point of S_current, then by the same barycentric coordinates
-/// to a point near the base, then to the closest point on the base. Returns the map T of `mesh`.
+/// Operator P: maps each vertex of `mesh` to the closest point of S_current, then by its barycentric coordinates to the
+/// point between the images of the triangle's corners under T, then to the closest point on the base. Returns the map T
+/// of `mesh`.
 ///
-/// A closest point found by a walk is searched again in a tree if it is farther away than `farthest` or faces the other
-/// way.
+/// A closest point on S_current found by a walk is searched again in a tree if it is farther away than `farthest`, in
+/// units of the mesh, or if its triangle faces the other way.
 pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, farthest: f64) -> Correspondence {
     let mut correspondence = vec![UNSET; mesh.slots()];
     traverse(mesh, |v, start| {
@@ -66,8 +67,8 @@ pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, fart
 }
 
 /// Returns the closest point on S_current to a vertex of the next surface, by a walk from the triangle `start`. If the
-/// result is farther away than `farthest` or faces the other way, it is searched again in a tree. Without `start`, all
-/// triangles are tested.
+/// result is farther away than `farthest`, or its triangle faces away from the normal of the vertex, it is searched
+/// again in a tree. Without `start`, all triangles are tested.
 fn nearest(
     mesh: &Mesh,
     walker: &SurfaceWalker,
@@ -125,8 +126,8 @@ fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     }
 }
 
-/// Operator D, equation 1 of the paper: moves the image q of each vertex under T to Σ dⱼ qⱼ / Σ dⱼ over its neighbours,
-/// with the mean length dⱼ of the edges at qⱼ, then back onto the base. Evens out the map T.
+/// Operator D (Kobbelt, Bareuther & Seidel, equation 1): moves the image q of each vertex under T to Σ dⱼ qⱼ / Σ dⱼ
+/// over its neighbours, with the mean length dⱼ of the edges at qⱼ, then back onto the base. Evens out the map T.
 pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, correspondence: &mut Correspondence) {
     let densities: Vec<f32> =
         (0..mesh.slots()).map(|i| density(mesh, correspondence, VertexId::from_index(i))).collect();

@@ -1,5 +1,5 @@
-//! Detail: the signed distance λ from each surface of the decomposition to the next finer one along its normals, and
-//! its reconstruction on the deformed base (sections 2 and 3).
+//! Detail: the signed distance λ from each surface of the decomposition to the next finer one along its normals,
+//! positive outwards, and its reconstruction on the deformed base (Kobbelt, Bareuther & Seidel, sections 2 and 3).
 
 use super::correspondence::{BasePoint, Correspondence, UNSET, normal_at};
 use super::prisms::PrismLookup;
@@ -37,7 +37,7 @@ pub(super) struct Bands {
 /// Finds where the normals of one surface of a decomposition hit the next finer one.
 #[derive(Clone, Debug)]
 struct BandLookup {
-    /// The largest distance of a hit; farther ones belong to another part of the surface.
+    /// The largest distance at which a hit counts; farther ones belong to another part of the surface.
     search_distance: f64,
     prisms: PrismLookup,
 }
@@ -60,8 +60,8 @@ impl Bands {
         &self.all[self.all.len() - 1]
     }
 
-    /// Returns the detail at a point of the base: for each band but the first, its signed distance from the band before
-    /// along the normal.
+    /// Returns the detail at a point of the base: for each band but the first, its distance from the band before along
+    /// the normal, positive outwards.
     pub fn detail_at(&self, at: &BasePoint) -> Detail {
         let mut detail = Detail { last: *at, ..NOTHING };
         for (k, BandLookup { search_distance, prisms }) in self.lookups.iter().enumerate() {
@@ -89,7 +89,7 @@ pub(super) fn search_distance(from: &Band, to: &Band) -> f64 {
 /// Maximum number of bands above the base.
 pub(super) const MAX_BANDS: usize = 8;
 
-/// The detail at a point of the base: the signed distances of all bands.
+/// The detail at a point of the base: for each band above the base, its signed distance from the band before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Detail {
     lambdas: [f32; MAX_BANDS],
@@ -134,8 +134,8 @@ pub(super) struct Detailed {
 /// How finely the deformed base is sampled for the detail.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DetailSampling {
-    /// Edges longer than this with their detail are split, in units of the mesh; so are shorter ones, see
-    /// [`MAX_DEVIATION`].
+    /// Edges that are longer than this once their ends are displaced by the detail are split, in units of the mesh; so
+    /// are shorter ones if the detail at their midpoint deviates, see [`MAX_DEVIATION`].
     pub longest: f32,
     /// How often an edge of the deformed base may be halved; 0 adds no vertices.
     pub rounds: u32,
@@ -226,8 +226,9 @@ struct DetailSamples {
     details: Vec<Detail>,
 }
 
-/// An edge is halved if the detail at its midpoint is off the straight line by more than this share of the longest
-/// edge. With a larger value, noses and eyelids stay blunt; with a smaller one, every edge is split.
+/// An edge is halved if its midpoint, displaced by the detail there, is farther than this share of
+/// [`DetailSampling::longest`] from the middle between its displaced ends. With a larger value, noses and eyelids stay
+/// blunt; with a smaller one, every edge is split.
 const MAX_DEVIATION: f32 = 0.04;
 
 impl DetailSamples {
@@ -255,8 +256,8 @@ impl DetailSamples {
         p + normal * detail.lambdas.iter().sum::<f32>()
     }
 
-    /// Splits edges at their midpoint, longest first: those longer than `longest` with their detail, and those whose
-    /// detail at the midpoint deviates by more than [`MAX_DEVIATION`].
+    /// Splits edges at their midpoint, longest first: those that are longer than `longest` once displaced by their
+    /// detail, and those whose displaced midpoint deviates as described at [`MAX_DEVIATION`].
     fn refine(&mut self, bands: &Bands, longest: f32) {
         let mut splits: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
         for (u, v) in self.mesh.edges() {

@@ -1,4 +1,4 @@
-//! Distortion of the map T, which the operator D keeps low (section 3).
+//! Distortion of the map T, which the operator D keeps low (Kobbelt, Bareuther & Seidel, section 3).
 
 use super::correspondence::Correspondence;
 use crate::math::{DVec3, triangle};
@@ -38,8 +38,8 @@ pub(super) fn distortion(mesh: &Mesh, correspondence: &Correspondence) -> Distor
     Distortion { area: per_vertex(&before), angle: per_vertex(&stretch) }
 }
 
-/// Returns the ratio of the singular values of the affine map from one triangle to another, at most [`MAX_ANISOTROPY`];
-/// 1 for a similarity.
+/// Returns the ratio of the larger to the smaller singular value of the affine map from one triangle to another, at
+/// most [`MAX_ANISOTROPY`]; 1 for a similarity.
 fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
     // In the plane of the first triangle, with one edge along x, the linear part is a 3 × 2 matrix with columns p and
     // q.

@@ -1,5 +1,5 @@
 //! Control ellipsoids: containment, closest points, pushing vertices out, and moving points along with the ellipsoids
-//! (section 5).
+//! (Kobbelt, Bareuther & Seidel, section 5).
 
 use crate::math::{DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
@@ -283,8 +283,8 @@ pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     push_straight(ellipsoids, at)
 }
 
-/// Maximum number of pushes out of one ellipsoid after the other; in a crease of 90°, each further digit takes some
-/// three.
+/// Maximum number of pushes out of one ellipsoid after the other; in a crease of 90°, each further correct digit takes
+/// some three pushes.
 const PUSHES: usize = 12;
 
 /// A point at least this far from the centre in the unit-ball frame counts as outside: rounding puts surface points
@@ -312,8 +312,8 @@ fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     p + direction * distance
 }
 
-/// Returns the distance at which the ray from `p` along `direction` leaves the ellipsoid; `None` if it is not inside at
-/// the distance `distance`.
+/// Returns the distance from `p` at which the ray along `direction` leaves the ellipsoid; `None` if the point of the
+/// ray at `distance` is not inside.
 fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Option<f64> {
     if e.unit(p + direction * distance).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
@@ -324,8 +324,9 @@ fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Opti
     (exit > distance).then_some(exit)
 }
 
-/// Returns `p` moved along with the ellipsoids from `before` to `after`: by the mean of their affine maps, with larger
-/// weights for nearer ones. Used to predict the membrane of the next frame.
+/// Returns `p` moved along with the ellipsoids from `before` to `after`, which are in the same order: by the weighted
+/// mean of the affine maps that take each to its new state, with larger weights for nearer ones. Used to predict the
+/// membrane of the next frame.
 ///
 /// If all ellipsoids move alike, so does every point. Otherwise, points nearer to an ellipsoid than its shortest
 /// semi-axis mostly move with it, and the space between two is stretched evenly.
@@ -340,9 +341,10 @@ pub(super) fn move_with(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> V
     }
     if total > 0.0 { (p + sum / total).as_vec3() } else { p.as_vec3() }
 }
-/// Regularises the weight of an ellipsoid that contains a point: it is eleven times that of one at a distance of its
-/// own shortest semi-axis. With a larger weight, all stretching falls on the crease between two ellipsoids that
-/// separate, and the map folds there; with a smaller one, detail slides on them.
+/// Added to the squared distance from an ellipsoid, in units of its shortest semi-axis; the inverse of the sum is its
+/// weight in [`move_with`]. So an ellipsoid that contains the point weighs eleven times as much as one that is its own
+/// shortest semi-axis away. With a larger ratio, all stretching falls on the crease between two ellipsoids that
+/// separate, and the map folds there; with a smaller one, detail slides on the ellipsoids.
 const SOFTNESS: f64 = 0.1;
 
 #[cfg(test)]

@@ -16,12 +16,12 @@ use crate::spatial::SurfaceWalker;
 /// be guarded nor solved in bounded time.
 const MAX_CHANGE: f64 = 2.0;
 
-/// While ellipsoids move, a membrane with at most this residual, a share of the target edge, is only refreshed on one
-/// level: three times as fast as a solve on all levels.
+/// Largest residual, as a share of the target edge, with which a membrane may be refreshed on one level while
+/// ellipsoids move: three times as fast as a solve on all levels.
 const REFRESH_TOLERANCE: f64 = 3.0 * TOLERANCE;
 
 /// Depth by which rounding may put vertices inside an ellipsoid, as a share of the target edge; a rigid motion stays
-/// below.
+/// below. After a larger one the membrane is solved once the ellipsoids stop.
 const ROUNDING: f64 = 1e-3;
 
 /// Maximum number of frames in a row that only refresh the membrane, so that wide saddles between ellipsoids do not lag
@@ -71,7 +71,8 @@ impl MultiresolutionModel {
         residual(mesh, ellipsoids, self.params.energy) / self.params.target()
     }
 
-    /// Predicts the membrane for the next positions `ellipsoids_after` of the ellipsoids.
+    /// Predicts the membrane for the next positions `ellipsoids_after` of the ellipsoids; an error if it is too large
+    /// for its edge bounds.
     fn predict(&self, ellipsoids_after: Vec<Ellipsoid>) -> Result<Prediction, MethodError> {
         let before = self.ellipsoids.now();
         let mut predicted = self.surface.clone();
@@ -84,9 +85,10 @@ impl MultiresolutionModel {
         Ok(Prediction { ellipsoids_before: before, ellipsoids_after, predicted, residual, params })
     }
 
-    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small, its
-    /// edges are within bounds, no vertex is deep inside an ellipsoid and none is held back by the collision guard.
-    /// This makes rigid motions exact. `None` if the membrane has to be solved.
+    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small,
+    /// nearly all edges are within bounds, no vertex is deep inside an ellipsoid, none is held back by the collision
+    /// guard, and no solve is due because the ellipsoids have stopped. This makes rigid motions exact. `None` if the
+    /// membrane has to be solved.
     fn predict_only(&mut self, prediction: &Prediction) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !prediction.moves() && self.refreshed_frames > 0;
@@ -136,7 +138,8 @@ impl MultiresolutionModel {
     }
 
     /// Returns the membrane for the next positions of the ellipsoids: refreshed if that is sufficient, else solved on
-    /// all levels, else moved under the collision guard.
+    /// all levels. If that intersects itself or slips off an ellipsoid, the current membrane is moved under the
+    /// collision guard instead.
     fn solved(&mut self, prediction: &Prediction) -> (Mesh, Changes) {
         let (next, changes) = self
             .refresh(prediction)
@@ -185,8 +188,8 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// Cuts thin necks of a membrane that was made without collision tests. `None` if it intersects itself, or if it no
-    /// longer contains the centre of an ellipsoid that it contained before.
+    /// Cuts thin necks of a membrane that was made without collision tests, if the parameters allow it. `None` if it
+    /// intersects itself, or if it no longer contains the centre of an ellipsoid that it contained before.
     fn with_threads_cut(
         &mut self,
         mut mesh: Mesh,
@@ -250,7 +253,7 @@ impl<'a> Lap<'a> {
     }
 }
 
-/// Whether at most [`MAX_OUT_OF_BOUNDS`] of the edges are out of bounds.
+/// Whether a share of at most [`MAX_OUT_OF_BOUNDS`] of the edges is shorter or longer than `bounds`.
 fn edges_within_bounds(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
     let outside = mesh.edges().filter(|&(u, v)| {

@@ -1,5 +1,5 @@
-//! The membrane over the ellipsoids: umbrella iterations and pushes out of the ellipsoids, from coarse to fine (section
-//! 5).
+//! The membrane over the ellipsoids: umbrella iterations and pushes out of the ellipsoids, from coarse to fine
+//! (Kobbelt, Bareuther & Seidel, section 5).
 
 use super::ellipsoid::{Ellipsoid, pushed_out};
 use super::params::{Energy, MultiresParams};
@@ -11,16 +11,16 @@ use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 /// slip off the thinnest.
 const MAX_EDGE_PER_AXIS: f64 = 0.8;
 
-/// The iterations of a level finer than the coarsest end when one of them moves vertices by no more than this share of
-/// the level's target edge, as a root mean square: from there on they slide along the surface, and a tenth of that
-/// motion is normal to it.
+/// The iterations of a refresh, or of a level finer than the coarsest, end when one of them moves vertices by no more
+/// than this share of the level's target edge, as a root mean square: from there on they slide along the surface, and a
+/// tenth of that motion is normal to it.
 const LEVEL_TOLERANCE: f64 = 0.025;
 
 /// Minimum number of vertices of a coarse level: fewer do not represent the shape.
 const MIN_VERTICES: f64 = 60.0;
 
-/// Solves the membrane on meshes from coarse to fine, with up to `levels` coarse levels before the target resolution;
-/// the last one is left in `mesh`.
+/// Solves the membrane on meshes from coarse to fine, with up to `levels` coarse levels before the target resolution,
+/// which `mesh` has in the end.
 ///
 /// Edits are made without collision tests; the caller checks the result for self-intersections.
 pub(super) fn solve(
@@ -119,7 +119,7 @@ fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Ve
     }
 }
 
-/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (equation 2 of the paper).
+/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (Kobbelt, Bareuther & Seidel, equation 2).
 #[inline]
 fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();

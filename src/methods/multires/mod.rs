@@ -80,7 +80,8 @@ pub struct MultiresolutionModel {
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
     correspondence: Correspondence,
     detailed: Detailed,
-    /// The collision guard. Only its memory is reused between frames, not its state.
+    /// The collision guard, which keeps triangles from intersecting. Only its memory is reused between frames, not its
+    /// state.
     guard: Embedding,
     components: u32,
     iteration: u32,
@@ -97,8 +98,8 @@ impl MultiresolutionModel {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted;
-    /// [`MethodError::Mesh`] for a detail or a base that is open or not manifold, or for a base that intersects itself;
-    /// [`MethodError::TooManyVertices`] if the edges are too short.
+    /// [`MethodError::Mesh`] for a detail or a base that is invalid, open or not manifold, or for a base that
+    /// intersects itself; [`MethodError::TooManyVertices`] if the edges are too short.
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
@@ -190,8 +191,8 @@ impl MultiresolutionModel {
         &self.surface
     }
 
-    /// Returns the mesh T: the triangles of [`Self::base_mesh`] with each vertex at its position on the undeformed base
-    /// M₀.
+    /// Returns the image of the deformed base under the map T: the triangles of [`Self::base_mesh`] with each vertex at
+    /// its corresponding point on the undeformed base M₀.
     pub fn link_mesh(&self) -> TriangleMesh {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
@@ -207,8 +208,9 @@ impl MultiresolutionModel {
     /// Sets the parameters, also during a run.
     ///
     /// # Errors
-    /// As [`MultiresParams::validate`]; [`MethodError::InvalidArgument`] if the edges are too long for an ellipsoid,
-    /// and [`MethodError::TooManyVertices`] if they are too short. Nothing has changed then.
+    /// As [`MultiresParams::validate`]; [`MethodError::InvalidArgument`] if the edges are too long for the membrane to
+    /// hold on to the tips of an ellipsoid, and [`MethodError::TooManyVertices`] if they are too short. Nothing has
+    /// changed then.
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
         check_tips(&self.ellipsoids.targets(), params.edge_max)?;
@@ -236,8 +238,8 @@ impl MultiresolutionModel {
     /// left out shrinks and is removed.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for an empty list, for axes that span no ellipsoid, and for tips too sharp for
-    /// the edges; nothing has changed then.
+    /// [`MethodError::InvalidArgument`] for an empty list, for a centre out of range, for axes that span no ellipsoid,
+    /// and for tips too sharp for the edges; nothing has changed then.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;

@@ -143,7 +143,8 @@ fn steps_between(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     shift.max(turns).max(libm::log(growth) / libm::log(MAX_GROWTH))
 }
 
-/// Interpolates between two ellipsoids: centres linearly, orientations about one axis, lengths geometrically.
+/// Returns the ellipsoid at `share` (0..1) of the way between two: centres are interpolated linearly, orientations
+/// about one axis, lengths geometrically.
 fn between(from: &Ellipsoid, to: &Ellipsoid, share: f64) -> Ellipsoid {
     let rotation = slerp(quaternion(from), quaternion(to), share);
     let lengths = [0, 1, 2].map(|k| from.lengths[k] * libm::pow(to.lengths[k] / from.lengths[k], share));

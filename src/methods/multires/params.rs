@@ -12,9 +12,9 @@ pub struct MultiresParams {
     pub edge_min: f64,
     /// ε_max: longer edges are split, in units of the mesh; more than twice `edge_min`.
     pub edge_max: f64,
-    /// Number of coarser levels that the membrane is solved on first; 0 solves on the target resolution only.
+    /// Maximum number of coarser levels that the membrane is solved on first; 0 solves on the target resolution only.
     pub levels: u32,
-    /// q: the factor by which the edge bounds shrink from one level to the next finer one.
+    /// q: the factor, below 1, by which the edge bounds shrink from one level to the next finer one.
     pub refine_factor: f64,
     /// Maximum number of Gauss–Seidel iterations per level of a solve; finer levels may end earlier.
     pub smoothing: u32,
@@ -42,7 +42,7 @@ pub enum Energy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// None, as in the paper: thin necks stay and parts never join.
+    /// None, as in Kobbelt et al.: thin necks stay and parts never join.
     Never,
     /// A neck too thin for the shortest edge is cut.
     Split,

@@ -22,7 +22,7 @@ pub(super) struct PrismLookup {
 /// centroid. With less, more normals fall back to the tree; with more, the lists grow long.
 const DEPTH: f64 = 1.5;
 
-/// Widening of a prism against rounding, as a share of its size.
+/// Widening of a prism against rounding, as a share of its largest coordinate in absolute value.
 const ROUNDING: f64 = 1e-5;
 
 /// Smallest cosine between the normals at two corners: with more divergent normals the prism would be much too wide,
@@ -71,8 +71,8 @@ impl PrismLookup {
     }
 }
 
-/// Returns the depth of the prism of a triangle; 0, for no prism, if the normals at its corners diverge too much or hit
-/// nothing.
+/// Returns the depth of the prism of a triangle; 0, for no prism, if the normals at its corners diverge too much, or
+/// neither they nor the one at its centroid hit `to`.
 fn depth(from: &Band, to: &Band, search_distance: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
@@ -96,8 +96,8 @@ fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
 struct Prism {
     /// The corners moved to either side.
     points: [DVec3; 6],
-    /// For each edge, the outward unit vector at right angles to it and to the mean normal: about the normal of the lateral
-    /// face.
+    /// For each edge, the outward unit vector at right angles to it and to the mean normal: approximately the normal of
+    /// the lateral face.
     axes: [DVec3; 3],
     margin: f64,
 }
@@ -126,7 +126,8 @@ impl Prism {
         Bounds { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
     }
 
-    /// Whether none of the lateral faces separates a triangle from the prism. The caller has tested the bounding boxes.
+    /// Whether no plane at right angles to one of `axes`, about parallel to a lateral face, separates a triangle from
+    /// the prism. The caller has tested the bounding boxes.
     fn may_intersect(&self, corners: [Vec3; 3]) -> bool {
         self.axes.iter().all(|axis| {
             let (least, most) = extent(axis, &self.points);

@@ -12,7 +12,7 @@ use crate::methods::caller_mesh::check_edges;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// Number of triangles of the base if no edge bounds are given: the paper's "moderately complex models".
+/// Number of triangles of the base if no edge bounds are given: the "moderately complex models" of Kobbelt et al.
 const DEFAULT_TRIANGLES: f64 = 10_000.0;
 
 /// Returns the bands from coarse to fine, and the parameters with edge bounds filled in.
@@ -59,10 +59,11 @@ pub(super) fn set_up(
 }
 
 /// Returns a mesh with vertices at the same position merged, see [`TriangleMesh::welded`], after checking that it is
-/// closed, manifold and not too small.
+/// closed and manifold, and its edges not too short.
 ///
 /// # Errors
-/// [`MethodError::Mesh`]; [`MethodError::InvalidArgument`] naming `parameter` if its edges are too short.
+/// [`MethodError::Mesh`] if it is invalid, open or not manifold; [`MethodError::InvalidArgument`] naming `parameter` if
+/// its edges are too short.
 fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
     let mesh = mesh.welded();

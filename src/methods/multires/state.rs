@@ -19,7 +19,7 @@ struct State {
     params: MultiresParams,
     moving: MovingEllipsoids,
     surface: Mesh,
-    /// Triangle and barycentric coordinates of the map T, by slot.
+    /// The point of the base that the map T assigns to each vertex, as a triangle and barycentric coordinates, by slot.
     correspondence: Vec<(u32, Vec3)>,
     iteration: u32,
     passing: u32,

@@ -1,14 +1,14 @@
 //! Texture coordinates of the deformed surface, taken from the corresponding points of the finest surface; seams are
-//! respected (section 7).
+//! respected (Kobbelt, Bareuther & Seidel, section 7).
 
 use super::correspondence::{BasePoint, Correspondence};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::spatial::SurfaceWalker;
 
-/// A triangle whose texture coordinates are farther apart than this multiple of what its size implies crosses a seam.
-/// With a smaller value, stretched texture is mistaken for a seam; with a much larger one, narrow strips of the whole
-/// texture appear along it.
+/// A triangle is taken to cross a seam if its texture coordinates are farther apart than this multiple of what its size
+/// implies. With a smaller value, stretched texture is mistaken for a seam; with a much larger one, narrow strips of
+/// the whole texture appear along it.
 const SEAM_RATIO: f32 = 6.0;
 
 /// Returns texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; `None` if the finest

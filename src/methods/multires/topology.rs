@@ -49,7 +49,7 @@ fn remesh_and_resolve(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut R
     changes
 }
 
-/// Cuts thin necks of a `mesh` without self-intersections, unless the parameters forbid topology changes; joins
+/// Cuts thin necks of `mesh`, which must not intersect itself, unless the parameters forbid topology changes; joins
 /// contacts around them if the parameters allow it. Edges are not split beyond `most_vertices` vertices.
 pub(super) fn cut_threads(mesh: &mut Mesh, params: &MultiresParams, most_vertices: usize) -> Changes {
     let active = pinched(mesh, params.bounds());
@@ -70,8 +70,8 @@ fn resolve(
     resolver.resolve(mesh, sampling(params.bounds()), active)
 }
 
-/// Returns the sampling for topology changes, with δ = ε_min: edges from ε_min to 2.5 ε_min, a slightly higher bound
-/// than that of the default parameters.
+/// Returns the edge lengths for topology changes, from ε_min to 2.5 ε_min: the upper bound is slightly higher than that
+/// of the default parameters.
 fn sampling(bounds: EdgeBounds) -> Sampling {
     Sampling::new(bounds.min)
 }
