@@ -2,7 +2,7 @@
 // is accepted.
 import { VesicleError } from './error.js';
 
-/** Returns the `invalid-argument` error for one parameter. */
+/** Returns the `invalid-argument` error whose message names the parameter and its problem; the caller throws it. */
 export function invalid(parameter: string, problem: string): VesicleError {
   return new VesicleError('invalid-argument', `${parameter}: ${problem}`);
 }

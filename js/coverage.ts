@@ -19,7 +19,10 @@ export interface Coverage {
   uncovered: UncoveredRegion[];
 }
 
-/** A connected region of the iso-surface that is farther than one voxel from the surface. */
+/**
+ * A connected region of the iso-surface, made of the triangles that are at least in part farther than one voxel from
+ * the surface.
+ */
 export interface UncoveredRegion {
   /** A point of the region near its middle, in world space. */
   position: Vec3;

@@ -41,14 +41,14 @@ export interface DeformableParams {
   stiffness?: number;
   /** Rest length of the edge springs: zero, the mean edge length, or a length in world units. */
   restLength?: 'zero' | 'mean' | number;
-  /** Mass of a vertex, m. */
+  /** Mass of a vertex, m: heavier ones start and stop more slowly. */
   mass?: number;
-  /** Damping of the velocity, γ. */
+  /** Damping coefficient, γ: friction that slows the vertices down. */
   damping?: number;
   /**
-   * Integrator of the equation of motion: 'implicit' (the default) takes long steps and needs the fewest; 'euler' is
-   * the paper's and needs `rigidity` up to 0.4; 'runge-kutta' evaluates the forces four times and remains stable up to
-   * 3.
+   * Integrator of the equation of motion: 'implicit' (the default) takes long steps, needs the fewest of them, and is
+   * stable for all parameters; 'euler' is the paper's, and stable for `rigidity` up to 0.4 and `damping` up to 1;
+   * 'runge-kutta' evaluates the forces four times a step, and is stable for `rigidity` up to 3.
    */
   integrator?: 'euler' | 'runge-kutta' | 'implicit';
   /** Time step, Δt, of one iteration of 'euler' and 'runge-kutta'; an iteration of 'implicit' takes 16 at once. */
@@ -66,9 +66,9 @@ export interface DeformableParams {
    */
   topology?: 'adaptive' | 'fixed';
   /**
-   * Local adaptation of the surface to the image, 0..1; default 1. Above 0, walls and gaps visible in the image are kept,
-   * however thin, and edge lengths vary with the curvature, in proportion to the value. At 0, or if `isoForce` is 0,
-   * sheets closer than the contact distance are joined, as in the paper.
+   * Local adaptation of the surface to the image, 0..1; default 1. Any value above 0 keeps walls and gaps visible in
+   * the image, however thin, and limits the rigidity; edge lengths vary with the curvature in proportion to the
+   * value. At 0, or if `isoForce` is 0, sheets closer than the contact distance are joined, as in the paper.
    */
   adaptivity?: number;
   /**
@@ -98,9 +98,9 @@ export interface Attractor {
  *   and cavities that enclose fewer voxels than `smallestPart`. If there is none, the model starts empty (components
  *   appear on finer levels, or with another `iso`), or from the enclosing surface if `seeding` is 'off', or if
  *   `adaptivity` or `isoForce` is 0.
- * - `'enclosing'`: a surface around everything brighter than `iso` on the coarsest level at construction (around the
- *   whole volume if nothing is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and for
- *   objects without a usable iso-surface.
+ * - `'enclosing'`: a rounded box around everything brighter than `iso` on the coarsest level at construction (around
+ *   the whole volume if nothing is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and
+ *   for objects without a usable iso-surface.
  * - `{ bubbles }`: a grid of n × n × n spheres, which grow and merge.
  * - `{ seeds, radius }`: spheres around packed points in world space.
  * - `{ marchingCubes }`: the iso-surface of the coarsest level at the given intensity.
@@ -236,7 +236,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Finds components and cavities of the current level's image that the surface lacks and adds them, whatever the value
-   * of `seeding`. A finished model can continue afterwards.
+   * of `seeding`; none if `topology` is 'fixed' or `isoForce` is 0. A finished model continues if any were added.
    *
    * @returns A report that counts them in `events.seeds`.
    * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress; `too-large`.
@@ -274,7 +274,7 @@ export class DeformableModel implements Stepper {
    * Changes any subset of the parameters of the live model. All values are validated before any is set.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out
-   *   of range; nothing has changed then.
+   *   of range; `too-large`. Nothing has changed then.
    */
   setParams(params: DeformableParams): void {
     const values = shallowCopy('params', params);

@@ -22,17 +22,23 @@ export interface ImplicitParams {
   /** Width of the Gaussian kernel, σ, a length. */
   sigma?: number;
   /**
-   * Regularisation λ of surface constraints: how much each may be missed; 0 interpolates. With more than 3,000 points
-   * it is multiplied by n/3,000.
+   * Regularisation λ of surface constraints (points where f is to be 0): how much each may be missed; 0 interpolates.
+   * With more than 3,000 points it is multiplied by n/3,000.
    */
   lambdaSurface?: number;
-  /** Regularisation λ of exterior constraints: how much each may be missed. */
+  /** Regularisation λ of exterior constraints (points where f is to be −1): how much each may be missed. */
   lambdaExterior?: number;
   /** Relative residual of the linear system at which the solver stops. */
   tolerance?: number;
-  /** Edge of an extraction cell in the points' units; 0, the default, derives it from the points' spacing. */
+  /**
+   * Edge of a cell of the grid on which the surface is extracted, in the points' units; 0, the default, derives it from
+   * the points' spacing.
+   */
   cell?: number;
-  /** The value of f at the extracted surface: 0, or the mean of f over the surface constraints. */
+  /**
+   * The value at the extracted surface of f, the sum of radial basis functions: 0, or the mean of f over the surface
+   * constraints.
+   */
   level?: 'zero' | 'mean';
 }
 
@@ -61,7 +67,7 @@ export interface ImplicitOptions {
    * Confidence of each point, above 0 and at most 1: its λ is divided by it, so that uncertain points constrain less.
    */
   confidence?: Float32Array;
-  /** Packed rgb of each point, 0..1: colours vertices that no camera sees. */
+  /** Packed rgb of each point, 0..1: colours the mesh if no camera image shows any of it. */
   colors?: Float32Array;
   /**
    * Points known to be outside, packed. By default made towards the cameras, without cameras along the normals, given or
@@ -82,7 +88,10 @@ export interface ImplicitOptions {
 export interface PointEdits {
   /** Additional points near the surface, packed. */
   added?: Float32Array;
-  /** Points to leave out, by their zero-based index in the original points. */
+  /**
+   * Points to leave out, by their zero-based index in the original points; others at the same positions are left out,
+   * too.
+   */
   removed?: Uint32Array;
   /** Additional points known to be outside, packed. */
   exterior?: Float32Array;
@@ -173,7 +182,10 @@ export class ImplicitSurface implements Stepper {
     return this.#handle.use((raw) => raw.params() as Required<ImplicitParams>);
   }
 
-  /** Edge of an extraction cell in the points' units; 0 until it is derived from their spacing. */
+  /**
+   * Edge of a cell of the grid on which the surface is extracted, in the points' units; 0 until it is derived from
+   * their spacing.
+   */
   get cell(): number {
     return this.#statistics().cell;
   }
@@ -191,7 +203,7 @@ export class ImplicitSurface implements Stepper {
     return this.#statistics().duplicates;
   }
 
-  /** Number of spurious components of the last surface: connected components with no point near. */
+  /** Number of spurious components of the last surface: connected components with no surface constraint near. */
   get spuriousComponents(): number {
     return this.#statistics().spuriousComponents;
   }
@@ -211,8 +223,9 @@ export class ImplicitSurface implements Stepper {
    * Runs up to `iterations` slices of work, synchronous and deterministic; fewer if the surface is finished earlier.
    *
    * @returns The last report.
-   * @throws {@link VesicleError} `singular-system` naming the likely cause; `too-large`; `invalid-argument` while a
-   *   {@link ImplicitSurface.run} is in progress. The last surface stays, and other parameters may be set.
+   * @throws {@link VesicleError} `singular-system` naming the likely cause; `too-large`; `invalid-argument`, naming the
+   *   parameter, where too few points are left, or `cell` does not suit them, and while a {@link ImplicitSurface.run}
+   *   is in progress. The last surface stays, and other parameters may be set.
    */
   step(iterations = 1): StepReport {
     integer('iterations', iterations, { min: 1 });
@@ -239,7 +252,7 @@ export class ImplicitSurface implements Stepper {
    * Changes any subset of the parameters of the live model. All values are validated before any is set. Only dependent
    * stages run again: for `cell` and `level` the extraction alone, for the others the solve and what follows.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the parameter; nothing has changed then.
+   * @throws {@link VesicleError} `invalid-argument` naming the parameter, `too-large`; nothing has changed then.
    */
   setParams(params: ImplicitParams): void {
     const values = shallowCopy('params', params);
@@ -261,8 +274,9 @@ export class ImplicitSurface implements Stepper {
    * matrix and solution; more are solved from the start. If only a subsample is used, a removed point is not replaced
    * by another.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther from the others than their own
-   *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
+   * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther than 1.5 times the longest
+   *   side of the points' bounding box from its centre along an axis, no such index, too few points left, all in one
+   *   plane, on the surface and outside at once; nothing has changed then.
    */
   setEdits(edits: PointEdits): void {
     const known = checkProperties('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
@@ -285,8 +299,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Evaluates ∇f at packed points, as packed vectors per unit of length of the points; on the surface they point
-   * inwards. Throws as {@link ImplicitSurface.evaluate}.
+   * Evaluates the gradient of f, ∇f, at packed points, as packed vectors per unit of length of the points; on the
+   * surface they point inwards. Throws as {@link ImplicitSurface.evaluate}.
    */
   gradient(points: Float32Array): Float32Array {
     finite('points', points, 3);
@@ -319,11 +333,11 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Samples f minus its value at the surface on a grid around the points and the surface, so that the deformable model
-   * can continue from it with iso 0.
+   * Samples f minus its value at the surface (above 0 inside) on a grid of `dims` voxels around the points and the
+   * surface, so that the deformable model can continue from it with `iso` 0.
    *
-   * @throws {@link VesicleError} `invalid-argument` before the system is solved, or below 2 voxels along an axis;
-   *   `too-large`.
+   * @throws {@link VesicleError} `invalid-argument` before the system is solved, or a number of voxels along an axis
+   *   not from 2 to 4096; `too-large`.
    */
   toVolume(dims: Vec3): Volume {
     const sizes = Uint32Array.from(numbers('dims', dims, 3), (size) => integer('dims', size, { min: 2, max: 4096 }));
@@ -331,8 +345,9 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Colours the mesh from photographs: each vertex gets the mean colour of the cameras that see it, weighted by the
-   * cosine between normal and viewing direction; unseen vertices take their neighbours' colours.
+   * Colours the mesh from photographs: each vertex gets the mean colour of the cameras that see it, weighted by alpha,
+   * by the cosine between normal and viewing direction, and less at silhouettes; unseen vertices take their neighbours'
+   * colours. Colours stay unchanged if no camera sees any of the mesh.
    *
    * @throws {@link VesicleError} `invalid-argument` before there is a surface, or where no camera has an image.
    */

@@ -66,7 +66,7 @@ export interface MeshInfo {
    * tensor.
    */
   inertia: number[];
-  /** Lengths of the shortest edge, of the mean and of the longest, world units. */
+  /** Shortest, mean and longest length of an edge, world units. */
   edge: { min: number; mean: number; max: number };
   /** Smallest angle of a triangle, degrees. */
   minAngleDegrees: number;
@@ -106,7 +106,10 @@ export interface MeshHit {
   distance: number;
 }
 
-/** Kind of curvature; κ₁ and κ₂ are the principal curvatures. */
+/**
+ * Kind of curvature, for {@link Mesh.curvature}; κ₁ and κ₂ are the principal curvatures, the largest and smallest
+ * normal curvature at a point.
+ */
 export type CurvatureKind =
   /** Mean curvature, H = (κ₁ + κ₂) / 2. */
   | 'mean'
@@ -127,7 +130,7 @@ export interface SurfaceDistance {
   hausdorff: number;
 }
 
-/** A pass of {@link Mesh.restructure}, by its edit of edges. */
+/** A pass of {@link Mesh.restructure}, named by what it does to edges. */
 export type RestructurePass = 'collapse' | 'split' | 'flip';
 
 const RESTRUCTURE_PASSES: readonly RestructurePass[] = ['collapse', 'split', 'flip'];
@@ -255,12 +258,14 @@ export class Mesh {
     return this.#handle.use((raw) => raw.triangleCount());
   }
 
-  /** Counter that increases when the connectivity changes. */
+  /**
+   * Counter that increases when the connectivity changes; that of an implicit surface, also when anything else does.
+   */
   get topologyVersion(): number {
     return this.#handle.use((raw) => raw.topologyVersion());
   }
 
-  /** Counter that increases when any vertex moves. */
+  /** Counter that increases when any vertex moves; that of an implicit surface, also when its colours change. */
   get geometryVersion(): number {
     return this.#handle.use((raw) => raw.geometryVersion());
   }
@@ -436,7 +441,8 @@ export class Mesh {
   }
 
   /**
-   * Returns the first intersection of a ray with the surface, from either side, or undefined.
+   * Returns the first intersection of the ray from `origin` along `direction` with the surface, from either side, or
+   * undefined.
    *
    * @param direction - Any length but 0.
    * @throws {@link VesicleError} `invalid-argument`.
@@ -448,7 +454,8 @@ export class Mesh {
   }
 
   /**
-   * Computes the cross-section of the surface with a plane as line segments: pairs of points, six numbers a segment.
+   * Computes the cross-section of the surface with the plane through `origin` as line segments: pairs of points, six
+   * numbers a segment.
    *
    * @param normal - Any length but 0.
    * @throws {@link VesicleError} `invalid-argument`.

@@ -28,9 +28,15 @@ export interface MultiresParams {
   levels?: number;
   /** q: factor by which edge bounds shrink from one level to the next finer one. */
   refineFactor?: number;
-  /** Smoothing iterations with the umbrella operator per level. */
+  /**
+   * Largest number of smoothing iterations, with the umbrella operator, per level of the multi-level solver; finer
+   * levels may need fewer.
+   */
   smoothing?: number;
-  /** Applications of the operator D, which evens out the map T, per step. */
+  /**
+   * Number of times per solve of the base that the operator D evens out the map T from the deformed base to the
+   * undeformed one (see {@link MultiresolutionModel.linkMesh}).
+   */
   distribute?: number;
   /**
    * Largest number of times that an edge of the base is halved for the detail, where the detail is finer than the base,
@@ -71,8 +77,8 @@ interface Counts {
 const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
 
 /**
- * A detailed surface deformed, without limit, by ellipsoids that support a low-frequency surface with dynamic
- * connectivity.
+ * A detailed surface deformed, however far, by ellipsoids that support a low-frequency surface, whose connectivity
+ * changes as it is deformed.
  *
  * After Kobbelt, Bareuther and Seidel, "Multiresolution shape deformations for meshes with dynamic vertex
  * connectivity". A step is one frame: the ellipsoids move towards their targets as far as the low-frequency surface can
@@ -149,20 +155,26 @@ export class MultiresolutionModel implements Stepper {
     return this.#counts().bandCount;
   }
 
-  /** Number of triangles of the base surface whose image under T is flipped or has no area. */
+  /**
+   * Number of triangles of {@link MultiresolutionModel.baseMesh} that are flipped or have no area in
+   * {@link MultiresolutionModel.linkMesh}.
+   */
   get folded(): number {
     return this.#counts().folded;
   }
 
   /**
-   * Number of vertices of the mesh whose normal on the base did not hit the detailed surface; the closest point is used
-   * instead.
+   * Number of vertices of the mesh whose normal on the base, or on a surface between base and detail, did not hit the
+   * next finer surface; its closest point is used instead.
    */
   get unmatchedVertices(): number {
     return this.#counts().unmatchedVertices;
   }
 
-  /** Number of vertices of the mesh whose detail was reduced to avoid self-intersections. */
+  /**
+   * Number of vertices of the mesh whose detail was reduced to avoid self-intersections, summed over the surfaces of
+   * the decomposition above the base.
+   */
   get heldVertices(): number {
     return this.#counts().heldVertices;
   }
@@ -172,11 +184,13 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Sets new targets for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
-   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside
-   * the surface; those omitted shrink and vanish.
+   * Sets new targets for the ellipsoids, by index; each step moves, rotates and resizes them by a limited amount, their
+   * centres by at most half of their shortest semi-axis (or of their target's, if longer). Additional ellipsoids grow
+   * from a fraction of their size, or out of the nearest existing one if they lie outside the surface; those omitted
+   * shrink and vanish.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid; nothing has changed then.
+   * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid: none at all, axes that are not orthogonal or
+   *   have no length, or tips too sharp for `edgeMax`; nothing has changed then.
    */
   setEllipsoids(ellipsoids: ControlEllipsoid[]): void {
     const packed = packedEllipsoids(ellipsoids);
@@ -197,8 +211,8 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Runs until the surface has settled, yielding to the event loop between frames. Ellipsoids and parameters may be
-   * changed meanwhile.
+   * Runs until the surface has settled, yielding to the event loop between slices of one or more frames. Ellipsoids and
+   * parameters may be changed meanwhile.
    *
    * @returns The last report.
    * @throws As {@link MultiresolutionModel.step}; `signal.reason` when aborted, and the model stays usable; any error
@@ -213,15 +227,18 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Computes the distortion of T per vertex of {@link MultiresolutionModel.baseMesh}: `area` is the area on the
+   * Computes the distortion of the map T per vertex of {@link MultiresolutionModel.baseMesh}: `area` is the area on the
    * undeformed base divided by that on the deformed one, 1 where areas are preserved; `angle` the ratio of the largest
-   * to the smallest stretch over all directions, 1 where angles are preserved.
+   * to the smallest stretch over all directions, at most 1000, 1 where angles are preserved.
    */
   distortion(): { area: Float32Array; angle: Float32Array } {
     return this.#handle.use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
   }
 
-  /** Returns copies of the meshes of the multi-level solver for the current ellipsoids, from coarse to fine. */
+  /**
+   * Solves a copy of the low-frequency surface for the current ellipsoids, and returns its mesh on each level of the
+   * solver, from coarse to fine.
+   */
   levelMeshes(): Mesh[] {
     const levels = this.#handle.use((raw) => raw.levelMeshes());
     return levels.map((level) => wrapMesh(new Handle('Mesh', () => level)));

@@ -30,8 +30,8 @@ export function init(options: { module_or_path?: InitInput | Promise<InitInput> 
 }
 
 /**
- * Loads the WebAssembly module like {@link init}, but synchronously, from bytes or a compiled module. Browsers refuse
- * to compile large modules on the main thread: use it in workers and in Node.
+ * Loads the WebAssembly module like {@link init}, but synchronously, from its bytes or the compiled module in `module`.
+ * Browsers refuse to compile large modules on the main thread: use it in workers and in Node.
  */
 export function initSync(options: { module: BufferSource | WebAssembly.Module }): unknown {
   if (crash) restart();

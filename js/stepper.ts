@@ -46,7 +46,10 @@ export interface StepReport {
 export interface RunOptions {
   /** Aborts the run, which then rejects with `signal.reason`; the model stays usable. */
   signal?: AbortSignal;
-  /** Largest number of iterations of this run; it then resolves with a report that is not `done`. */
+  /**
+   * Largest number of iterations of this run; if the model needs more, the run resolves with a report that is not
+   * `done`. Default no limit.
+   */
   maxIterations?: number;
   /**
    * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. A step is never
@@ -57,7 +60,7 @@ export interface RunOptions {
   onStep?: (report: StepReport) => void;
 }
 
-/** Interface that all four methods implement. */
+/** Interface that the models of all four methods implement. */
 export interface Stepper {
   /** The surface: the same live object from start to end. */
   readonly mesh: Mesh;
@@ -103,8 +106,8 @@ class EventLoopYield {
 }
 
 /**
- * Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason` when
- * the signal aborts.
+ * Calls `work` until it returns a value, and resolves with that, yielding to the event loop after each slice of
+ * `budgetMs` milliseconds. Rejects with any error of `work`, and with `signal.reason` when the signal aborts.
  */
 export async function runInSlices<T extends object>(
   work: () => T | undefined,

@@ -8,8 +8,8 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {
   /**
-   * Edge threshold τ: the means of the two clusters of a window must differ by more than this for a boundary, intensity
-   * units; by default, or if 0, derived from the noise and the intensity range.
+   * Edge threshold τ: the mean intensities of the two clusters (bright and dark voxels) of a window must differ by more
+   * than this for a boundary, intensity units; by default, or if 0, derived from the noise and the intensity range.
    */
   threshold?: number;
   /** k: the window for clustering is 2k + 1 voxels wide along each axis. */
@@ -23,7 +23,9 @@ export interface TrackingParams {
   radius?: number;
   /** Time scale c: the distance that one frame counts as, world units; by default, or if 0, derived from the radius. */
   timeScale?: number;
-  /** Damping β: each step of a projection is scaled by this factor relative to the one before. */
+  /**
+   * Damping β: each step of a projection is scaled by this factor relative to the one before, down to 0.2 of the first.
+   */
   damping?: number;
   /** c_min: edges shorter than this are collapsed, in units of the first frame's mean edge. */
   edgeMin?: number;
@@ -55,7 +57,7 @@ export interface TrackingOptions {
   voxels?: { min: Vec3; max: Vec3 };
   /**
    * Component to track: the largest of the first frame (the default), or the one that encloses a point in world space,
-   * or the nearest to it.
+   * or has the vertex nearest to it.
    */
   component?: 'largest' | Vec3;
   /**
@@ -77,8 +79,8 @@ export interface FrameStatistics {
   /** Number of triangles that face away from the sum of their three neighbours. */
   folded: number;
   /**
-   * Number of rejected projections, which found too few boundary points or moved too far; these vertices follow their
-   * neighbours.
+   * Number of rejected projections, which found too few boundary points or only a plane nearly parallel to the frame,
+   * or moved too far; these vertices follow their neighbours.
    */
   rejected: number;
   /** Number of vertex displacements reduced to avoid self-intersections. */
@@ -127,7 +129,8 @@ export class SurfaceTracker implements Stepper {
    *
    * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few
    *   voxels, without contrast or with slanted axes, a box outside of it, a start that is empty, inside out, outside
-   *   the box or much finer than its voxels; `not-closed`, `self-intersecting` for a start that is.
+   *   the box or with a mean edge below a tenth of a voxel; `not-closed`, `self-intersecting` for a start that is;
+   *   `too-large`.
    */
   constructor(given: TrackingOptions) {
     const known = checkProperties('options', given, OPTIONS) as TrackingOptions;
@@ -211,7 +214,7 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Runs to the last frame, yielding to the event loop between frames.
+   * Runs to the last frame, yielding to the event loop between slices of one or more steps.
    *
    * @returns The last report.
    * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker stays usable; any error

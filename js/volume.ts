@@ -160,7 +160,7 @@ export class Volume {
     return this.#handle.use((raw) => raw.space() as Space);
   }
 
-  /** Smallest and largest intensity of all frames, after slope and intercept. */
+  /** Smallest and largest finite intensity of all frames, after slope and intercept. */
   get range(): [number, number] {
     const [low, high] = this.#handle.use((raw) => raw.range()) as unknown as [number, number];
     return [low, high];
@@ -213,8 +213,8 @@ export class Volume {
   }
 
   /**
-   * Builds an image pyramid: one volume a level, each smaller than the one before by `factor` along each axis; [0] =
-   * this one.
+   * Builds an image pyramid: one volume a level, from fine to coarse, each with `factor` times fewer voxels along each
+   * axis (rounded down) than the one before; the first is this one.
    *
    * @param levels - Number of levels, this volume included.
    * @param options - `factor`: above 1, at most 2; default the square root of 3.
@@ -228,9 +228,9 @@ export class Volume {
   }
 
   /**
-   * Reduces the resolution of all frames by averaging blocks of voxels: fewer and larger voxels of the same type.
-   * Incomplete blocks at the far ends are dropped. For images that were interpolated to smaller pixels than were
-   * measured.
+   * Reduces the resolution of all frames by averaging the finite voxels of each block: fewer and larger voxels of the
+   * same type. Incomplete blocks at the far ends are dropped. For images that were interpolated to smaller pixels than
+   * were measured.
    *
    * @param factors - Block size in voxels along x, y and z, 1 to 16 each.
    * @throws {@link VesicleError} `invalid-argument`: a factor out of range, or beyond the volume; `too-large`.
@@ -244,8 +244,8 @@ export class Volume {
    * Inserts in-between slices along the axis of the largest spacing, by symmetric optical flow between neighbouring
    * slices, in all frames. The original slices stay unchanged, at their positions; voxels keep their type.
    *
-   * @param options - `factor`: number of slices for each original one, 1 to 16; default the integer that makes voxels
-   *   closest to cubes; 1 changes nothing. `method`: `'linear'` interpolates linearly instead.
+   * @param options - `factor`: number by which the distance between slices is divided, 1 to 16; default the integer
+   *   that makes voxels closest to cubes; 1 changes nothing. `method`: `'linear'` interpolates linearly instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {

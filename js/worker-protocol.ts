@@ -30,7 +30,7 @@ export type Reply =
   | { type: 'error'; id: number; failure: Failure }
   | { type: 'report'; id: number; report: Report };
 
-/** Content of a report: that of a step of a run, or the fraction done of a coverage measurement. */
+/** Content of a report: the state after a step of a run, or the fraction done, 0..1, of a coverage measurement. */
 export type Report = StepReport | number;
 
 /** Methods that the page can abort, with the name of the listener option that receives their reports. */
@@ -162,7 +162,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
   },
 };
 
-/** Static methods of each class that may be called. */
+/** Static methods that may be called, by class. */
 export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N], 'prototype'>> } = {
   Volume: { parse: 'method', fromFrames: 'method' },
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
@@ -180,7 +180,10 @@ export const FUNCTIONS: Names<FunctionName> = {
   animationGlb: 'method',
 };
 
-/** Returns the entry `name` of one of the tables. Throws `invalid-argument` if it has no own entry of that name. */
+/**
+ * Returns the entry `name` of one of the tables of what may be accessed. Throws `invalid-argument` if it has no own
+ * entry of that name.
+ */
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
   if (found !== undefined) return found;

@@ -22,10 +22,11 @@ import type { ClassName, FunctionName, RemoteClass, RemoteFunction } from './wor
 const markedForTransfer = new WeakSet<object>();
 
 /**
- * Marks a typed array, or all typed arrays inside an object, to be transferred to the worker without a copy when next
- * passed as an argument. Afterwards it is empty here, as is every other array on the same buffer.
+ * Marks a typed array, or all typed arrays inside an object, to be transferred to the worker without a copy when passed
+ * as an argument. Afterwards it is empty here, as is every other array on the same buffer, and cannot be passed again.
  *
  * @returns The value itself.
+ * @throws {@link VesicleError} `invalid-argument` if it is not an object.
  */
 export function transfer<T extends object>(value: T): T {
   if (value === null || typeof value !== 'object') throw invalid('value', 'must be a typed array or an object');
@@ -166,7 +167,9 @@ function deserialize(value: unknown, session: Session): unknown {
   });
 }
 
-/** Posts a call on an object, on a class, or of a free function, and resolves with its result. */
+/**
+ * Posts a call of `name` on an object, on a class, or of a free function, to the worker, and resolves with its result.
+ */
 async function post(
   session: Session,
   on: Remote | ClassName | undefined,

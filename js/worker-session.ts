@@ -60,7 +60,7 @@ export class Session {
     return this.#last;
   }
 
-  /** Posts a task. Throws synchronously if it cannot be posted. */
+  /** Posts a task. Throws if the worker has ended or an argument cannot be sent; other failures reject the answer. */
   post(task: Task, { transfer = [], target, onReport }: RequestOptions = {}): PendingAnswer {
     if (this.#end) throw this.#end;
     const id = this.nextId();
@@ -81,7 +81,7 @@ export class Session {
     if (!this.#end) this.#send({ type: 'free', object }, []);
   }
 
-  /** Terminates the worker: all pending and later requests reject with the reason. */
+  /** Terminates the worker: all pending requests reject with the reason, and later ones throw it. */
   end(reason: Error): void {
     if (this.#end) return;
     this.#end = reason;

@@ -106,9 +106,12 @@ type Constructor<C> = C extends new (
   ...args: infer A
 ) => infer I
   ? {
-      /** Returns an object at once; if its creation fails, every promise of the object rejects. */
+      /**
+       * Returns an object at once, before it is created in the worker; if that fails, every promise of the object
+       * rejects.
+       */
       new (...args: Arguments<A>): WithRemotes<I>;
-      /** Resolves with an object once it is created; rejects if the creation fails. */
+      /** Resolves with an object once it is created in the worker; rejects if the creation fails. */
       create(...args: Arguments<A>): Promise<WithRemotes<I>>;
     }
   : // For classes without a public constructor; only for `instanceof`.

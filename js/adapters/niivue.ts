@@ -41,7 +41,8 @@ const SECONDS: Record<number, number> = { 0: 1, 8: 1, 16: 1e-3, 24: 1e-6 };
  * Converts a volume of NiiVue to the options of a `Volume`: `new Volume(volumeFromNiivue(nv.volumes[0]))`. World space
  * is NiiVue's: RAS, whatever the file says. All frames that NiiVue has loaded are included.
  *
- * @throws `VesicleError` `invalid-argument`: a volume that is not loaded, or several numbers a voxel.
+ * @throws `VesicleError` `invalid-argument`: a volume that is not loaded, several numbers a voxel, or a voxel type that
+ *   a `Volume` does not store.
  */
 export function volumeFromNiivue(volume: NiivueVolume | undefined): VolumeInit {
   const { hdr, img } = Object(volume) as NiivueVolume;
@@ -94,7 +95,7 @@ export interface NiivueSurfaceOptions {
   NVMesh?: NVMeshClass;
   /** Name in NiiVue's list of meshes; default 'vesicle'. */
   name?: string;
-  /** Colour as rgba, 0..1; default a warm white. Vertex colours of the mesh take precedence. */
+  /** Colour as rgba, 0..1; default a warm white. Vertex colours of the mesh replace its rgb. */
   color?: readonly [number, number, number, number];
   /** World space of the mesh, which is that of its volume; default RAS, as in NiiVue. */
   space?: Space;
@@ -136,8 +137,8 @@ export class NiivueSurface {
   /**
    * Updates NiiVue's mesh if the mesh has changed since the last call; draw to show it. Resolves with whether it has.
    *
-   * The work is done synchronously and the promise resolves at once, except on the first call in 1.0: there NiiVue adds
-   * a mesh and uploads its volumes again.
+   * The work is done synchronously and the promise resolves at once, except in 1.0 on the first call, and with WebGPU
+   * possibly on each: there NiiVue uploads its volumes again, too.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */
@@ -167,7 +168,10 @@ interface MeshAdapter {
   remove(): unknown;
 }
 
-/** Returns four bytes a vertex, rgba: the vertex colours if the mesh has them, else `color` for all. */
+/**
+ * Returns four bytes a vertex, rgba: rgb are the vertex colours if the mesh has them, else those of `color`; alpha is
+ * always that of `color`.
+ */
 function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array((positions.length / 3) * 4);
   const all = Array.from(color, (share) => Math.round(255 * share));

@@ -14,17 +14,26 @@ export interface MeshSource {
   readonly geometryVersion: number;
   /** Returns the surface in its present state. */
   arrays(): MeshArrays;
-  /** Copies the surface into existing arrays; preferred to `arrays` if present. */
+  /**
+   * Copies the surface into the arrays of `out`, replacing those that are too small, and returns the counts written;
+   * used instead of `arrays` if present.
+   */
   copyTo?(out: MeshArrays): { vertices: number; triangles: number };
 }
 
-/** A surface ready to be shown, in the host's space. The arrays are valid until the next read. */
+/**
+ * A surface ready to be shown, in the world space of the host (NiiVue, three.js or vtk.js). The arrays are valid until
+ * the next read.
+ */
 export interface SurfaceArrays extends MeshArrays {
   /** Whether the connectivity has changed since the last read, or the mesh is another one. */
   topology: boolean;
 }
 
-/** Reads a mesh if it has changed since the last read, and converts it to the host's space. */
+/**
+ * Reads a mesh if it has changed since the last read, and converts it to the world space of the host (NiiVue, three.js
+ * or vtk.js).
+ */
 export class MeshReader {
   readonly #rotated: boolean;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
@@ -33,8 +42,8 @@ export class MeshReader {
   #geometry = 0;
 
   /**
-   * Converts from the mesh's space to the host's: RAS and LPS differ by a rotation of 180° about z, which preserves
-   * orientation.
+   * Sets the space of the mesh and that of the host. If both are given and differ, each surface read is rotated by 180°
+   * about z, which maps RAS to LPS and back and preserves orientation.
    */
   constructor(space: Space | undefined, host: Space | undefined) {
     const spaces = [space, host].filter((one) => one !== undefined);
@@ -119,8 +128,8 @@ const ELEMENTS = [
 ];
 
 /**
- * Validates voxels with one number each and returns them with their dimensions; the number of frames follows from the
- * length.
+ * Returns a host's voxels, one number each, as options of a `Volume`: `sizes` are the numbers along x, y and z, and the
+ * number of frames follows from the length. Throws `invalid-argument` for other types and lengths.
  */
 export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit, 'data' | 'dims'> {
   if (!ELEMENTS.some((kind) => data instanceof kind)) {

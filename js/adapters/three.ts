@@ -36,11 +36,11 @@ interface Header {
 /**
  * Converts a volume of three's `NRRDLoader` to the options of a `Volume`: `new Volume(volumeFromThree(volume))`.
  *
- * @param options - `world`: `'file'`, the default, is the world space of the file, with its origin, and RAS or LPS as
- *   stated there. `'slices'` is the space in which `volume.extractSlice()` draws: the middle of the volume at the
- *   origin, RAS.
- * @throws `VesicleError` `invalid-argument`: not such a volume, several numbers a voxel, or a byte order that the
- *   loader does not read.
+ * @param options - `world`: `'file'`, the default, is the world space of the file, with its origin; LPS or RAS as
+ *   stated there (LAS is mirrored to RAS), RAS if nothing is. `'slices'` is the space in which `volume.extractSlice()`
+ *   draws: the middle of the volume at the origin, RAS.
+ * @throws `VesicleError` `invalid-argument`: not such a volume, several numbers a voxel, a voxel type that a `Volume`
+ *   does not store, a byte order that the loader does not read, or no such `world`.
  */
 export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' | 'slices' } = {}): VolumeInit {
   const { data, xLength, yLength, zLength, matrix } = checkVolume(volume);
@@ -138,7 +138,7 @@ const ATTRIBUTES = [
   ['colors', 'color', 3],
 ] as const;
 
-/** Capacity of buffers relative to their contents, so that they are seldom reallocated. */
+/** Capacity of new buffers as a multiple of their contents, so that they are seldom reallocated. */
 const CAPACITY_FACTOR = 1.5;
 
 /**
@@ -150,8 +150,9 @@ const CAPACITY_FACTOR = 1.5;
  * surface.update(model.mesh); // after every step
  * ```
  *
- * The object's `geometry` is replaced whenever the buffers have to grow; material and transform in the scene are the
- * caller's. Positions are those of the mesh, in its volume's world space.
+ * The object's `geometry` is replaced by the first update, and whenever its buffers have to grow or the mesh gains or
+ * loses colours or texture coordinates; material and transform in the scene are the caller's. Positions are those of
+ * the mesh, in its volume's world space unless `worldSpace` is another one.
  */
 export class ThreeSurface {
   readonly #three: ThreeClasses;
@@ -164,7 +165,7 @@ export class ThreeSurface {
    * @param object - Receives the geometry; its previous geometry is not disposed of.
    * @param options - `space` of the mesh and `worldSpace` of the scene: if both are given and differ, the signs of x
    *   and y are flipped.
-   * @throws `VesicleError` `invalid-argument`: classes that are missing, no such object.
+   * @throws `VesicleError` `invalid-argument`: classes that are missing, no such object, no such space.
    */
   constructor(three: ThreeClasses, object: ThreeObject, options: { space?: Space; worldSpace?: Space } = {}) {
     for (const name of ['BufferGeometry', 'BufferAttribute', 'Sphere', 'Box3'] as const) {

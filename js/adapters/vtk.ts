@@ -35,7 +35,8 @@ export interface ItkImage {
  *
  * @param options - `space`: orientation of the image's world axes, which vtk.js does not know; default LPS, as produced
  *   by itk and DICOM readers.
- * @throws `VesicleError` `invalid-argument`: no such image, no scalars, or several numbers a voxel.
+ * @throws `VesicleError` `invalid-argument`: no such image, no scalars, several numbers a voxel, a voxel type that a
+ *   `Volume` does not store, or no such space.
  */
 export function volumeFromVtk(image: VtkImage, options: { space?: Space } = {}): VolumeInit {
   const scalars = scalarsOf(image);
@@ -69,7 +70,8 @@ function scalarsOf(image: VtkImage) {
  * `new Volume(volumeFromItk(image))`. World space is LPS. The caller adds the seconds between frames, because not all
  * files state them.
  *
- * @throws `VesicleError` `invalid-argument`: no such image, another dimension, or several numbers a voxel.
+ * @throws `VesicleError` `invalid-argument`: no such image, another dimension, several numbers a voxel, or a voxel type
+ *   that a `Volume` does not store.
  */
 export function volumeFromItk(image: ItkImage): VolumeInit {
   const { imageType, size, spacing, origin, direction, data } = Object(image) as ItkImage;
@@ -110,7 +112,8 @@ export interface VtkClasses<P extends VtkPolyData> {
  * surface.update(model.mesh); // after every step, then render
  * ```
  *
- * Points are those of the mesh, in its volume's world space; they have outward normals.
+ * Points are those of the mesh, in its volume's world space unless `worldSpace` is another one; they have outward
+ * normals.
  */
 export class VtkSurface<P extends VtkPolyData> {
   /** Input of a `vtkMapper`; the same object from start to end. */
@@ -122,7 +125,7 @@ export class VtkSurface<P extends VtkPolyData> {
    * @param vtk - The classes of vtk.js.
    * @param options - `space` of the mesh and `worldSpace` of the view: if both are given and differ, the signs of x and
    *   y are flipped.
-   * @throws `VesicleError` `invalid-argument`: classes that are missing.
+   * @throws `VesicleError` `invalid-argument`: classes that are missing, or no such space.
    */
   constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space } = {}) {
     for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {

@@ -13,9 +13,9 @@ export type LabMethod = keyof typeof MODELS;
 /** State of a `<vesicle-lab>`, also in its attribute `data-state`. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
-/** Approximate duration of the steps between two renderings, milliseconds. */
+/** Approximate duration of the method's steps between two renderings, milliseconds. */
 const SLICE_MS = 60;
-/** Largest number of steps between two renderings. */
+/** Largest number of steps of the method between two renderings. */
 const MAX_STEPS = 256;
 
 const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
@@ -70,7 +70,7 @@ export class VesicleLab extends HTMLElement {
     if (this.isConnected && this.#view !== undefined) void this.reset();
   }
 
-  /** Restarts the method with the current attributes. */
+  /** Loads the file again and restarts the method with the current attributes; it then runs unless `paused` is set. */
   async reset(): Promise<void> {
     this.#close();
     const opening = ++this.#opening;
@@ -105,7 +105,7 @@ export class VesicleLab extends HTMLElement {
     return make({ ...settings, bytes });
   }
 
-  /** Runs to the end, or until {@link VesicleLab.pause}. */
+  /** Runs the method to its end, or until {@link VesicleLab.pause}; resolves then. */
   async play(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'running' || this.state === 'done') return;
@@ -132,7 +132,7 @@ export class VesicleLab extends HTMLElement {
     if (this.state === 'running') this.#setState('paused', 'Paused.');
   }
 
-  /** Runs one step of the method, and pauses. */
+  /** Pauses and runs one step of the method; does nothing if it is done. */
   async step(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'done') return;

@@ -27,7 +27,7 @@ export interface Settings {
   ellipsoids: ControlEllipsoid[];
 }
 
-/** A model, and the direction from the model to the initial position of the camera. */
+/** A model, and in `from` the direction from the model to the initial position of the camera. */
 export interface ModelWithView {
   model: Stepper;
   from: Vec3;
@@ -36,7 +36,9 @@ export interface ModelWithView {
 /** Direction from man-made objects, which usually face −y, to the initial position of the camera in front of them. */
 const FRONT: Vec3 = [-0.5, -1, 0.35];
 
-/** Functions that create the model of each method; volumes and meshes that it was made from are freed. */
+/**
+ * Functions that create the model of each method from the settings; they free the volume or mesh that it was made from.
+ */
 export const MODELS = {
   deformable: ({ bytes, start, levels, params }: Settings): Promise<ModelWithView> =>
     ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
@@ -72,21 +74,27 @@ async function withResource<T extends { free(): void }, Made>(
   }
 }
 
-/** Downloads the file at an address. */
+/** Downloads the file at an address; throws `bad-file` for an HTTP error. */
 export async function fetched(address: string): Promise<Uint8Array> {
   const response = await fetch(address);
   if (!response.ok) throw new VesicleError('bad-file', `src: ${address}: ${response.status} ${response.statusText}`);
   return new Uint8Array(await response.arrayBuffer());
 }
 
-/** Returns the initial surface that an attribute names; `'contour'` by default. */
+/**
+ * Returns the initial surface that the attribute `start` names, `'contour'` if it is missing; throws `invalid-argument`
+ * for others.
+ */
 export function parseStart(name: string | null): StartName {
   const start = STARTS.find((one) => one === (name ?? 'contour'));
   if (!start) throw invalid('start', `'${name}'; accepted: ${STARTS.join(', ')}`);
   return start;
 }
 
-/** Parses an attribute as JSON; returns `otherwise` if it is empty or missing. */
+/**
+ * Parses the attribute `name` as JSON; returns `otherwise` if it is empty or missing, and throws `invalid-argument` if
+ * it is not JSON.
+ */
 export function json<T>(name: string, text: string | null, otherwise: T): T {
   if (text === null || text.trim() === '') return otherwise;
   try {
