@@ -42,7 +42,7 @@ pub enum Energy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// None, as in Kobbelt et al.: thin necks stay and parts never join.
+    /// None, as in Kobbelt, Bareuther & Seidel: thin necks stay and parts never join.
     Never,
     /// A neck too thin for the shortest edge is cut.
     Split,

@@ -12,7 +12,8 @@ use crate::methods::caller_mesh::check_edges;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// Number of triangles of the base if no edge bounds are given: the "moderately complex models" of Kobbelt et al.
+/// Number of triangles of the base if no edge bounds are given: the "moderately complex models" of Kobbelt, Bareuther &
+/// Seidel.
 const DEFAULT_TRIANGLES: f64 = 10_000.0;
 
 /// Returns the bands from coarse to fine, and the parameters with edge bounds filled in.
