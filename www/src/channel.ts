@@ -23,7 +23,7 @@ interface PendingRequest {
   reject: (error: RequestError) => void;
 }
 
-/** Constraint on a protocol's request table: maps the name of each request to the types of its body and reply. */
+/** Constraint on a lab's request table: maps the name of each request to the types of its body and reply. */
 type RequestTable<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
@@ -82,7 +82,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     });
   }
 
-  /** Posts a message that has no reply. */
+  /** Posts a message to the worker that has no reply. */
   protected post(message: { kind: string }, transfer: Transferable[] = []): void {
     this.#worker.postMessage(message, transfer);
   }

@@ -14,7 +14,7 @@ export interface Example {
   /** Unit of lengths in world space; empty if the file does not state one. */
   unit: Unit;
   levels: number;
-  /** Mean edge length in world units, for examples in which the model's own choice is too coarse. */
+  /** Mean edge length in world units; if undefined, the model chooses it. */
   edge?: number;
   params: ParamValues & { iso: number };
   credit: string;

@@ -11,7 +11,7 @@ import { spawnSculpt } from './sculpt/client';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
-/** The labs, in the order of the navigation. An empty or unknown address opens the first one. */
+/** The labs, in the order of the navigation. If none is open yet, an empty or unknown address opens the first one. */
 const LABS: [LabKind, ...LabKind[]] = [
   {
     id: 'extract',
@@ -56,7 +56,10 @@ class Labs {
   readonly #links = new Map<string, HTMLAnchorElement>();
   #kind: LabKind | undefined;
   #lab: Lab | undefined;
-  /** Number of times a lab was opened; a lab whose code arrives after another was requested is dropped. */
+  /**
+   * Number of times a lab was opened: tells whether another was opened while the code of one was loading, which is then
+   * dropped.
+   */
   #turn = 0;
 
   constructor(root: HTMLElement, help: HTMLElement, nav: HTMLElement) {

@@ -42,7 +42,7 @@ export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 /** All that a model is built from, besides the volume. */
 export interface Setup {
   start: StartShape;
-  /** Pyramid levels above the volume itself. */
+  /** Number of coarser pyramid levels that the run starts with, besides the volume itself. */
   levels: number;
   /** Mean edge length on the finest level in world units; if undefined, the model chooses it. */
   edge: number | undefined;
@@ -95,8 +95,8 @@ export interface Plane {
 }
 
 /**
- * Surface buffers that are transferred to the page and back, so that none is allocated per frame. They may be longer
- * than the part in use.
+ * Arrays of a surface that are transferred to the page and, in the Extract lab, back, so that none is allocated for
+ * each surface sent. They may be longer than the part in use.
  */
 export interface SurfaceBuffers {
   positions: Float32Array;
@@ -110,7 +110,7 @@ export interface Surface extends SurfaceBuffers {
   vertices: number;
   /** Number of triangles in use. */
   triangles: number;
-  /** One value per vertex, if a quantity was requested. */
+  /** One value per vertex to colour the surface by, if a quantity was requested. */
   values?: Float32Array;
   /** Colours of the vertices, rgb in 0..1, if the mesh has them. */
   colors?: Float32Array;
@@ -119,8 +119,8 @@ export interface Surface extends SurfaceBuffers {
 }
 
 /**
- * Measures of a surface. `report`, the result of the mesh checks, takes time, so it is present only when the model is
- * not running.
+ * Measures of a surface. `report`, the result of the mesh checks, takes time: while the Extract lab's model is running,
+ * it is left out.
  */
 export interface Measures {
   info: MeshInfo;
@@ -130,11 +130,11 @@ export interface Measures {
 /** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** Mean edge length δ at the start of the run, in world units. */
+  /** Sampling distance δ of the model, in world units: edges are between δ and 2.5 δ long. */
   delta: number;
 }
 
-/** Coverage, and the iteration at which it was measured. */
+/** How much of the iso-surface the surface covers, and the iteration at which it was measured. */
 export interface MeasuredCoverage extends Coverage {
   iteration: number;
 }
@@ -171,7 +171,7 @@ export interface Requests {
   /** Replies with `levels` coarser levels of the volume's pyramid, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
-  /** Sets the quantity sent for each vertex from now on. */
+  /** Sets the quantity whose values at the vertices are sent with the surface from now on; none if undefined. */
   quantity: { body: VertexQuantity | undefined; reply: undefined };
   /** Saves the present state of the run, also while it is running. */
   save: { body: undefined; reply: SavedRun };
@@ -228,7 +228,7 @@ export interface SectionsEvent {
 }
 /**
  * State of the run: sent when a run starts and, after its last results, when it is done or was stopped; also after
- * single steps and, in the Extract lab, after seeding or restoring.
+ * single steps, in the Extract lab after seeding or restoring, and in the Track lab on request.
  */
 export interface StateEvent {
   event: 'state';
@@ -238,13 +238,13 @@ export interface FailureEvent {
   event: 'failure';
   failure: Failure;
 }
-/** Progress of a comparison: one step of one of its runs. */
+/** Progress of a comparison: the report of a step of one of its runs. Not sent for each step. */
 export interface ComparisonProgressEvent {
   event: 'comparing';
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
-/** Progress of a coverage measurement, 0..1. */
+/** Progress of a coverage measurement, from 0 to 1. */
 export interface CoverageProgressEvent {
   event: 'covering';
   share: number;

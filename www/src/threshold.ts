@@ -48,7 +48,7 @@ function variance(below: number, belowSum: number, count: number, sum: number): 
   return below * above * difference * difference;
 }
 
-/** Returns the quantiles of the intensities at the given fractions, from a histogram over `range`. */
+/** Returns the quantiles of the intensities at the given fractions, up to half a bin, from a histogram over `range`. */
 export function quantiles(histogram: ArrayLike<number>, range: [number, number], fractions: number[]): number[] {
   const { count } = totals(histogram);
   return fractions.map((fraction) => {

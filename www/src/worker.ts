@@ -36,15 +36,17 @@ import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
  */
 const BUFFER_SETS = 2;
 /**
- * Least milliseconds between two measurements of area and volume during a run; on small meshes one costs as much as a
- * step.
+ * Least milliseconds between two measurements of the surface during a run (area, volume and others); on small meshes
+ * one costs as much as a step.
  */
 const MEASURE_EVERY = 400;
 
 /** Least milliseconds between two progress messages of a coverage measurement. */
 const TELL_EVERY = 100;
 
-/** Step reports per progress message. With fewer, sending the messages costs more than making the reports. */
+/**
+ * Number of step reports in a progress message. With fewer, sending the messages costs more than making the reports.
+ */
 const MOST_REPORTS = 50;
 
 /** The contents of a snapshot besides the surface: none, its measures, or measures and mesh checks. */
@@ -70,7 +72,7 @@ class Session {
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
-  /** Number of pyramid levels the model was built with, above the volume itself. */
+  /** Number of coarser pyramid levels the model was built with, besides the volume itself. */
   #levels = 0;
   #measuredAt = 0;
   #run: Task | undefined;

@@ -90,7 +90,10 @@ function drawBar(figure: Figure, bar: Bar, drawn: ChartLayout): HTMLElement {
   return row;
 }
 
-/** Draws the bar and the mark of its target; hidden from screen readers, since the number beside it says the same. */
+/**
+ * Draws the bar of a value, and a mark at the target if one applies; hidden from screen readers, since the number
+ * beside the bar says the same.
+ */
 function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayout): HTMLElement {
   const missed = meetsTarget(figure, bar) === false;
   const [from, to] = [Math.min(at(value), base), Math.max(at(value), base)];

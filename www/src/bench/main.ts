@@ -65,7 +65,10 @@ function summaryRow({ chart, figure }: Targeted): HTMLElement {
   return row;
 }
 
-/** Returns the worst value among the bars to which the target applies, with its host; a dash if none was measured. */
+/**
+ * Returns the worst value among the bars to which the target applies (the largest, or the smallest if the target is a
+ * least value), with the name of its host; a dash if none was measured.
+ */
 function worstValue({ bars, target }: Figure, unit: string): string {
   const sign = target?.sense === 'least' ? -1 : 1;
   const judged = bars.filter(({ label, value }) => value !== undefined && label.startsWith(target?.host ?? ''));

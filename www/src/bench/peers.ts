@@ -30,7 +30,7 @@ export function peerSection({ rows, load = 0, cores }: NonNullable<Report['peers
   };
 }
 
-/** Returns a figure for each task, with a bar for each package. */
+/** Returns a figure of the chart for each task, with a bar for each other package that does it. */
 function figuresOf(rows: PeerRow[]): Figure[] {
   const tasks = new Map(rows.map(({ task, name }) => [task, name]));
   return [...tasks].map(([task, name]) => ({ name, bars: rows.filter((row) => row.task === task).map(barOf) }));

@@ -17,7 +17,7 @@ export interface Report {
 }
 
 export interface Host {
-  /** Name of the host and its version, if any. */
+  /** Name and version of the browser or of Node that ran the measurement; `native` for native code. */
   host: string;
 }
 

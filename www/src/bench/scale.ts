@@ -9,8 +9,9 @@ export interface Scale {
 export type Kind = 'linear' | 'log' | 'ratio';
 
 /**
- * Returns a scale that contains all finite values: from 0 (`linear`), between powers of ten (`log`), or logarithmic
- * with bars that start at 1 (`ratio`). Logarithmic scales ignore values that are not above 0.
+ * Returns a scale for a chart's values: from 0 to above the largest (`linear`), between powers of ten (`log`), or the
+ * same with bars that start at 1 (`ratio`). Ignores values that are not finite and, on logarithmic scales, those not
+ * above 0; positions outside the scale are moved to its ends.
  */
 export function scaleOf(kind: Kind, values: number[]): Scale {
   const good = values.filter((value) => Number.isFinite(value) && (kind === 'linear' || value > 0));
@@ -26,7 +27,10 @@ function linear(most: number): Scale {
   return { at: (value) => clamped(value / end), base: 0, ticks };
 }
 
-/** Returns a tick step of 1, 2 or 5 times a power of ten, about a quarter of the length. */
+/**
+ * Returns the least distance between ticks, 1, 2 or 5 times a power of ten, that is at least a quarter of the length of
+ * the axis.
+ */
 function niceStep(length: number): number {
   const power = 10 ** Math.floor(Math.log10(length / 4));
   const part = length / 4 / power;

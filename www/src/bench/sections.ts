@@ -45,12 +45,15 @@ export function sectionsOf(report: Report): Section[] {
 const SECOND = 1000;
 const MEGABYTE = 1e6;
 
-/** Returns a figure with a bar for each host. */
+/** Returns a figure of a chart, with a bar for each host; `value` takes the measurement from a host's results. */
 function figure<T extends Host>(name: string, hosts: T[], value: (host: T) => number, target?: Target): Figure {
   return { name, bars: hosts.map((host): Bar => ({ label: shortHost(host.host), value: value(host) })), target };
 }
 
-/** Returns a figure for each row of the first host, with a bar for each host's row of the same index. */
+/**
+ * Returns a figure of a chart for each row of the first host's results, with a bar for each host's row of the same
+ * index.
+ */
 function figuresOfRows<Row>(
   hosts: (Host & { rows: Row[] })[],
   name: (row: Row) => string,
@@ -152,7 +155,10 @@ function topologyFigures(hosts: Steps[]): Figure[] {
   );
 }
 
-/** Returns a chart of the step time of each host relative to native code; no chart if native code was not measured. */
+/**
+ * Returns a chart of the step time of each other host relative to native code; no chart if native code was not
+ * measured.
+ */
 function overNative(hosts: Steps[]): Chart[] {
   const native = hosts.find(({ host }) => host === 'native');
   if (!native) return [];

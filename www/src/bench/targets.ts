@@ -8,6 +8,7 @@ export interface Target {
   host?: string;
 }
 
+/** A measured value, or the reason why there is none. */
 export interface Bar {
   /** The host or software that was measured. */
   label: string;
@@ -18,6 +19,7 @@ export interface Bar {
   skipped?: string;
 }
 
+/** A group of bars in a chart: one measurement, with a bar for each host or package, and its target. */
 export interface Figure {
   name: string;
   bars: Bar[];

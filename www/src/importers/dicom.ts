@@ -9,7 +9,10 @@ import { Refusal } from '../worker/refusal';
 
 const PIPELINE = 'read-image-dicom-file-series';
 
-/** Returns the options for itk-wasm: its program is served beside the page, and runs in the calling worker. */
+/**
+ * Returns the options for itk-wasm: its program that reads DICOM is served beside the page, and runs in the calling
+ * worker.
+ */
 const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
 
 /**
@@ -20,7 +23,10 @@ function pageAddress(): string {
   return new URL(import.meta.env.DEV ? import.meta.env.BASE_URL : '../', self.location.href).href;
 }
 
-/** Reads the volume from the DICOM files of one series, in world space LPS as in DICOM. */
+/**
+ * Reads the volume from the DICOM files of one series, in world space LPS as in DICOM. Throws a `Refusal` if they
+ * cannot be read or the voxels are not single numbers.
+ */
 export async function readSeries(files: NamedBytes[]): Promise<VolumeInit> {
   const paths = files.map((_, k) => `${k}.dcm`);
   const inputs = files.map(({ bytes }, k) => ({

@@ -26,7 +26,8 @@ export function isTiff({ bytes }: NamedBytes): boolean {
 
 /**
  * Reads the volume from the DICOM files among `files`, or else from TIFF files with one slice each or all in one;
- * undefined if no file is DICOM and not all are TIFF.
+ * undefined if no file is DICOM and not all are TIFF. Throws a `Refusal` if the files cannot be read or hold a single
+ * slice.
  */
 export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
   // DICOM folders contain other files as well, and DICOM files without that extension.

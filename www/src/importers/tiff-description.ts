@@ -1,16 +1,19 @@
 /** Parses the description of the stack in a TIFF file: OME's XML, or the lines of ImageJ. */
 
 export interface Stack {
-  /** Indices of the pages that make up the volume: z, then time. */
+  /** Indices of the pages that make up the volume: all slices of the first frame, then those of the next. */
   pages: number[];
   frames: number;
-  /** Voxel sizes along x, y and z in the stack's unit; undefined where the description has none. */
+  /** Voxel sizes along x, y and z in the description's unit of length; undefined where it has none. */
   spacing: [number | undefined, number | undefined, number | undefined];
-  /** Whether the pages' resolution tags count pixels per unit of the stack, as in ImageJ. */
+  /** Whether the pages' resolution tags count pixels per unit of length of the description, as in ImageJ. */
   perUnit: boolean;
 }
 
-/** Parses the description of a stack of `count` pages; without a description, all pages are slices of one frame. */
+/**
+ * Parses the description of a stack of `count` pages; if it is neither OME's nor ImageJ's, all pages are slices of one
+ * frame.
+ */
 export function describedIn(text: string, count: number): Stack {
   if (/<OME[\s>]/.test(text)) return fromOme(text, count);
   if (text.startsWith('ImageJ=')) return fromImageJ(text, count);
@@ -45,8 +48,8 @@ function fromImageJ(text: string, count: number): Stack {
 }
 
 /**
- * Returns the pages of the first channel, z before time, from a file that stores the dimensions in `order`, fastest
- * first. If the sizes do not fit the number of pages, all pages are slices of one frame.
+ * Returns the pages of the first channel, frame after frame, from a file that stores slices (Z), channels (C) and
+ * frames (T) in `order`, the fastest first. If the file has fewer pages than that, all pages are slices of one frame.
  */
 function ordered(sizes: Record<string, number>, order: string, count: number): Pick<Stack, 'pages' | 'frames'> {
   const { Z = 1, T = 1 } = sizes;

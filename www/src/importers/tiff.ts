@@ -8,7 +8,10 @@ import { describedIn, type Stack } from './tiff-description';
 
 const KINDS = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, Float32Array, Float64Array];
 
-/** Reads the volume from all pages, in the order of the file names; of several channels the first. */
+/**
+ * Reads the volume from all pages, in the order of the file names; of several channels the first. Throws a `Refusal` if
+ * the images cannot be read, differ in size or are in colour.
+ */
 export async function readStack(files: NamedBytes[]): Promise<VolumeInit> {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
   const pages = (await Promise.all(byName.map(pagesOf))).flat();
@@ -56,15 +59,15 @@ async function valuesOf(plane: GeoTIFFImage, k: number): Promise<VoxelArray> {
   return values as VoxelArray;
 }
 
-/** Returns a field of a page; undefined if there is none of that name. */
+/** Returns the value of a page's tag; undefined if the page has none of that name. */
 async function tagOf(page: GeoTIFFImage, name: 'ImageDescription' | 'XResolution' | 'YResolution'): Promise<unknown> {
   const directory = page.getFileDirectory();
   return directory.hasTag(name) ? directory.loadValue(name) : undefined;
 }
 
 /**
- * Returns the voxel size along x, y and z: from the stack's description, else from the page's resolution if it is in
- * the stack's unit (scanners store that of paper), else 1.
+ * Returns the voxel size along x, y and z: from the description, else 1 along z and, along x and y, the page's
+ * resolution if it counts pixels per unit of the description (scanners store that of paper), else 1.
  */
 async function pixelSize(page: GeoTIFFImage, { spacing, perUnit }: Stack): Promise<[number, number, number]> {
   const resolution = async (tag: 'XResolution' | 'YResolution') => {

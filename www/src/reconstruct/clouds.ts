@@ -5,12 +5,12 @@ import type { Cloud } from './protocol';
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
 
 /**
- * Standard deviation of the points' distance from their surface, relative to shapes about 1 in size; some shapes use a
- * fraction of it.
+ * Standard deviation of the points' distance from their surface, in the units of the shapes, which are about 1 in size;
+ * some shapes use a fraction of it.
  */
 const NOISE = 0.02;
 
-/** Returns a generator of pseudo-random numbers from 0 to 1 (mulberry32). */
+/** Returns a generator of pseudo-random numbers from 0 to below 1 (mulberry32). */
 export function seeded(seed: number): () => number {
   let state = seed;
   return () => {
@@ -21,7 +21,7 @@ export function seeded(seed: number): () => number {
   };
 }
 
-/** Returns a normally distributed number of standard deviation 1 (Box and Muller). */
+/** Returns a normally distributed number of mean 0 and standard deviation 1 (Box and Muller). */
 function gauss(random: () => number): number {
   return Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
 }
@@ -48,8 +48,8 @@ export function computedCloud(shape: PointShape): Cloud {
 }
 
 /**
- * Samples a torus of radii 1 and 0.35; undefined for samples that are rejected to make the density uniform over the
- * area.
+ * Returns a random point near a torus of radii 1 and 0.35; undefined for samples that are rejected to make the density
+ * uniform over the area.
  */
 function onTorus(random: () => number): Vec3 | undefined {
   const [around, across] = [2 * Math.PI * random(), 2 * Math.PI * random()];
@@ -60,7 +60,7 @@ function onTorus(random: () => number): Vec3 | undefined {
   return [out * Math.cos(around), out * Math.sin(around), thick * Math.sin(across)];
 }
 
-/** Samples one of two spheres of radius 0.6, apart from each other. */
+/** Returns a random point near one of two spheres of radius 0.6, apart from each other. */
 function onTwoBalls(random: () => number): Vec3 {
   const [x, y, z] = direction(random);
   const radius = 0.6 + 0.5 * NOISE * gauss(random);
@@ -76,8 +76,8 @@ function direction(random: () => number): Vec3 {
 }
 
 /**
- * Samples the three faces at one corner of a cube that a scanner in front of the corner sees, with noise along its
- * rays.
+ * Returns a random point near the three faces of a cube that a scanner in front of their common corner sees, with noise
+ * along its rays.
  */
 function onCorner(random: () => number): Vec3 {
   const [u, v, face] = [random(), random(), Math.floor(3 * random())];
@@ -90,8 +90,8 @@ function onCorner(random: () => number): Vec3 {
 }
 
 /**
- * Samples a sphere: densely on one side, sparsely on the other, not at all at the top and bottom. Undefined for
- * rejected samples.
+ * Returns a random point near a sphere of radius 1: dense on one side, sparse on the other, none at the top and bottom.
+ * Undefined for rejected samples.
  */
 function onUnevenBall(random: () => number): Vec3 | undefined {
   const [x, y, z] = direction(random);

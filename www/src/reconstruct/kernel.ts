@@ -8,10 +8,13 @@ export interface KernelParams {
   sigma: number;
 }
 
-/** Radius, as a multiple of τ, below which φ(0) replaces the closed form, which loses its digits there. */
+/**
+ * Distance r, as a multiple of τ, below which the multi-order kernel uses its value at 0: the closed form loses its
+ * digits there.
+ */
 const SMALL_R = 1e-4;
 
-/** Returns the kernel and its constants from the method's parameters, with defaults for missing ones. */
+/** Returns the radial basis function and its constants from the method's parameters, with defaults for missing ones. */
 export function kernelParams(params: ParamValues): KernelParams {
   const number = (name: string, otherwise: number) => (typeof params[name] === 'number' ? params[name] : otherwise);
   return {
@@ -22,7 +25,7 @@ export function kernelParams(params: ParamValues): KernelParams {
   };
 }
 
-/** Returns φ(r) of the kernel chosen in the parameters. */
+/** Returns the value φ(r) of the chosen radial basis function at the distance `r`. */
 export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): number {
   switch (kernel) {
     case 'thin-plate':
@@ -36,7 +39,10 @@ export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): num
   }
 }
 
-/** Returns φ(r) of the multi-order kernel: equation 6 of the paper in real form, with δ and τ squared in the energy. */
+/**
+ * Returns the value φ(r) of the multi-order radial basis function at the distance `r`: equation 6 of the paper in real
+ * form, with δ and τ squared in the energy.
+ */
 function multiOrder(delta: number, tau: number, r: number): number {
   if (r < SMALL_R * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));
   const a = Math.sqrt(1 + 2 * delta * tau) / (2 * tau);
@@ -44,7 +50,10 @@ function multiOrder(delta: number, tau: number, r: number): number {
   return (1 - (even + (r * odd) / (4 * a * tau * tau))) / (4 * Math.PI * delta * delta * r);
 }
 
-/** Returns e^(−ar) times cosh(br) and sinh(br)/(br), or times cos(br) and sin(br)/(br) if b² = `square` is negative. */
+/**
+ * Returns the two decaying terms of the multi-order function: e^(−ar) times cosh(br) and sinh(br)/(br), or times
+ * cos(br) and sin(br)/(br) if b² = `square` is negative.
+ */
 function damped(square: number, a: number, r: number): [number, number] {
   const b = Math.sqrt(Math.abs(square));
   const fall = Math.exp(-a * r);

@@ -40,7 +40,7 @@ export function toPointEdits({ added, removed, outside }: Edits): Required<Point
   };
 }
 
-/** Returns the loaded points without the removed and with the added ones. */
+/** Returns the loaded points without the removed ones, followed by the added ones. */
 export function applyEdits(points: Float32Array, { added, removed }: Edits): Float32Array {
   if (added.length + removed.length === 0) return points;
   const gone = new Set(removed);
@@ -57,12 +57,18 @@ const QUANTITIES: Record<PointQuantity, (model: ImplicitSurface, points: Float32
   distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
 };
 
-/** Returns the values of a quantity at the vertices. `points` are the points in use, after edits. */
+/**
+ * Returns the values of a quantity at the vertices, to colour the surface by. `points` are the points in use, after
+ * edits.
+ */
 export function valuesFor(model: ImplicitSurface, points: Float32Array, quantity: PointQuantity): Float32Array {
   return QUANTITIES[quantity](model, points);
 }
 
-/** Returns the level of f at which the surface is extracted: 0, or the mean of f over the surface constraints. */
+/**
+ * Returns the level of the fitted function f at which the surface is extracted: 0, or the mean of f over the surface
+ * constraints.
+ */
 export function levelOf(model: ImplicitSurface): number {
   if (model.params.level === 'zero') return 0;
   const values = model.evaluate(model.constraints().surface);
@@ -70,8 +76,8 @@ export function levelOf(model: ImplicitSurface): number {
 }
 
 /**
- * Returns the dimensions of a grid around the points with nearly cubic voxels, `size` of them along the longest side
- * and at least `LEAST_DIM` along the others.
+ * Returns the dimensions of a grid around the points with nearly cubic voxels: `size` of them along the longest side,
+ * and at least `LEAST_DIM` along each.
  */
 export function cubicDims(points: Float32Array, size: number): Vec3 {
   const sides = [0, 1, 2].map((axis) => {
@@ -83,8 +89,8 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
 }
 
 /**
- * Collects the facts about the fit that the page displays; distances from the surface only if `complete`, that is, if
- * there is a complete surface.
+ * Collects the facts about the fit that the page displays. `complete` tells whether there is a complete surface; only
+ * then the distances of the points from it are included.
  */
 export function fitOf(model: ImplicitSurface, residual: number, complete: boolean): Fit {
   const { surface, exterior } = model.constraints();

@@ -2,7 +2,7 @@
 
 /** Target mean number of points per occupied cell: with fewer many cells are empty, with more searches take longer. */
 const PER_CELL = 4;
-/** Largest number of cells along a side of the grid. */
+/** Largest length of the longest side of the grid, in cells; points on its far border take one more. */
 const MOST_CELLS = 96;
 
 /** Points sorted into the cells of a uniform grid. */
@@ -12,7 +12,8 @@ class PointGrid {
   readonly #dims = [1, 1, 1];
   readonly #cell: number;
   /**
-   * Index into the list of points, sorted by cell, of the first point of each cell; one final entry is their number.
+   * For each cell, the place in the list (of point indices, sorted by cell) of its first point; a final entry holds the
+   * number of points.
    */
   readonly #begin: Uint32Array;
   readonly #list: Uint32Array;
@@ -42,8 +43,8 @@ class PointGrid {
   }
 
   /**
-   * Returns the distance from a position to its nearest point: searches shell by shell around its cell, until no nearer
-   * point can follow.
+   * Returns the distance from the position at `offset` in packed `positions` to its nearest point: searches shell by
+   * shell around its cell, until no nearer point can follow.
    */
   distance(positions: Float32Array, offset: number): number {
     const centre = [0, 1, 2].map((axis) => this.#index(positions[offset + axis] ?? 0, axis));

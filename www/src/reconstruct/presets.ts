@@ -14,7 +14,10 @@ export type Count = number | readonly [least: number, most: number];
 export interface CloudOutcome {
   components: Count;
   genus: Count;
-  /** Mean of |H| over the vertices, per unit of length of the points; tests allow a deviation of 10 %. */
+  /**
+   * Mean of the absolute mean curvature |H| over the vertices, in 1 / the points' unit; tests allow a deviation of 10
+   * %.
+   */
   meanCurvature?: number;
   /** Mean distance of the points from the surface, in the points' units; tests allow a deviation of 10 %. */
   fitness?: number;

@@ -27,11 +27,11 @@ export type { Failure, Fitness, MeshFormat, NamedBytes, ParamSpec, ParamValues, 
 export interface Cloud {
   points: Float32Array;
   normals?: Float32Array;
-  /** rgb, 0..1. */
+  /** Colours of the points, rgb in 0..1. */
   colors?: Float32Array;
 }
 
-/** A camera that the points were made from, with its photograph if there is one. */
+/** The camera of a photograph that the points were computed from, with the photograph if there is one. */
 export interface CameraView {
   /** 3 × 4 projection from world to pixel coordinates, row-major. */
   projection: number[];
@@ -117,12 +117,15 @@ export interface Requests {
   setEdits: { body: Edits; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
   /**
-   * Samples f on a grid, `size` voxels along the longest side, as NIfTI; also replies with the level the surface is
-   * extracted at.
+   * Samples the fitted function f on a grid around the points, `size` voxels along the longest side, as NIfTI; also
+   * replies with the level of f at which the surface is extracted.
    */
   volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };
   quantity: { body: PointQuantity | undefined; reply: undefined };
-  /** Times solves with subsamples of the present points of each size and kernel; undefined if cancelled. */
+  /**
+   * Times solves with subsamples of the loaded points, without edits, of each size and with each kernel; undefined if
+   * cancelled.
+   */
   timing: { body: { sizes: number[]; kernels: string[] }; reply: Timing[] | undefined };
   cancelTiming: { body: undefined; reply: undefined };
 }
@@ -151,7 +154,9 @@ export interface MeasuredEvent {
   measures?: Measures;
   fit: Fit;
 }
-/** The points in use as surface constraints, and the exterior constraints; both packed xyz. */
+/**
+ * Positions of the surface constraints, which are the points in use, and of the exterior constraints; both packed xyz.
+ */
 export interface ConstraintsEvent {
   event: 'constraints';
   surface: Float32Array;

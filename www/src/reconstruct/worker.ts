@@ -48,7 +48,7 @@ class Session {
   #previewedAt = 0;
   /** Whether the page has drawn the last surface it was sent. */
   #shown = true;
-  /** Version of the complete mesh that was sent last; empty if there is none. */
+  /** Version of the complete mesh that was sent last; empty if there is none or it must be sent again. */
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
@@ -212,7 +212,7 @@ class Session {
     if (!this.#run) this.#showSurface();
   }
 
-  /** Sends a preview of the surface, unless the page has not drawn the last one yet. */
+  /** Sends a preview of the surface if it has triangles, unless the page has not drawn the last one yet. */
   #preview(): void {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
@@ -224,7 +224,7 @@ class Session {
     }
   }
 
-  /** Sends the complete surface, unless the page has it already. */
+  /** Sends the complete surface, if there is one that the page does not have already. */
   #showSurface(): void {
     const model = this.#model;
     if (!model || model.mesh.vertexCount === 0) return;

@@ -47,7 +47,10 @@ export function turnedAbout(ellipsoid: ControlEllipsoid, place: Vec3, about: Vec
   return { center: added(place, rotated(arm, about, angle)), axes };
 }
 
-/** Returns the ellipsoid with each semi-axis scaled by the absolute value of its factor, at least `LEAST_FACTOR`. */
+/**
+ * Returns the ellipsoid with each semi-axis multiplied by the absolute value of its factor or, if that is less, by
+ * `LEAST_FACTOR`.
+ */
 export function scaled({ center, axes }: ControlEllipsoid, factors: Vec3): ControlEllipsoid {
   const longer = axes.map((axis, k) => times(axis, Math.max(LEAST_FACTOR, Math.abs(factors[k] ?? 1))));
   return { center, axes: longer as ControlEllipsoid['axes'] };
@@ -61,7 +64,7 @@ export function withLengths(ellipsoid: ControlEllipsoid, lengths: Vec3): Control
 
 /**
  * Interpolates between two ellipsoids, `t` from 0 to 1: the centre linearly, the axes by a rotation, the lengths
- * geometrically.
+ * geometrically. Values of `t` outside give the nearer one.
  */
 export function between(from: ControlEllipsoid, to: ControlEllipsoid, t: number): ControlEllipsoid {
   if (t <= 0) return from;

@@ -16,7 +16,7 @@ export interface SculptExample {
   detail?: ExampleMesh;
   base?: ExampleMesh;
   up: 'y' | 'z';
-  /** Ellipsoids at the start; if undefined, they are fitted to the mesh. */
+  /** Ellipsoids at the start; if undefined, they are fitted to the mesh, or a unit ball without a mesh. */
   start?: Pose;
   /** Names of the ellipsoids, in the order of `start`. */
   names?: string[];

@@ -29,7 +29,7 @@ function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): Contr
 }
 
 /**
- * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless
+ * Largest displacement of an ellipsoid's centre per frame of a glide, as a share of its shortest semi-axis, unless
  * `MAX_GLIDE_FRAMES` limits the number of frames. Steps of the model itself are longer.
  */
 const GLIDE_STEP = 0.4;
@@ -49,7 +49,7 @@ export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): Control
   return Array.from({ length: frames }, (_, i) => to.map((one, k) => between(from[k] ?? one, one, (i + 1) / frames)));
 }
 
-/** Blobs that rise and sink past each other: rounds per period, initial phase, sideways offset and radius. */
+/** Blobs that rise and sink past each other: rises per period, initial phase in radians, sideways offset and radius. */
 const BLOBS = [
   { rounds: 1, phase: 0, aside: -0.35, radius: 0.62 },
   { rounds: 2, phase: 1.9, aside: 0.4, radius: 0.42 },

@@ -14,8 +14,8 @@ const FILL = 0.9;
 const MIN_SEMI_AXIS = 0.03;
 
 /**
- * Returns a row of ellipsoids from one end of the mesh to the other; their number is 1.5 times its length over its
- * width, between 1 and `MAX_ELLIPSOIDS`.
+ * Returns a row of ellipsoids from one end of the mesh to the other along its longest principal axis; their number is
+ * 1.5 times its length over its width, rounded, between 1 and `MAX_ELLIPSOIDS`.
  */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
@@ -38,7 +38,7 @@ export function fitted(mesh: Mesh): ControlEllipsoid[] {
 
 /**
  * Returns the centre and semi-axes, in principal coordinates, of an ellipsoid for the vertices with `from` ≤ x ≤ `to`.
- * `least` bounds its width from below; `isWhole` tells that these are all vertices.
+ * `least` is the least length of the semi-axes along y and z; `isWhole` tells that these are all vertices.
  */
 function sliceEllipsoid(local: Float32Array, [from, to]: [number, number], isWhole: boolean, least: number) {
   const sums = [0, 0, 0, 0, 0];

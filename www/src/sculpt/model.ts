@@ -110,7 +110,10 @@ export function valuesFor(model: MultiresolutionModel, quantity: SculptQuantity)
   return (quantity === 'area distortion' ? area : angle).map(Math.log2);
 }
 
-/** Collects the facts about the map T and the detail that the page displays. */
+/**
+ * Collects the facts that the page displays about the detail and the map T, which takes the deformed base to the
+ * undeformed one.
+ */
 export function factsOf(model: MultiresolutionModel): Facts {
   const { bandCount: bands, folded, unmatchedVertices: missed, heldVertices: held } = model;
   const { area, angle } = model.distortion();

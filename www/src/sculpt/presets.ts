@@ -272,7 +272,7 @@ export function posesOf(example: SculptExample | undefined): Pose[] {
 
 /**
  * Returns the first variant of a figure whose pose and parameters are all in force, if there is one; parameters that it
- * does not set must equal `usual`.
+ * does not set must have the values in `usual`, those with which the figure opens.
  */
 export function variantInForce(
   preset: SculptPreset,

@@ -18,7 +18,10 @@ export class Preview {
     return this.#saved !== undefined;
   }
 
-  /** Adjusts the model before a step; `durationMs` is the duration of the last step in milliseconds. */
+  /**
+   * Adjusts the model before a step. `motion`: whether the pointer drags ellipsoids or, with `path`, they move by
+   * themselves; `durationMs`: duration of the last step in milliseconds.
+   */
   prepare(model: MultiresolutionModel, motion: 'none' | 'path' | 'drag', durationMs: number): void {
     if (motion === 'none') this.end(model);
     else if (motion === 'drag' && !this.#coarse && durationMs > SLOW_FRAME_MS) this.#coarsen(model);

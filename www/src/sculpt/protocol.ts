@@ -39,7 +39,7 @@ export type {
 /** All ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
-/** Source of a mesh: a file, or a computed shape. */
+/** Source of a mesh: a file with its texture, if any, or a computed shape. */
 export type MeshSource = { file: NamedBytes; texture?: MeshTexture } | { shape: ComputedMesh };
 
 /** Meshes that a model is built from; with neither detail nor base it is a membrane over the ellipsoids alone. */
@@ -82,8 +82,8 @@ export interface OpenedScene extends Ready {
 }
 
 /**
- * The meshes displayed: the result, the base, both of them, a row with all stages of figure 1, the solver's levels, or
- * stages of restructuring.
+ * The meshes displayed: the result, the base, both of them, a row with all stages of figure 1, the meshes of the
+ * membrane's solver from coarse to fine, or stages of restructuring.
  */
 export type Layout = 'result' | 'base' | 'pair' | 'row' | 'levels' | 'stages';
 
@@ -115,17 +115,26 @@ export interface SavedPose {
   frame: number;
 }
 
-/** Facts about the map T and the detail, beyond the measures of the mesh. */
+/**
+ * Facts about the detail and the map T, which takes the deformed base to the undeformed one; beyond the measures of the
+ * mesh.
+ */
 export interface Facts {
   bands: number;
   folded: number;
   missed: number;
   held: number;
-  /** 5th percentile of the area distortion: area on the undeformed base over that on the deformed base. */
+  /**
+   * Area distortion of the map T (area on the undeformed base over that on the deformed base): 5th percentile over the
+   * vertices.
+   */
   areaLow: number;
-  /** 95th percentile of the area distortion: area on the undeformed base over that on the deformed base. */
+  /**
+   * Area distortion of the map T (area on the undeformed base over that on the deformed base): 95th percentile over the
+   * vertices.
+   */
   areaHigh: number;
-  /** 95th percentile of the angle distortion: largest over smallest stretch. */
+  /** Angle distortion of the map T (largest over smallest stretch): 95th percentile over the vertices. */
   angleHigh: number;
 }
 
@@ -135,7 +144,7 @@ export interface Requests {
   open: { body: { source: SceneSource; setup: Setup }; reply: OpenedScene };
   /** Builds a new model of the same meshes. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
-  /** Loads a film at a frame, without playing it. */
+  /** Loads a film at a frame, at most its last one, without playing it. */
   film: { body: { film: Film | undefined; frame: number }; reply: undefined };
   /**
    * Plays the film from its present frame, or from the start if it is at its end; without a film, runs until the model
@@ -167,7 +176,7 @@ export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: 
 export interface ShownMessage {
   kind: 'shown';
 }
-/** Sets the target pose of the ellipsoids; has no reply. */
+/** Sets the target pose of the ellipsoids: at once during a drag, else by a glide of several frames; has no reply. */
 export interface PoseMessage {
   kind: 'pose';
   pose: Pose;
@@ -184,14 +193,17 @@ export interface FrameEvent {
   result: Surface;
   /** The deformed base, unless the layout is only the result. */
   base?: Surface;
-  /** The map T: the vertices of the base at their positions on the undeformed base; in the layout `row`. */
+  /**
+   * The map T as a surface: the triangles of the base, with its vertices at their positions on the undeformed base.
+   * Sent in the layout `row`.
+   */
   link?: Surface;
   /** The solver's meshes from coarse to fine, if the layout includes them. */
   levels?: Stage[];
   reports: StepReport[];
   /** Present ellipsoids; removed ones that are still shrinking follow at the end. */
   ellipsoids: Pose;
-  /** Pose that the ellipsoids move to. */
+  /** Pose that the ellipsoids move to, at the end of a glide if there is one. */
   pose: Pose;
   /** Number of the last pose received before this step. */
   poseId: number;
@@ -205,7 +217,10 @@ export interface FrameEvent {
    */
   preview: boolean;
 }
-/** Measures and facts, sent when the model has converged or was stopped. */
+/**
+ * Measures of the mesh, and facts about the map and the detail; sent when the model has converged or was stopped, and
+ * after single steps.
+ */
 export interface MeasuredEvent {
   event: 'measured';
   measures: Measures;

@@ -8,7 +8,10 @@ import type { Stage, StageKind, Surface } from './protocol';
 /** Largest number of solver levels displayed side by side. */
 const MAX_MESHES = 5;
 
-/** Returns the meshes that the membrane was solved on, from coarse to fine; the finest ones if there are too many. */
+/**
+ * Returns the meshes that the membrane was solved on, from coarse to fine; only the `MAX_MESHES` finest ones if there
+ * are more.
+ */
 export function levelsOf(model: MultiresolutionModel): Stage[] {
   const levels = model.levelMeshes();
   try {
@@ -24,8 +27,8 @@ function sizeOf(mesh: Mesh): string {
 }
 
 /**
- * Returns a mesh with its caption: the number of triangles, and the quality below which a share `WORST_SHARE` of them
- * lies; 1 is equilateral.
+ * Returns a mesh with a caption: `name`, the number of triangles, and the quality below which a share `WORST_SHARE` of
+ * them lies; 1 is equilateral.
  */
 function withCaption(mesh: Mesh, name: string): Stage {
   const surface = surfaceOf(mesh);
@@ -41,8 +44,8 @@ function withCaption(mesh: Mesh, name: string): Stage {
 const WORST_SHARE = 0.05;
 
 /**
- * Returns the quality of each triangle: its area over that of an equilateral triangle with the same mean squared edge
- * length.
+ * Returns the quality of each triangle, from 0 to 1: its area over that of an equilateral triangle with the same mean
+ * squared edge length.
  */
 function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   return Float32Array.from({ length: triangles }, (_, triangle) => {
@@ -55,7 +58,7 @@ function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   });
 }
 
-/** Edge length of the deformed ball, which has radius 1. */
+/** Edge length of the ball before its deformation; its radius is 1. */
 const EDGE = 0.16;
 /** Rounds of restructuring after which hardly any edge is out of bounds. */
 const ROUNDS = 6;
@@ -106,8 +109,8 @@ function restructured(mesh: Mesh): Stage[] {
 const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 
 /**
- * Returns the stages of figure 6: after each pass in turn, then after further rounds of all passes, when hardly any
- * edge is out of bounds.
+ * Returns the stages of figure 6: the deformed ball, the ball after each pass in turn, and after further rounds of all
+ * passes, when hardly any edge is out of bounds.
  */
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();

@@ -260,7 +260,7 @@ class Session {
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
   }
 
-  /** Sets parameters and returns the values of all; ends a preview before. */
+  /** Ends a preview, then sets parameters; returns the values of all. */
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     this.#preview.end(model);

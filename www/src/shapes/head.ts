@@ -47,7 +47,10 @@ function depthInEllipsoid([x, y, z]: readonly [number, number, number], [a, b, c
   return slope > 0 ? (1 - level) / slope : a;
 }
 
-/** Returns the largest depth of a point inside any opening of the skull, voxels; negative outside all of them. */
+/**
+ * Returns the largest depth of a point inside any opening of the skull, voxels; negative outside all of them, −∞ behind
+ * all.
+ */
 function depthInOpenings(at: readonly [number, number, number]): number {
   return OPENINGS.reduce((deepest, { direction, radius }) => {
     const along = at[0] * direction[0] + at[1] * direction[1] + at[2] * direction[2];

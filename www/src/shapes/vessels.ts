@@ -66,8 +66,8 @@ function unit(v: Point): Point {
 }
 
 /**
- * Draws a capsule into the volume: `strength` becomes the maximum of its value and the capsule's, 0 to 1. Visits only
- * the voxels around the capsule.
+ * Draws a vessel segment with round ends into the volume: each value of `strength`, 0 to 1, becomes the maximum of
+ * itself and the segment's. Visits only the voxels around the segment.
  */
 function draw({ from, to, radius }: Segment, strength: Float32Array): void {
   const reach = radius + 2;

@@ -31,7 +31,10 @@ export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Ve
   return { low, high };
 }
 
-/** Returns the opposite corners, in world coordinates, of a box of voxels. */
+/**
+ * Returns the opposite corners, in world coordinates, of a box of voxels; `affine` maps voxel indices to world
+ * coordinates.
+ */
 export function boxOf({ low, high }: VoxelBox, affine: ArrayLike<number>): Box {
   return {
     min: toWorld(affine, low.map((at) => at - RIM) as Vec3),

@@ -100,7 +100,10 @@ function connected(
   return edges;
 }
 
-/** Convolves with a Gaussian, first along rows, then along columns; the border is padded with the nearest values. */
+/**
+ * Convolves an image with a Gaussian, first along rows, then along columns; the border is padded with the nearest
+ * values.
+ */
 function smoothed({ width, height, values }: GreyImage, deviation: number): Float32Array {
   const radius = Math.ceil(3 * deviation);
   const kernel = Array.from({ length: 2 * radius + 1 }, (_, i) =>

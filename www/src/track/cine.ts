@@ -7,7 +7,10 @@ export interface CineSpec {
   frames: number;
   /** Standard deviation of the noise, in intensity units; blood is 110 brighter than muscle. */
   noise: number;
-  /** Half the length of the long axis, mm; all other lengths scale with it. */
+  /**
+   * Long half axis, mm, of the ellipsoid that forms the cavity in diastole, before its top is cut off; all other
+   * lengths scale with it.
+   */
   size: number;
   /** Whether the cavity contains two papillary muscles; the gaps between them and the wall close in systole. */
   papillary: boolean;
@@ -19,11 +22,11 @@ const BLOOD = 200;
 const MUSCLE = 90;
 /** Intensity of lung before noise. */
 const LUNG = 45;
-/** Long half axis, mm, of the heart for which the other lengths in this file hold; they scale with `size`. */
+/** Value of `size`, mm, for which the other lengths in this file hold. */
 const REFERENCE_HALF_AXIS = 42;
 /** Number of samples through the thickness of a slice, averaged for the partial volume effect. */
 const SAMPLES = 3;
-/** Edge of the cells that the true volume is integrated over, mm for a heart of half axis `REFERENCE_HALF_AXIS`. */
+/** Edge of the cells that the true volume is integrated over, mm for a heart whose `size` is `REFERENCE_HALF_AXIS`. */
 const INTEGRATION_STEP = 1.5;
 
 /** Returns the contraction in a frame: 0 in diastole, 1 in systole. */
@@ -33,7 +36,7 @@ export function contraction({ frames }: CineSpec, frame: number): number {
   return rise(phase / 0.35) - 0.92 * rise((phase - 0.35) / 0.3) - 0.08 * rise((phase - 0.65) / 0.35);
 }
 
-/** Returns the centre of the image in world coordinates, where the ventricle lies. */
+/** Returns the centre of the image in world coordinates, mm; the ventricle is placed around it. */
 export function centreOf({ dims, spacing }: CineSpec): Vec3 {
   return dims.map((n, k) => ((n - 1) / 2) * (spacing[k] ?? 1)) as Vec3;
 }
@@ -73,7 +76,10 @@ function smoothMax(a: number, b: number, width: number): number {
   return Math.max(a, b) + near * near * width * 0.25;
 }
 
-/** Returns the voxels of all frames, x fastest; the noise is that of magnitude images, and the same at every call. */
+/**
+ * Returns the voxels of all frames, x fastest. The noise is that of magnitude images (Rician), and the same at every
+ * call.
+ */
 export function cineVoxels(spec: CineSpec): Uint8Array {
   const [nx, ny, nz] = spec.dims;
   const voxels = new Uint8Array(nx * ny * nz * spec.frames);

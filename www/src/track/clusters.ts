@@ -11,7 +11,7 @@ const MAX_ITERATIONS = 10;
 
 /** Result of 2-means on the values of a window. */
 export interface Clusters {
-  /** Mean of the dark cluster, and of the bright one, in intensity units. */
+  /** Mean of the dark cluster, then of the bright one, in intensity units. */
   means: [number, number];
   /** 1 for each value in the bright cluster, else 0. */
   bright: Uint8Array;
@@ -41,8 +41,8 @@ export function twoMeans(values: ArrayLike<number>): Clusters {
 }
 
 /**
- * Tests whether a window contains a boundary: both clusters are large enough, and their means differ by more than
- * `threshold`.
+ * Tests whether a window contains a boundary: each cluster has more than `MIN_SHARE` of the pixels, and their means
+ * differ by more than `threshold`.
  */
 export function hasBoundary({ means, bright }: Clusters, threshold: number): boolean {
   const share = bright.reduce((sum, one) => sum + one, 0) / bright.length;

@@ -7,7 +7,10 @@ import { buildTracker, prepare } from './source';
 
 type OnProgress = (part: number, phase: string) => void;
 
-/** Prepares the image, tracks all frames with `setup` and returns the results. Undefined if the signal aborts. */
+/**
+ * Prepares the image, tracks all frames with `setup` and returns the results for the comparison. Undefined if the
+ * signal aborts.
+ */
 export async function trackForComparison(
   original: Volume,
   spec: CineSpec | undefined,

@@ -1,7 +1,9 @@
 /** Intersects a surface with a plane, and the resulting segments with a row of a picture. */
 import type { Plane, Surface } from '../protocol';
 
-/** Returns the cross-section of a surface with a plane, as segments: pairs of points, packed xyz. */
+/**
+ * Returns the cross-section of a surface with a plane, as segments: pairs of points in world coordinates, packed xyz.
+ */
 export function crossSection(
   { positions, indices, vertices, triangles }: Surface,
   { origin, normal }: Plane,

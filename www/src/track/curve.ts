@@ -2,19 +2,22 @@
 import type { FrameStatistics } from './protocol';
 
 export interface Beat {
-  /** Frame of the largest volume. */
+  /** Number of the frame with the largest volume. */
   diastole: number;
-  /** Frame of the smallest volume. */
+  /** Number of the frame with the smallest volume. */
   systole: number;
-  /** The largest volume. */
+  /** The largest volume, in the unit of the volumes evaluated. */
   largest: number;
-  /** The smallest volume. */
+  /** The smallest volume, in the unit of the volumes evaluated. */
   smallest: number;
-  /** Ejection fraction: (largest − smallest) / largest. */
+  /** Ejection fraction, 0 to 1: (largest − smallest) / largest. */
   ejection: number;
 }
 
-/** Evaluates the volumes of all frames. Undefined for fewer than two. */
+/**
+ * Returns the largest and smallest of the volumes of all frames, their frames, and the ejection fraction. Undefined for
+ * fewer than two frames.
+ */
 export function beatOf(volumes: readonly number[]): Beat | undefined {
   if (volumes.length < 2) return undefined;
   const [largest, smallest] = [Math.max(...volumes), Math.min(...volumes)];
@@ -23,7 +26,8 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
 }
 
 /**
- * Largest share of folded triangles in a frame, which face away from all their neighbours; above it a warning is shown.
+ * Largest share of folded triangles in a frame, which face away from the sum of their three neighbours; above it a
+ * warning is shown.
  */
 export const MAX_FOLDED_SHARE = 0.01;
 /**
@@ -41,8 +45,8 @@ export interface FrameWarning {
 type CheckedFacts = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
 
 /**
- * Returns a warning for each frame with too many folded triangles or an unexpected area: such frames are suspicious
- * even if their volume and error are plausible.
+ * Returns a warning for each frame with too many folded triangles or, after the first, an unexpected area: such frames
+ * are suspicious even if their volume and error are plausible.
  */
 export function warningsOf(facts: readonly CheckedFacts[]): FrameWarning[] {
   return facts.flatMap(({ folded, triangles, area, volume }, frame) => {

@@ -138,8 +138,8 @@ export function isTrackPreset(example: TrackExample | undefined): example is Tra
 }
 
 /**
- * Returns the first variant of a figure whose parameters are all in force, if there is one; parameters that it does not
- * set must equal `usual`.
+ * Returns the first variant of a figure whose parameters are all in force, if there is one; parameters of the figure,
+ * `usual`, that it does not set must be in force, too. Other parameters are ignored.
  */
 export function variantInForce(preset: TrackPreset, params: ParamValues, usual: ParamValues): TrackVariant | undefined {
   return preset.variants.find((one) =>

@@ -76,7 +76,7 @@ export interface Setup {
    * largest.
    */
   at: Vec3 | undefined;
-  /** Parameters set by the user; the tracker derives all others from the image. */
+  /** Parameters set by the user; the others have the tracker's defaults, some of which it derives from the image. */
   params: ParamValues;
 }
 
@@ -94,7 +94,7 @@ export interface Ready {
   suggested: number;
   /** Estimated standard deviation of the noise, in intensity units. */
   noise: number;
-  /** The image as prepared, with the voxels of all frames; undefined if unchanged. */
+  /** The image as prepared, with the voxels of all frames; undefined if unchanged, and in the reply to `restore`. */
   volume: VolumeView | undefined;
 }
 
@@ -118,8 +118,9 @@ export interface SavedTrack {
 }
 
 /**
- * Boundary votes of a frame: positions of voxel faces in world coordinates, packed xyz, and for each the fraction of
- * windows that separate its two voxels. Includes faces to the next frame.
+ * Boundary votes of a frame: positions of the faces between two voxels in world coordinates, packed xyz, and for each
+ * the fraction of windows that separate its two voxels. Includes the faces between a voxel and itself in the next
+ * frame.
  */
 export interface BoundaryVotes {
   frame: number;
@@ -140,7 +141,7 @@ export interface InterpolatedSlice {
   rmsError: { linear: number; flow: number };
 }
 
-/** The setting that a comparison changes: toggles the prediction, or uses another method of inserting slices. */
+/** The change that a comparison makes to the setup: toggles the prediction, or inserts slices by another method. */
 export type Alternative = 'prediction' | Enrichment;
 
 /** Result of a run through all frames, for comparison. */
@@ -194,7 +195,7 @@ export interface TrackedFrame {
   error: SurfaceError | undefined;
 }
 
-/** Step of the preparation of the image that begins, in words for the status line. */
+/** Sent when a step of preparing the image begins; `what` names the step in words for the status line. */
 export interface PreparingEvent {
   event: 'preparing';
   what: string;

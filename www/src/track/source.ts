@@ -29,8 +29,8 @@ export async function openImage(source: ImageSource): Promise<Volume> {
 }
 
 /**
- * Groups files by frame, in the order of their names: each header together with its data files. A single header takes
- * all data files.
+ * Groups files by frame, in the order of their names: each header, or file with all in one, together with the data
+ * files of its name. A single header takes all data files.
  */
 export function framesOf(files: NamedBytes[]): NamedBytes[][] {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
@@ -86,7 +86,7 @@ export function prepare(image: Volume, preparation: Preparation, onStage: (what:
 
 /**
  * Returns the binning factors along the voxel axes, 1 across slices. Slices lie across the axis with the largest
- * spacing, or the last axis if voxels are cubes.
+ * spacing, or the last of several such axes.
  */
 function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
   const across = spacing.lastIndexOf(Math.max(...spacing));

@@ -32,8 +32,8 @@ type Handlers = {
 };
 
 /**
- * Parameters that the boundary depends on. A change of any other keeps the boundary, and only the surfaces are computed
- * again.
+ * Parameters that the boundary depends on. After a change of others, only the surfaces are computed again, if the state
+ * with the boundary of all frames was saved.
  */
 const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 

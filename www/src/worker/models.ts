@@ -47,7 +47,10 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
  * needs an entry here and one in `view/shading`.
  */
 const QUANTITIES: Record<VertexQuantity, (model: DeformableModel) => Float32Array> = {
-  /** Speed along the normal as displacement per iteration, in units of δ. */
+  /**
+   * Outward speed along the normal, negative inwards, as displacement per time step in units of the sampling distance
+   * δ.
+   */
   speed: (model) => {
     const factor = model.params.timeStep / model.delta;
     return model.speeds().map((speed) => speed * factor);

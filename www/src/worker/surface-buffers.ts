@@ -9,8 +9,8 @@ import { buffersOf } from './serving';
 const CAPACITY_RATIO = 1.25;
 
 /**
- * Rounds a count up to the next capacity of a geometric sequence, so that the buffers of a growing surface fit for a
- * while, here and on the GPU.
+ * Rounds a number of vertices or triangles up to the next capacity of a geometric sequence, so that the buffers of a
+ * growing surface fit for a while, here and on the GPU.
  */
 export function capacityFor(count: number): number {
   return Math.ceil(CAPACITY_RATIO ** Math.ceil(Math.log(Math.max(1, count)) / Math.log(CAPACITY_RATIO)));

@@ -24,7 +24,10 @@ function parseFile(file: NamedBytes): Volume {
   }
 }
 
-/** Parses a volume from one file, or from a header and its data in either order; rejects any other number of files. */
+/**
+ * Parses a volume from one file, or from a header and its data in either order; throws a `Refusal` for any other number
+ * of files.
+ */
 export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
@@ -65,7 +68,10 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   };
 }
 
-/** Returns the `levels` pyramid levels coarser than the volume, the finest first, with the volume's grey scale. */
+/**
+ * Returns the `levels` pyramid levels coarser than the volume, the finest first, as grey values: `window` holds the
+ * intensities of black and white.
+ */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
   const [, ...coarser] = volume.pyramid(levels + 1);
   return coarser.map((level) => {
@@ -77,7 +83,10 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
   });
 }
 
-/** Converts the first `frames` frames to grey values, slice by slice to avoid a second full copy in floats. */
+/**
+ * Converts the first `frames` frames to grey values, slice by slice to avoid a second full copy in floats. `window`
+ * holds the intensities of black and white.
+ */
 function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
   const [nx, ny, nz] = volume.dims;
   const voxels = new Uint8Array(nx * ny * nz * frames);
