@@ -4,7 +4,7 @@ use super::order::{combined_rank, rank_f32};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
 
-/// A closed axis-aligned box.
+/// An axis-aligned box; its faces belong to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Corner with the smallest coordinates.
@@ -318,8 +318,8 @@ impl BoxTree {
     }
 }
 
-/// Builds the subtree of `items`, which it reorders, and appends its nodes to `nodes`; items are split at the median
-/// along the widest axis. `first` is the index of their first among all items of the tree.
+/// Builds the subtree of `items`, which it reorders, and appends its nodes to `nodes`; items are split at the median of
+/// their boxes' centres along the widest axis. `first` is the index of the first of them among all items of the tree.
 fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.union(item));
     let at = nodes.len();

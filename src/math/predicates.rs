@@ -24,8 +24,8 @@ fn coordinates(p: Vec3) -> Coord3D<f32> {
     Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// Returns twice the signed area of the triangle `a b c` in the plane, with an exact sign: positive if its corners are
-/// counter-clockwise, zero exactly if they are collinear.
+/// Returns twice the signed area of the triangle `a b c` in the plane: positive if its corners are counter-clockwise,
+/// zero if they are collinear. The sign is exact unless products of coordinates overflow or underflow.
 pub fn orient2d([a, b, c]: [DVec2; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(|p| Coord { x: p.x, y: p.y });
     robust::orient2d(a, b, c)

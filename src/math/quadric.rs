@@ -4,7 +4,8 @@
 use super::{DMat3, DVec3};
 use std::ops::{Add, AddAssign};
 
-/// A quadric x ↦ xᵀ A x − 2 b·x + c, with A symmetric and positive semidefinite.
+/// A quadratic function of a position x, xᵀ A x − 2 b·x + c, with A symmetric and positive semidefinite: the form of a
+/// weighted sum of squared distances to planes and points.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quadric {
     /// Diagonal entries of A: xx, yy, zz. The entries xy, yz and zx are in `mixed`.

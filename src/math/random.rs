@@ -1,6 +1,6 @@
 //! Random numbers that are the same on every platform: PCG-XSH-RR (O'Neill, 2014).
 
-/// A seeded generator of random numbers.
+/// A seeded generator of random numbers, which are the same on every platform.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 

@@ -8,8 +8,8 @@ const SWEEPS: usize = 16;
 /// Returns the eigenvalues of a symmetric matrix in ascending order, and their orthonormal eigenvectors as the columns
 /// of a rotation.
 ///
-/// Only the symmetric part of `matrix` is used. Every eigenvalue is accurate to rounding relative to the largest. A
-/// matrix with an entry that is not finite gives values that are not finite.
+/// Only the symmetric part of `matrix` is used. Every eigenvalue is accurate to rounding relative to the one with the
+/// largest absolute value. If an entry is not finite, some of the results are not.
 pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
     let (mut a, mut vectors) = ((matrix + matrix.transpose()) * 0.5, DMat3::IDENTITY);
     for _ in 0..SWEEPS {
@@ -61,7 +61,8 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix; its sign is arbitrary.
+/// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix; its sign is arbitrary. With NaN in the
+/// matrix the result is meaningless.
 pub fn least_eigenvector<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     let mut vectors = [[0.0; N]; N];
     (0..N).for_each(|k| vectors[k][k] = 1.0);

@@ -2,8 +2,8 @@
 
 use super::{DVec3, Vec3};
 
-/// Returns the cross product of two edges: a vector along the normal, which points to the side from which the corners
-/// are counter-clockwise, of twice the triangle's area.
+/// Returns the cross product of two edges: a vector along the normal, on the side from which the corners are
+/// counter-clockwise, whose length is twice the triangle's area.
 #[inline]
 pub fn area_vector([a, b, c]: [Vec3; 3]) -> DVec3 {
     let a = a.as_dvec3();
@@ -16,8 +16,9 @@ pub fn area(triangle: [Vec3; 3]) -> f64 {
     0.5 * area_vector(triangle).length()
 }
 
-/// Returns the solid angle of the triangle at `p`, from −2π to 2π; positive if `p` is behind the triangle, on the side
-/// from which its corners are clockwise. The solid angles of a closed surface sum to 4π inside and to 0 outside.
+/// Returns the solid angle of the triangle seen from `p`, in steradians, from −2π to 2π; positive if `p` is behind the
+/// triangle, on the side from which its corners are clockwise. Over a closed surface with outward triangles they sum to
+/// 4π inside and to 0 outside.
 ///
 /// Van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983.
 pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {

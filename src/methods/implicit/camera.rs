@@ -155,7 +155,7 @@ impl Camera {
     }
 }
 
-/// Accumulates a mean colour of pixels, each weighted by its share times its alpha.
+/// Accumulates a mean colour of pixels, each weighted by its alpha times a given share.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ColorMean {
     sum: Vec3,

@@ -101,7 +101,8 @@ impl Cloud {
     /// Checks that the points span a volume.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for points in one plane.
+    /// [`MethodError::InvalidArgument`] for points in one plane, or so near to one that their least standard deviation
+    /// is at most 1e-6 of their largest.
     pub fn check_span(&self) -> Result<(), MethodError> {
         let mean = self.points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / self.len() as f64;
         let (spread, _) = symmetric::eigen(self.points.iter().fold(DMat3::ZERO, |sum, p| {
@@ -138,7 +139,7 @@ pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodErr
 /// Checks that all values are finite.
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] naming the first that is not.
+/// [`MethodError::InvalidArgument`] naming the list, `name`, and its first value that is not.
 pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodError> {
     match values.iter().position(|p| !p.is_finite()) {
         Some(i) => Err(MethodError::invalid(name, format!("point {i} must be finite, got {}", values[i]))),
@@ -150,8 +151,8 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
 const MIN_SIZE: f64 = 1e-27;
 /// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
 const MAX_SIZE: f64 = 1e38;
-/// Maximum distance of the points from the origin along an axis, in longest sides of their bounding box: a cell of 1/30
-/// of a side is still as exact as needed there.
+/// Maximum distance of the points from the origin along an axis, in longest sides of their bounding box: at this
+/// distance, the smallest cell that single precision resolves is already 1/30 of a side.
 const MAX_SIZES_FROM_ORIGIN: f64 = 240.0;
 
 /// Uniform map from world units (those of the input points) into the normalised box, which is centred at the origin and
@@ -171,7 +172,7 @@ impl BoxMap {
         Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
     }
 
-    /// Returns an upper bound of the absolute coordinates of the points, in world units.
+    /// Returns an upper bound of the absolute coordinates of the points from which the map was made, in world units.
     pub fn max_coordinate(&self) -> f64 {
         self.centre.abs().max_element() + 1.0 / self.scale
     }
@@ -226,7 +227,8 @@ impl BoxMap {
     }
 }
 
-/// Returns the mean distance from a point to its nearest neighbour, estimated from at most 4000 points.
+/// Returns the mean distance from a point to its nearest neighbour, in the units of the points, estimated from at most
+/// 4000 of them; there must be at least two.
 pub fn mean_spacing(points: &[Vec3]) -> f64 {
     let tree =
         crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());
@@ -249,7 +251,8 @@ pub fn mean_spacing(points: &[Vec3]) -> f64 {
 const SPACING_SAMPLE: usize = 4000;
 
 /// Returns the indices of the points in the `keep` largest clusters, in ascending order. Points belong to one cluster
-/// if their grid cells, with edges of length `cell`, are connected by 26-neighbourhood.
+/// if their grid cells, with edges of length `cell`, are linked by a chain of cells with points that touch, even at a
+/// corner.
 pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     let clusters = clusters(points, cell);
     let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
@@ -259,8 +262,8 @@ pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     kept
 }
 
-/// Returns the indices of the points, grouped into clusters of connected grid cells with edges of length `cell`; cells
-/// are connected if they touch, even at a corner. Clusters are ordered by their lowest index.
+/// Returns the indices of the points, grouped into clusters: those of grid cells, with edges of length `cell`, that are
+/// linked by a chain of cells with points that touch, even at a corner. Clusters are ordered by their lowest index.
 fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     let cell_of = |p: &Vec3| (*p / cell).floor().to_array().map(|x| x as i32 as u32);
     let mut by_cell: Vec<([u32; 3], u32)> = points.iter().map(cell_of).zip(0..).collect();

@@ -130,7 +130,8 @@ fn fill_unseen(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
     }
 }
 
-/// Neighbours of all vertices, each listed once for every shared triangle: on a closed surface, all equally often.
+/// Lists of the neighbours of all vertices. A list names a neighbour once for every triangle that has both vertices: on
+/// a closed surface, all equally often.
 struct Neighbours {
     starts: Vec<usize>,
     all: Vec<usize>,
@@ -255,7 +256,7 @@ impl DepthBuffer {
 
     /// Returns the colour of a surface point in the camera's image, and its weight: the cosine between normal and
     /// direction to the camera, times alpha, at a silhouette times [`SILHOUETTE_WEIGHT`]. `None` if the camera does not
-    /// see the point.
+    /// see the point, or the pixels that show it are masked.
     ///
     /// Only those of the four surrounding pixels that show the surface near the point are blended. If one shows
     /// something nearer, the point counts as hidden.

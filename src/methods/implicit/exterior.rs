@@ -14,7 +14,8 @@ const SPHERE_POINTS: usize = 16;
 const SPHERE: f64 = 1.2;
 /// Number of surface points per exterior point near the surface.
 const SURFACE_POINTS: usize = 10;
-/// Minimum number of exterior points near the surface that are aimed at, for small clouds.
+/// Lower bound of the number to which exterior points near the surface are reduced; clouds of more than ten times as
+/// many points get more.
 const MIN_POINTS: usize = 30;
 /// Distance of exterior points from the surface, in mean spacings of the points, if no minimum is larger. At 1 they
 /// constrain less than noise does, at 6 they fall into cavities.
@@ -32,7 +33,8 @@ const MIN_CLEARANCE: f32 = 0.8;
 pub struct Exterior {
     /// Points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
-    /// Distance from the surface at which `near` was made, in box units; 0 if it was given.
+    /// Distance of the points in `near` from the surface points from which they were made, in box units; 0 if they were
+    /// given.
     pub offset: f32,
     /// Points on the bounding sphere.
     pub on_sphere: Vec<Vec3>,
@@ -68,9 +70,9 @@ pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
 
 /// Makes exterior points for the surface points `cloud`, whose mean distance to the nearest neighbour is `spacing`.
 ///
-/// From surface points, they are offset towards each camera that sees the point; without cameras, along the normals,
-/// given or estimated. Poisson-disc sampling reduces them to one for ten surface points, or to 30 if that is more.
-/// Points on the bounding sphere are added.
+/// They are made from an even sample of the surface points, by an offset towards each camera that sees the point, or
+/// without cameras along the normal, given or estimated. Those too near to the surface are dropped, and Poisson-disc
+/// sampling leaves at most one for ten surface points, or 30 if that is more. Points on the bounding sphere are added.
 pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let target_count = (cloud.len() / SURFACE_POINTS).max(MIN_POINTS);
     // A few more than wanted, as some will be rejected.
@@ -92,7 +94,8 @@ struct OutwardDirections {
     noise: f32,
 }
 
-/// Returns outward directions at no more than `positions` surface points.
+/// Returns outward directions at an even sample of no more than `positions` surface points: towards the cameras that
+/// see them, or without cameras along their normals.
 fn outward_directions(
     cloud: &Cloud,
     cameras: &[Camera],
@@ -127,8 +130,8 @@ fn outward_directions(
 /// different sides of a thin part.
 const ORIENTED: usize = 3000;
 
-/// Returns the directions from each surface point to the cameras that are on the outer side of its normal and not
-/// occluded.
+/// Returns the directions from each surface point in `positions`, given with its normal, to the cameras that see it:
+/// those in a direction whose cosine with the normal is above [`GRAZING`], and not occluded.
 ///
 /// Occlusion alone does not suffice, since rays slip through gaps in the far side of an object.
 fn towards_cameras(
@@ -175,7 +178,7 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
 const VOXEL: f32 = 3.5;
 /// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
 const UNTESTED_VOXELS: f32 = 1.5;
-/// Maximum number of occlusion voxels along an axis.
+/// Maximum length of the longest side of the points' bounding box, in occlusion voxels: smaller voxels are enlarged.
 const MAX_VOXELS: f32 = 256.0;
 
 /// Voxels that contain points, to decide whether a camera sees a point.

@@ -10,9 +10,11 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Lattice, SurfaceExtractor};
 
-/// Minimum and maximum default number of cells along the longest side of the points' bounding box.
+/// Minimum and maximum default number of cells along the longest side of the points' bounding box; far from the origin
+/// there may be fewer.
 const CELLS: [f64; 2] = [64.0, 160.0];
-/// Default edge length of a cell, in mean spacings of the points: finer detail comes from the kernel alone.
+/// Default edge length of a cell, in mean spacings of the points, if [`CELLS`] allows it: finer detail comes from the
+/// kernel alone.
 const CELL: f64 = 0.5;
 /// Margin of the lattice around the points, as a share of the longest side of their bounding box: the surface may bulge
 /// beyond them.
@@ -53,8 +55,8 @@ pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
 const MAX_DISTANCE_IN_EDGES: f64 = 8100.0;
 
 impl Extraction {
-    /// Starts extracting the surface on which `field` equals `level`, from the cells around `points`; points and edge
-    /// length of a cell, `cell`, are in world units.
+    /// Starts extracting the surface on which `field` equals `level`, from the cells around `points` and those that a
+    /// coarse scan finds; points and edge length of a cell, `cell`, are in world units.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points; [`MethodError::Volume`]
@@ -137,7 +139,7 @@ impl Extraction {
         }
     }
 
-    /// Returns the number of connected components that no point is near; the coarse scan found them.
+    /// Returns the number of connected components found so far that no point is near; the coarse scan finds them.
     pub fn spurious_components(&self) -> usize {
         self.extractor.components_found_by_scan()
     }

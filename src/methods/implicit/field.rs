@@ -20,12 +20,12 @@ impl Field {
         Self { table, terms, coefficients: solution.coefficients.clone() }
     }
 
-    /// Returns f at `p`, in box units.
+    /// Returns f at `p`, which is in box units.
     pub fn value(&self, p: DVec3) -> f64 {
         self.terms.iter().map(|term| self.term(term, p)).sum::<f64>() + self.polynomial(p)
     }
 
-    /// Returns f and ∇f at `p`, in box units.
+    /// Returns f and its gradient ∇f at `p`, in box units.
     pub fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (mut sum, mut gradient) = (self.polynomial(p), self.slopes());
         for term in &self.terms {

@@ -58,12 +58,13 @@ impl Kernel {
         matches!(self, Self::ThinPlate { .. } | Self::Biharmonic { .. })
     }
 
-    /// Returns φ(r) and dφ/d(r²) = φ′(r)/2r, which has a limit at 0.
+    /// Returns φ(r) and its derivative by r², dφ/d(r²) = φ′(r)/2r; at r = 0 the limit of that, or 0 for −r, which has
+    /// none.
     ///
     /// r³ and −r are only conditionally positive definite. Both are shifted by terms that make them positive definite
-    /// between points of the ball, and that vanish in every sum whose weights are orthogonal to the polynomials: a
-    /// constant, and for r³ a multiple of r². Thus one solver serves all kernels. The shifts are those at which
-    /// spherical harmonics of degree 0 and 1 get positive eigenvalues on the sphere, with some margin.
+    /// between points of the ball that contains all centres, and that vanish in every sum whose weights are orthogonal
+    /// to the polynomials: a constant, and for r³ a multiple of r². Thus one solver serves all kernels. The shifts are
+    /// those at which spherical harmonics of degree 0 and 1 get positive eigenvalues on the sphere, with some margin.
     pub fn value_and_slope(&self, r: f64) -> [f64; 2] {
         match *self {
             Self::MultiOrder { delta, tau } => multi_order(delta, tau, r),
@@ -90,15 +91,15 @@ impl Kernel {
     }
 }
 
-/// Distance r, in decay lengths 1/a, below which the closed form suffers from cancellation, and the power series is
-/// used; there it has converged in [`TERMS`] terms.
+/// Distance r, in decay lengths 1/a (see [`multi_order`]), below which the closed form suffers from cancellation, and
+/// the power series is used; there it has converged in [`TERMS`] terms.
 const SERIES_BELOW: f64 = 0.5;
 /// Number of terms of the power series: 0.5²⁰/20! is below rounding for all parameters, as |b| is below 2a.
 const TERMS: usize = 20;
 
 /// Returns φ(r) and dφ/d(r²) of the multi-order kernel, by equation 6 in real numbers: φ(r) = (1 − g(r)) / (4πδ²r),
-/// g(r) = e^(−ar) (C(br) + κ r S(br)), where a = √(1+2δτ)/2τ, b² = (1−2δτ)/4τ², κ = 1/4aτ², and C, S are cosh and sinh
-/// x/x, or cos and sin x/x where b² < 0.
+/// g(r) = e^(−ar) (C(br) + κ r S(br)), where a = √(1+2δτ)/2τ, b² = (1−2δτ)/4τ², κ = 1/4aτ², and C(x) and S(x) are cosh
+/// x and (sinh x)/x, or where b² < 0, with |b| for b, cos x and (sin x)/x.
 ///
 /// g solves g″ + 2a g′ + (δ/τ) g = 0, from which its power series follows.
 fn multi_order(delta: f64, tau: f64, r: f64) -> [f64; 2] {
@@ -227,8 +228,8 @@ impl KernelTable {
     }
 }
 
-/// Returns the number of the interval of the table that contains `s`, counted from that of 0; it consists of the
-/// leading bits of `s`.
+/// Returns the number of the interval that contains `s`, in the table or not, counted from that of 0; it consists of
+/// the leading bits of `s`.
 #[inline]
 fn interval(s: f64) -> u64 {
     s.to_bits() >> SHIFT

@@ -16,7 +16,8 @@ pub struct LowRank<T> {
 const MAX_RANK: usize = 64;
 
 /// Approximates a block of `height` by `width` entries by a low-rank matrix, to a relative error of about `tolerance`
-/// in the Frobenius norm. `row` and `column` write the entries of a row or column, given its index.
+/// in the Frobenius norm, unless that takes a rank above `MAX_RANK`. `row` and `column` write the entries of a row or
+/// column, given its index.
 pub fn cross_approximation<T: MatrixScalar>(
     [height, width]: [usize; 2],
     tolerance: f64,

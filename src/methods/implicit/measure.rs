@@ -6,7 +6,7 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 use serde::Serialize;
 
-/// Distances of points from a surface, in the units of the points, and the mean curvature of the surface.
+/// Distances of points from a surface, in the units of the points, and how curved the surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Fitness {

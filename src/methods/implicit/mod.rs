@@ -76,8 +76,8 @@ use solve::{Constraints, PositionIndex, Solution, Solver};
 /// Options of an [`ImplicitSurface`], beside its points.
 #[derive(Clone, Debug)]
 pub struct ImplicitOptions {
-    /// Points known to be outside, in world units (those of the input points); if `None`, exterior points are made
-    /// from cameras, normals or the points alone.
+    /// Points known to be outside, in world units (those of the input points); if `None`, exterior points are made from
+    /// cameras, normals or the points alone. In both cases some on a bounding sphere are added.
     pub exterior: Option<Vec<Vec3>>,
     /// Cameras from which the points were made; their images colour the surface.
     pub cameras: Vec<Camera>,
@@ -128,11 +128,11 @@ pub struct ImplicitSurface {
     solved: Option<Solved>,
     /// The edits at the last full solve, whose system later edits revise.
     base_edits: Option<PointEdits>,
-    /// The solver of the last full solve, possibly revised since; `None` before it, and if its matrix is too large to
-    /// keep.
+    /// The solver of the last full solve, possibly revised since; `None` before it, during a solve, and if its matrix
+    /// is too large to keep.
     solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
-    /// Counter of changes of the surface or its colours.
+    /// Counter of changes of the surface or its colours, for callers that draw it.
     version: u32,
     components: u32,
     euler: i64,
@@ -471,8 +471,8 @@ impl ImplicitSurface {
         &self.params
     }
 
-    /// Sets the parameters. The surface stays until the new one is complete; stages whose result does not change are
-    /// not repeated.
+    /// Sets the parameters. The surface stays until the new one is complete. If only cell or iso-value change, the
+    /// system is not solved again.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the parameter, or [`MethodError::Volume`] if memory cannot be allocated;
@@ -506,7 +506,8 @@ impl ImplicitSurface {
     }
 
     /// Replaces all edits: points added, removed and marked as outside. The surface stays until the new one is
-    /// complete. If only a few constraints change, the last system is revised: its matrix and its solution are reused.
+    /// complete. If only a few constraints change, the last system is revised: its solution is reused, and its matrix,
+    /// unless that was too large to keep.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left, or all lie in one
@@ -563,7 +564,8 @@ impl ImplicitSurface {
         self.spurious_components
     }
 
-    /// Returns the number of input points that were left out as duplicates of others.
+    /// Returns the number of input points that were left out because they equal another, at the latest when scaled into
+    /// the normalised box in single precision.
     pub fn duplicates(&self) -> usize {
         self.original.len() - self.cloud.len()
     }

@@ -52,7 +52,7 @@ struct Plane {
     normal: Vec3,
     /// Standard deviation of the points across the plane.
     thickness: f64,
-    /// Least standard deviation of the points within the plane.
+    /// Standard deviation of the points within the plane, along the direction in which it is least.
     width: f64,
 }
 
@@ -144,9 +144,9 @@ fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Returns Σ (p − middle)·n over the positions p, with normals n, of a connected component. If the points are spread
-/// evenly over a closed surface with outward normals, it is proportional to the enclosed volume (Gauss's theorem); a
-/// negative value shows that all normals point inwards.
+/// Returns the flux of the offsets from the mean position through the points of a connected component, Σ (p − mean)·n
+/// over the positions p with normals n. If the points are spread evenly over a closed surface with outward normals, it
+/// is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all normals point inwards.
 fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
     let position = |i: u32| positions[i as usize].as_dvec3();
     let middle = part.iter().map(|&i| position(i)).sum::<DVec3>() / part.len() as f64;

@@ -16,9 +16,10 @@ pub struct ImplicitParams {
     pub tau: f64,
     /// σ: width of the Gaussian kernel, in box units.
     pub sigma: f64,
-    /// λ of surface constraints: how much each may be missed; 0 interpolates the points.
+    /// λ of surface constraints, before confidences and the number of points are taken into account: the larger, the
+    /// more f may differ from 0 at the points; with 0 it interpolates them.
     pub lambda_surface: f64,
-    /// λ of exterior constraints: how much each may be missed.
+    /// λ of exterior constraints: the larger, the more f may differ from −1 at them.
     pub lambda_exterior: f64,
     /// Relative residual at which the linear solver stops.
     pub tolerance: f64,
@@ -48,7 +49,7 @@ pub enum KernelKind {
 pub enum IsoValue {
     /// The iso-value 0, as in the paper.
     Zero,
-    /// The mean of f over the surface constraints, which is a little below 0.
+    /// The mean of f over the surface constraints, usually a little below 0.
     Mean,
 }
 
@@ -93,7 +94,8 @@ impl ImplicitParams {
         Self { cell: other.cell, level: other.level, ..self.clone() }
     }
 
-    /// Returns a warning, to be shown to the user, if the values are accepted but may fail.
+    /// Returns a warning, to be shown to the user, if δ of the multi-order kernel is so large that the surface may
+    /// break up; `None` otherwise.
     pub fn warning(&self) -> Option<&'static str> {
         (self.kernel == KernelKind::MultiOrder && self.delta >= LARGE_DELTA).then_some(
             "delta ≥ 25: at large gaps between points the function falls to 0 inside, and the surface breaks up",

@@ -33,9 +33,9 @@ impl PointColors {
         Some(Self { grid, colors: cloud.colors?, spacing, next: 0 })
     }
 
-    /// Adds the colours of the nearest points to the next slice of vertices in `coloring`, weighted by their inverse
-    /// squared distance plus a constant; vertices with no point near get no colour. Returns whether all vertices are
-    /// done.
+    /// Adds the colours of the nearest points to the next slice of vertices in `coloring`, each with the weight
+    /// `1/(d²+c)`, where d is its distance and c a quarter of the squared mean spacing; vertices with no point near get
+    /// no colour. Returns whether all vertices are done.
     pub fn advance(&mut self, mesh: &TriangleMesh, map: &BoxMap, coloring: &mut Coloring) -> bool {
         // Half a spacing in quadrature with the distance; without it, each point leaves a spot.
         let least = (0.25 * self.spacing * self.spacing).clamp(MIN_SQUARED_DISTANCE, 1.0);

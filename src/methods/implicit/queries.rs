@@ -10,8 +10,8 @@ use crate::methods::MethodError;
 use crate::volume::{Space, Volume, VolumeError, VolumeInit, Voxels};
 
 impl ImplicitSurface {
-    /// Returns f minus the iso-value at `points`, in world units (those of the input points): positive inside, 0 on the
-    /// surface, negative outside.
+    /// Returns the implicit function f minus the iso-value at `points`, which are in world units (those of the input
+    /// points): positive inside, 0 on the surface, negative outside.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] before the system is solved.
@@ -21,10 +21,11 @@ impl ImplicitSurface {
         Ok(points.iter().map(|p| solved.field.value(self.map.in_box_exactly(p.as_dvec3())) - level).collect())
     }
 
-    /// Returns ∇f at `points`, per world unit (the unit of the input points). On the surface it points inwards.
+    /// Returns the gradient of the implicit function f at `points`, per world unit (the unit of the input points). On
+    /// the surface it points inwards.
     ///
     /// # Errors
-    /// As [`Self::evaluate`].
+    /// [`MethodError::InvalidArgument`] before the system is solved.
     pub fn gradient(&self, points: &[Vec3]) -> Result<Vec<DVec3>, MethodError> {
         let solved = self.solved("gradient")?;
         let at = |p: &Vec3| solved.field.value_and_gradient(self.map.in_box_exactly(p.as_dvec3())).1;

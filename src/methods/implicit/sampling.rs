@@ -77,7 +77,7 @@ impl Sampling {
 
 /// Poisson-disc sampling of at most `most` points: visits the points in random order, and keeps each that is farther
 /// than a radius from all kept before. The radius is searched, round by round, such that nearly `most` points are kept.
-/// Keeps all points if there are no more.
+/// If there are at most `most` points, all are kept.
 #[derive(Clone, Debug)]
 struct PoissonDisc {
     order: Vec<u32>,

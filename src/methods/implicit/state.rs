@@ -52,7 +52,7 @@ struct Function {
     mean: f64,
 }
 
-/// The saved form of the last extracted mesh.
+/// The saved form of the last finished surface.
 #[derive(Serialize, Deserialize)]
 struct Surface {
     positions: Vec<Vec3>,
@@ -96,7 +96,7 @@ impl ImplicitSurface {
 
     /// Continues a run from the bytes of [`Self::save`]; `self` must be made from the same points and options, except
     /// parameters. Takes as long as the run had spent on choosing constraints and on its current stage; if it was
-    /// colouring, on the extraction, too.
+    /// colouring, on the extraction, too; if it was revising a system, on that system's matrix, too.
     ///
     /// # Errors
     /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.

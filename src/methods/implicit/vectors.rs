@@ -18,7 +18,8 @@ impl MatrixScalar for f64 {
     }
 }
 
-/// Returns the dot product Σ aᵢbᵢ, accumulated in four independent partial sums that the compiler can vectorise.
+/// Returns the dot product of `a` and `b`, accumulated in four independent partial sums that the compiler can
+/// vectorise.
 pub fn dot<T: MatrixScalar>(a: &[T], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (fours, rest) = a.as_chunks::<4>();

@@ -71,8 +71,8 @@ impl Chebyshev {
         self.combined(&derivatives)
     }
 
-    /// Returns (1/n)(t₀ + 2 Σ tₘ Tₘ(node)) for each of the n nodes: its interpolation weight if `t` holds Tₘ at a
-    /// point, and the derivative of that weight if `t` holds Tₘ′.
+    /// Returns the interpolation weight of each node at a point if `t` holds the Chebyshev polynomials Tₘ there, and
+    /// the derivative of that weight if `t` holds their derivatives: (1/n)(t₀ + 2 Σ tₘ Tₘ(node)), with n nodes.
     fn combined(&self, t: &[f64; NODES]) -> [f64; NODES] {
         std::array::from_fn(|k| {
             let sum: f64 = (1..NODES).map(|m| self.polynomials[k][m] * t[m]).sum();

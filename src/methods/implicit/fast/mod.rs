@@ -95,8 +95,8 @@ impl Level {
 }
 
 impl FastField {
-    /// Prepares `field` for fast evaluation in the box between the corners `low` and `high`, extended to all centres;
-    /// outside it, evaluation is direct.
+    /// Prepares `field` for fast evaluation in a cube around all centres and the box between the corners `low` and
+    /// `high`. Outside it, and everywhere for kernels that grow with the distance, all terms are summed directly.
     pub fn new(field: Field, low: DVec3, high: DVec3) -> Self {
         let terms = field.terms();
         let low = terms.iter().fold(low, |low, (c, _)| low.min(*c));
@@ -122,7 +122,7 @@ impl FastField {
         fast
     }
 
-    /// Writes f at each of the points `targets`, in box units, to `out`.
+    /// Writes the value of f at each of the points `targets`, which are in box units, to `out`.
     pub fn values(&mut self, targets: &[DVec3], out: &mut [f64]) {
         for (p, value) in targets.iter().zip(out) {
             *value = self.value(*p);
@@ -140,7 +140,7 @@ impl FastField {
         sum + self.field.polynomial(p)
     }
 
-    /// Returns f and ∇f at `p`, in box units.
+    /// Returns f and its gradient ∇f at `p`, in box units.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
         let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
@@ -190,7 +190,7 @@ impl FastField {
     }
 
     /// Upward pass: sorts the terms into the finest cubes, spreads them to the nodes, and moves these sources to the
-    /// larger cubes. Also computes the translations of all levels.
+    /// larger cubes. Also computes the translations of all levels that have cubes which do not touch.
     fn gather_sources(&mut self) {
         let finest = self.levels.len() - 1;
         let index =

@@ -66,7 +66,8 @@ impl Translations {
     }
 }
 
-/// Returns the dot product Σ aᵢbᵢ, accumulated in eight independent partial sums that the compiler can vectorise.
+/// Returns the dot product of `a` and `b`, accumulated in eight independent partial sums that the compiler can
+/// vectorise.
 fn dot(a: &Nodal, b: &Nodal) -> f32 {
     let mut sums = [0.0; 8];
     let (eights, rest) = a.as_chunks::<8>();

@@ -35,7 +35,7 @@ impl Cluster {
         self.end - self.start
     }
 
-    /// Returns the diagonal of the bounding box.
+    /// Returns the diameter of the cluster: the diagonal of its bounding box.
     pub fn diameter(&self) -> f32 {
         self.bounds.min.distance(self.bounds.max)
     }

@@ -49,7 +49,7 @@ impl Polynomials {
 /// The state of the conjugate gradient iteration.
 #[derive(Clone, Debug)]
 pub struct ConjugateGradients {
-    /// The weights w, one per centre.
+    /// The weights w, one per row of the system.
     pub weights: Vec<f64>,
     /// The coefficients p, one per polynomial.
     pub coefficients: Vec<f64>,

@@ -11,7 +11,7 @@ pub struct Constraints {
     pub centres: Vec<Vec3>,
     /// Prescribed values of f: 0 on the surface, −1 outside.
     pub values: Vec<f64>,
-    /// Regularisation λ of each constraint, at least 0.
+    /// Regularisation λ of each constraint, at least 0: f differs from the prescribed value by λ times the weight.
     pub lambda: Vec<f64>,
     /// Number of surface constraints, which come first.
     pub surface: usize,
@@ -59,7 +59,8 @@ impl Constraints {
         0.5 * f64::from(bounds.max.distance(bounds.min))
     }
 
-    /// Returns the mean of f over the surface constraints, where f = y − λw; one of the choices for the iso-value.
+    /// Returns the mean over the surface constraints of f, which at a constraint is its value minus λ times its weight;
+    /// one of the choices for the iso-value.
     pub fn mean_on_surface(&self, solution: &Solution) -> f64 {
         let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
         -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64

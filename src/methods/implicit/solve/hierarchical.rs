@@ -8,8 +8,8 @@ use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 use crate::methods::implicit::vectors::{MatrixScalar, add, dot};
 use std::ops::Range;
 
-/// Admissibility: two clusters are far if the smaller one's diameter is at most this many times their distance. Above 2
-/// ranks grow, below 1 more is stored in full.
+/// Admissibility: two clusters are far if they do not touch, and the smaller one's diameter is at most this many times
+/// their distance. With a larger number ranks grow, with a smaller one more is stored in full.
 const ADMISSIBILITY: f32 = 3.0;
 
 /// A block on or above the diagonal, which also represents its mirror image.
@@ -146,7 +146,7 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         )
     }
 
-    /// Returns the product Φx; both vectors are in the order of the cluster tree.
+    /// Returns the product Φx of the matrix and `x`; both vectors are in the order of the cluster tree.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for block in &self.blocks {

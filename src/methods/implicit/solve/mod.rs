@@ -38,10 +38,11 @@ pub struct Singular;
 /// Share of the tolerance at which iterations stop: the rest is a margin, since the true residual is larger than the one
 /// that iterations compute.
 const ITERATE_TO: f64 = 0.5;
-/// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
+/// Maximum number of iterations for each round so far; a round may use what earlier ones left. A system that can be
+/// solved needs a few dozen.
 const MAX_ITERATIONS: u32 = 500;
-/// Share of the true residual that a round of iterations may leave; if it leaves more, rounding limits it, and the
-/// solve fails.
+/// Share of the true residual that a round of iterations may leave: if a round after the first leaves more, rounding
+/// limits it, and the solve fails.
 const MAX_REMAINING: f64 = 0.7;
 /// Maximum number of rounds of iterations, each from a recomputed residual.
 const MAX_ROUNDS: u32 = 6;
@@ -56,7 +57,7 @@ pub struct Solver {
     /// Constraints to which the system is to be revised before it is solved, and the initial weights, in their order.
     revision: Option<(Constraints, Vec<f64>)>,
     stage: Stage,
-    /// Slices of work since the system was complete, or, before that, since its start.
+    /// Slices of work since the system was complete, or, before that, since the start of the solve.
     slices: u32,
     iterations: u32,
     rounds: u32,
@@ -138,7 +139,7 @@ impl Solver {
     /// Repeats the slices of work up to a position, to restore a saved run.
     ///
     /// # Errors
-    /// As [`Self::advance`].
+    /// [`Singular`] if the tolerance cannot be reached.
     pub fn advance_to(&mut self, to: SolverPosition) -> Result<(), Singular> {
         while to.built && !self.position().built {
             self.advance()?;
@@ -279,7 +280,7 @@ impl Solver {
 /// Progress of a solver, in slices of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SolverPosition {
-    /// Whether matrix and preconditioner are complete.
+    /// Whether matrix and preconditioner are complete, and revised if they are to be.
     built: bool,
     /// Slices of work since `built` became true, or, before that, since the start.
     slices: u32,

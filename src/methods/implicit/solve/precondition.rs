@@ -7,8 +7,8 @@ use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
-/// Number of predecessors from which each centre is predicted. With 16, half as many iterations again are needed; with
-/// 32, the inverse takes twice as long to compute.
+/// Maximum number of predecessors of a centre in its row of the inverse. With 16, half as many iterations again are
+/// needed; with 32, the inverse takes twice as long to compute.
 const NEIGHBOURS: usize = 24;
 
 /// A sparse approximate inverse of the system's matrix: (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ, with a sparse gᵢ for each centre. It
@@ -56,7 +56,8 @@ impl SparseInverse {
         Self { rows: Rows::default(), ordering, computed: 0, weights: Vec::new() }
     }
 
-    /// Orders or computes up to `count` more rows. Returns whether all are computed.
+    /// Tests up to `count` more centres for the ordering; once that is complete, computes up to `count` more rows.
+    /// Returns whether all are computed.
     ///
     /// If a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
@@ -75,8 +76,8 @@ impl SparseInverse {
     }
 
     /// Returns a complete inverse for other centres, derived from this one, which must be complete: those flagged in
-    /// `removed` are left out. Those that `centres` has beyond the length of `removed` are added at the end, each
-    /// predicted from its nearest remaining or added predecessors.
+    /// `removed` are left out. Those that `centres` has beyond the length of `removed` are added at the end, each with
+    /// its nearest remaining or added predecessors as neighbours.
     pub fn revised(&self, removed: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
         let mut revised = Self {
             rows: Rows::default(),
@@ -130,7 +131,7 @@ impl SparseInverse {
     }
 }
 
-/// Returns the indices of the [`NEIGHBOURS`] points nearest to `p` among those that `among` accepts, nearest first.
+/// Returns the indices of up to [`NEIGHBOURS`] points nearest to `p` among those that `among` accepts, nearest first.
 fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32> {
     let with_distance = |i: usize| (rank_f64(points[i].distance_squared(p)), i as u32);
     let mut found: Vec<(u64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
@@ -142,8 +143,8 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
     found.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Appends the entries of gᵢ for one centre to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b, where A is the matrix
-/// Φ+Λ of its neighbours, and b holds its entries of Φ with them.
+/// Appends one row of the inverse, the entries of gᵢ for one centre, to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b,
+/// where A is the matrix Φ+Λ of its neighbours, and b holds its entries of Φ with them.
 fn row(
     centre: u32,
     neighbours: &[u32],
@@ -229,9 +230,10 @@ const CELL: f32 = 3.6;
 /// Initial search radius for the nearest predecessors of a centre, in minimum distances of the round.
 const SEARCH_RADIUS: f32 = 3.6;
 
-/// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors.
-/// Each centre is as far from its predecessors as any of its successors is, within a factor of √2: every round takes
-/// the centres that are farther than some distance from all taken before, and the distance falls from round to round.
+/// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors:
+/// first the centres of surface constraints, then those of exterior ones. In each part, a centre is as far from its
+/// predecessors as any of its successors is, within a factor of √2: every round takes the centres that are farther than
+/// some distance from all taken before, and the distance falls from round to round.
 #[derive(Clone, Debug, Default)]
 struct MaximinOrdering {
     centres: Vec<Vec3>,

@@ -30,7 +30,9 @@ const MAX_CHANGES: usize = 256;
 /// Marks a row whose constraint was removed, in place of the constraint's index.
 const REMOVED: u32 = u32::MAX;
 
-/// The linear system of some constraints, [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0].
+/// The linear system of some constraints, [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0]: Φ holds the kernel between centres, Λ the
+/// regularisation and B the polynomials at the centres, y the prescribed values; weights w and coefficients p are
+/// sought.
 ///
 /// Each constraint has a row, which is also its index in all vectors: first those for which the matrix was computed, in
 /// the order of its cluster tree, then those added since. Rows of removed constraints are kept, and are 0 in all
@@ -110,8 +112,8 @@ impl System {
         }
     }
 
-    /// Returns whether [`Self::revise`] is worthwhile: only a few of the constraints differ from those for which the
-    /// matrix was computed.
+    /// Returns whether [`Self::revise`] is worthwhile: at most `MAX_CHANGES` of the constraints for which the matrix
+    /// was computed are gone, and at most as many are new.
     pub fn can_revise(&self, constraints: &Constraints) -> bool {
         let known = PositionIndex::new(&constraints.centres);
         let own = self.base_centres();
@@ -231,8 +233,8 @@ impl System {
         out
     }
 
-    /// Returns yᵢ − ((Φ+Λ)w)ᵢ for row `i`, with Φ from the kernel itself, not from the approximated matrix; 0 for a
-    /// removed row.
+    /// Returns the residual of row `i` without the polynomial part, yᵢ − ((Φ+Λ)w)ᵢ, with Φ from the tabulated kernel,
+    /// not from the approximated matrix; 0 for a removed row.
     pub fn row_residual(&self, i: usize, weights: &[f64]) -> f64 {
         if self.constraint_of_row[i] == REMOVED {
             return 0.0;
