@@ -10,8 +10,8 @@ export const labOf = (hash: string): string | undefined =>
   LAB_IDS.find((id) => hash === `#${id}` || hash.startsWith(`#${id}?`));
 
 /**
- * Writes the open lab's state into the address. An address that names another lab is kept: the user has just asked for
- * that lab, and it is about to open.
+ * Writes the open lab's state, `hash`, into the address, without a new entry in the browser's history. An address that
+ * names another lab is kept: the user has just asked for that lab, and it is about to open.
  */
 export function showAddress(hash: string): void {
   const named = labOf(location.hash);
@@ -19,7 +19,7 @@ export function showAddress(hash: string): void {
   window.history.replaceState(null, '', hash);
 }
 
-/** Note to a copied link while one of the user's own files is open. */
+/** Message when a link is copied while one of the user's own files is open: the link does not contain the file. */
 export const FILE_NOTE = text('labs.linkLacksFile');
 
 /**

@@ -11,8 +11,9 @@ export class DragLatency {
   #drawn = 0;
   #displayMs: number | undefined;
   /**
-   * Latency of the model at the last frame that reached new poses, from the oldest of these: milliseconds, and frames
-   * drawn.
+   * Latency of the model, undefined before the first: milliseconds, and number of frames drawn, from the sending of a
+   * pose until a frame that takes account of it was drawn. Where one frame is the first to take account of several
+   * poses, measured from the oldest.
    */
   #last: { milliseconds: number; frames: number } | undefined;
 
@@ -25,8 +26,9 @@ export class DragLatency {
   }
 
   /**
-   * Latency of the model at the last frame that reached new poses, from the oldest of these: milliseconds, and frames
-   * drawn.
+   * Latency of the model, undefined before the first: milliseconds, and number of frames drawn, from the sending of a
+   * pose until a frame that takes account of it was drawn. Where one frame is the first to take account of several
+   * poses, measured from the oldest.
    */
   get last(): { milliseconds: number; frames: number } | undefined {
     return this.#last;

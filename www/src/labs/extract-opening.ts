@@ -32,7 +32,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   readonly #results: ExtractResults;
   /** Sends a restarted engine the view's settings. */
   readonly #onRestart: () => Promise<unknown>;
-  /** Default parameters of the method. */
+  /** Default parameters of the method, without the iso value, whose default depends on the volume. */
   defaults: ParamValues = {};
 
   constructor(
@@ -52,8 +52,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Starts to download the volume of the example that the address names, or of the first example, while the engine
-   * loads.
+   * Starts to download the volume of the example that the address names, or of the first example if it names none,
+   * while the engine loads.
    */
   static fetchLinked(): void {
     const linked = fromHash(location.hash);
@@ -142,8 +142,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Returns the settings for a model of an example, or of a file: for a file those in force, except the iso value,
-   * which is specific to a volume. A link's settings take precedence.
+   * Returns the settings for a model of an example or a file: the example's own parameters or, without any, those in
+   * force except the iso value, which is specific to a volume; without attractors. A link's settings take precedence.
    */
   #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
@@ -154,8 +154,9 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Returns the choice of the initial surface for an example, or for a file: for a file the one in force, except
-   * lengths and positions, which are specific to a volume. A link's settings take precedence.
+   * Returns the choice of the initial surface: an example's own; for a file the one in force, but with the contour
+   * (kind 'contour') in place of a sphere, and with an edge length that the model chooses, since positions and lengths
+   * are specific to a volume. A link's settings take precedence.
    */
   #startFor({ example, linked }: ExtractSource): StartChoice {
     const choice = this.#ui.start.value;

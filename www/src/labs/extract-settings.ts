@@ -88,7 +88,7 @@ export class ExtractSettings {
     this.#adoptModel(choice, params);
   }
 
-  /** Adopts a new model of the present volume, before its first step. */
+  /** Adopts on the page a new model of the present volume, before its first step. */
   begin(choice: StartChoice, params: ParamValues): void {
     this.#states.idle(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
@@ -105,16 +105,16 @@ export class ExtractSettings {
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
-   * one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
+   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
   /**
-   * Changes to another variant of the open figure: sets its parameters, and restarts the model or continues from the
-   * present surface.
+   * Changes to another variant of the open figure: sets its parameters, restarts the model or continues from the
+   * present surface, as the figure demands, and runs it.
    */
   changeTo({ params: usual, startsOver }: Preset, { id, params: differing }: Variant): Promise<void> {
     const params = { ...usual, ...differing };
@@ -137,14 +137,20 @@ export class ExtractSettings {
     });
   }
 
-  /** Rebuilds the model from its start, with the parameters unchanged. */
+  /**
+   * Rebuilds the model from the initial surface in force, with the parameters unchanged; it does not run until the user
+   * asks for it.
+   */
   startOver(): Promise<void> {
     return this.#change(text('labs.reset'), text('labs.buildFailed'), async () => {
       await this.#rebuild(this.#ui.start.inForce, this.#params);
     });
   }
 
-  /** Rebuilds the model from the chosen start, and runs it. If the start is rejected, the previous model continues. */
+  /**
+   * Rebuilds the model from the initial surface chosen on the page, and runs it. If the start is rejected, the previous
+   * model stays, and its run continues.
+   */
   async restart(): Promise<void> {
     if (!this.#states.canChange) return this.#ui.start.reject(this.#why(text('extract.notWhileOpening')));
     await this.#states.enqueue(async () => {
@@ -184,8 +190,8 @@ export class ExtractSettings {
   }
 
   /**
-   * Sets the attractors of the live model. With `tuning`, changes with the same label in short succession are undone as
-   * one.
+   * Sets the attractors of the live model; a run continues, and a converged one is resumed. With `tuning`, changes with
+   * the same label in short succession are undone as one.
    */
   setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
     return this.#states.enqueue(async () => {
@@ -233,7 +239,7 @@ export class ExtractSettings {
     this.#showPyramid(page.choice);
   }
 
-  /** Does a change that undo can revert; if it fails, the previous state stays. */
+  /** Does a change that undo can revert; if it fails, an error is displayed, and undo does not list it. */
   #change(label: string, errorTitle: string, work: () => Promise<void>): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;

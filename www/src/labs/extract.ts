@@ -162,7 +162,7 @@ export class ExtractLab implements Lab {
     await (engineBroken ? this.#opening.reopen() : this.#settings.startOver());
   }
 
-  /** Runs the same extraction twice, direct and coarse to fine, and shows the comparison. */
+  /** Runs the same extraction twice, direct and coarse to fine, both without attractors, and shows the comparison. */
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;

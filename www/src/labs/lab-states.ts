@@ -42,7 +42,7 @@ export class LabStates {
     return this.#state.value;
   }
 
-  /** The state beneath a displayed error. */
+  /** The lab's state; while an error is displayed, the model's state beneath it. */
   get modelState(): LabState {
     return this.value === 'error' ? this.#model : this.value;
   }
@@ -135,7 +135,9 @@ export class LabStates {
     this.#state.value = this.#model === 'running' ? 'running' : 'error';
   }
 
-  /** Hides the error; returns whether the lab is back in its previous state. */
+  /**
+   * Hides the error message; returns whether this has ended the error state, so that the model's state applies again.
+   */
   dismiss(): boolean {
     this.#banner.hide();
     if (this.value !== 'error' || !this.ready) return false;

@@ -23,14 +23,14 @@ export type OpenInLab = (passedOn: Handoff) => void;
 
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
-  /** Its name in addresses, after the hash. */
+  /** The lab's name in addresses, after the hash. */
   id: string;
   name: string;
   tagline: string;
-  /** Address of its page in the documentation. */
+  /** Address of the lab's page in the documentation. */
   guide: string;
-  /** Starts its worker. */
+  /** Starts the lab's worker. */
   spawn: () => Worker;
-  /** Loads its code; returns the lab's class. */
+  /** Loads the lab's code; returns the lab's class. */
   load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: OpenInLab) => Lab>;
 }

@@ -8,8 +8,8 @@ import type { ColorMode } from '../ui/view-options';
 export const ADDRESS = '#extract';
 
 /**
- * Version of the defaults that a link relies on. Links without one were written when the lab started from an enclosing
- * surface, with the method as published.
+ * Version of the defaults that a link relies on. Links without a version were written when the lab started from an
+ * enclosing surface, with the method as published.
  */
 const VERSION = '2';
 
@@ -45,7 +45,9 @@ export interface LabSettings {
   color: ColorMode;
 }
 
-/** Returns the settings that differ from those of the example, or else from the method's defaults. */
+/**
+ * Returns the settings that differ from those of the example, or else from the method's defaults, and all attractors.
+ */
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
@@ -98,8 +100,8 @@ export function toHash(linked: Linked): string {
 }
 
 /**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
- * ignored.
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): Linked | undefined {
   const [address, text] = hash.split(/\?(.*)/s, 2);

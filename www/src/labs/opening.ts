@@ -43,7 +43,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   readonly #ui: OpeningParts<Example>;
   protected readonly states: LabStates;
   #source: Source<Example, Linked, Data> | undefined;
-  /** Link whose file the user has yet to open. */
+  /** Settings of a link whose file the user has yet to open. */
   #awaiting: Linked | undefined;
   /** Counts requests, so that a slow download does not replace what was opened after it. */
   #requestCount = 0;
@@ -67,10 +67,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Parses an address for this lab. */
   protected abstract linkedBy(hash: string): Linked | undefined;
 
-  /** Describes an example as a source. */
+  /** Returns what is needed to open an example. */
   protected abstract fromExample(example: Example): Source<Example, Linked, Data>;
 
-  /** Describes the user's files as a source. */
+  /** Returns what is needed to open the user's files. */
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
   /**
@@ -97,23 +97,23 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Has the worker save the present model, so that it can be restored; does nothing by default. */
   protected save(): void {}
 
-  /** Settles when all pending saves are complete. */
+  /** Settles when all pending saves are complete; at once, unless a subclass saves anything. */
   protected async saved(): Promise<unknown> {
     return undefined;
   }
 
-  /** Called when the engine has loaded, with the parameters of the method. */
+  /** Called when the engine has loaded, with the parameters of the method; does nothing by default. */
   protected onEngineReady(_specs: ParamSpec[]): void {}
 
-  /** Called when the engine was restarted, to send it the view's settings again. */
+  /** Called when the engine was restarted, to send it the view's settings again; does nothing by default. */
   protected async restarted(): Promise<unknown> {
     return undefined;
   }
 
   /**
    * Opens what another lab passes on, or what the address asks for, or else the first example; then follows changes of
-   * the address until aborted. After each, `onFollowed` is called, which corrects an address that could not be
-   * followed.
+   * the address until `signal` is aborted. After each such change, `onFollowed` is called, which corrects an address
+   * that could not be followed.
    */
   async start(signal: AbortSignal, onFollowed: () => void, passedOn?: () => Promise<void>): Promise<void> {
     try {
@@ -149,7 +149,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return this.open({ ...this.fromExample(example), ...(linked && { linked }) });
   }
 
-  /** Opens the user's files; a link that lacks its file applies to them. */
+  /**
+   * Opens the user's files; if a link names a file that the user has yet to open, its settings are applied to these
+   * files.
+   */
   files(files: File[]): Promise<void> {
     const linked = this.#awaiting;
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
@@ -167,8 +170,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /**
-   * Cancels opening or preparing: since the worker is busy with it, the engine is restarted, and the previous source
-   * opened again.
+   * Cancels opening or preparing: since the worker is busy with it, the engine is restarted, and the previous source,
+   * or else the first example, is opened again.
    */
   async cancel(): Promise<void> {
     const request = this.#requestCount;

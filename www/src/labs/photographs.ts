@@ -28,12 +28,12 @@ interface CameraFile {
 /** Finds a file by its name in the list of cameras; undefined if there is none. */
 export type FileByName = (name: string) => Promise<Blob | undefined>;
 
-/** Pixels of a mask darker than this (of 255) are masked out. */
+/** Red value of a mask's pixel, 0 to 255, below which the photograph's pixel is masked out. */
 const MASKED = 128;
 
 /**
- * Reads all cameras of a list, and the photographs that are available. Throws if the list is malformed, or a photograph
- * cannot be decoded or does not fit its camera.
+ * Reads all cameras of a list, and the photographs and masks that are available. Throws if the list is malformed, the
+ * size of an image is unknown, a photograph or its mask cannot be decoded, or a photograph does not fit its camera.
  */
 export async function readPhotographs(json: string, fileOf: FileByName): Promise<Photograph[]> {
   const file = parseCameras(json);
@@ -94,7 +94,7 @@ function pixelsOf(picture: ImageBitmap): ImageData {
   return context.getImageData(0, 0, picture.width, picture.height);
 }
 
-/** Makes all pixels transparent that are dark in the mask; a mask of another size is ignored. */
+/** Makes all pixels transparent that are dark in the mask; a mask with another number of pixels is ignored. */
 function applyMask(pixels: ImageData, mask: ImageData): void {
   if (mask.data.length !== pixels.data.length) return;
   for (let i = 0; i < pixels.data.length; i += 4) if ((mask.data[i] ?? 0) < MASKED) pixels.data[i + 3] = 0;

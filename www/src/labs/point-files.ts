@@ -37,7 +37,7 @@ async function fetchPhotographs(folder: string): Promise<Photograph[]> {
 
 /**
  * Reads points from one file, and a list of cameras with the photographs it names. Throws if there are several files
- * with points, or photographs without a list of cameras.
+ * with points, photographs without a list of cameras, or a list that {@link readPhotographs} rejects.
  */
 export async function fromFiles(files: File[]): Promise<PointFiles> {
   const lists = files.filter(({ name }) => /\.json$/i.test(name));

@@ -35,8 +35,8 @@ export interface CloudSettings {
 }
 
 /**
- * Returns the settings that differ from those of the example, or else from the method's defaults. A number of points or
- * clusters of 0 stands for the method's own choice.
+ * Returns the settings that differ from those of the example, or else from the method's defaults; the points changed by
+ * hand only if there are few enough. 0 stands for the default number of points, and for all clusters.
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
   const { example, file, choice, params, defaults, edits, color, photo } = settings;
@@ -74,7 +74,7 @@ export function fits({ added, removed, outside }: Edits): boolean {
 
 /**
  * Returns the numbers of points and clusters, with those of a link in place of the given ones; 0 in a link stands for
- * the method's own choice.
+ * the default number of points, and for all clusters.
  */
 export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Partial<CloudChoice>): CloudChoice {
   return {
@@ -101,8 +101,8 @@ export function toHash(linked: LinkedCloud): string {
 }
 
 /**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
- * ignored.
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedCloud | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);

@@ -112,8 +112,9 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /**
-   * Returns the settings before a link changes them: an example's own; for cameras alone, those in force; for one file
-   * after another, those in force but the cell size; else the defaults.
+   * Returns the settings before a link changes them: an example's own; for cameras alone, those in force; for points
+   * from a file opened without a link, when those before were from a file, too, the settings in force but the cell
+   * size; else the defaults.
    */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {

@@ -96,7 +96,10 @@ export class ReconstructResults {
     cancelAnimationFrame(this.#framePending);
   }
 
-  /** Displays a surface at the next animation frame; only then may the worker send another. */
+  /**
+   * Displays a surface at the next animation frame; only then may the worker send another. A preview is dropped while a
+   * complete surface is displayed.
+   */
   #takeSurface(event: SurfaceEvent): void {
     if (event.preview && this.#complete) {
       this.#client.acknowledge();

@@ -13,7 +13,7 @@ import { UndoStack } from './undo';
 
 /** Limits of the undo history: number of states, and their total size in bytes. */
 const UNDO_LIMITS = { entries: 60, bytes: 96e6 };
-/** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
+/** Milliseconds within which repeated changes of the same setting are undone as one, as when a slider is dragged. */
 const TOGETHER = 1500;
 
 /** The settings that undo restores. */
@@ -177,8 +177,8 @@ export class ReconstructSettings {
   }
 
   /**
-   * Sends settings to the worker; returns the parameters in force. If only points by hand have changed, the live model
-   * takes them and updates its solution; else a new model is built.
+   * Sends settings to the worker; returns the parameters in force. If only the points changed by hand differ, the live
+   * model takes them and updates its solution; else a new model is built.
    */
   async #handOver({ choice, params, edits }: Settings): Promise<ParamValues> {
     const before = this.#now;

@@ -18,7 +18,10 @@ export class SurfaceCarrier {
     this.#view = view;
   }
 
-  /** Deforms the displayed surface to a dragged pose; returns whether that was possible. */
+  /**
+   * Deforms the displayed surface to a dragged pose; returns false if that was not possible, because there is no frame
+   * of the model yet or the number of ellipsoids has changed.
+   */
   dragTo(pose: Pose, poseId: number): boolean {
     this.#dragged = { pose, poseId };
     return this.#deform();

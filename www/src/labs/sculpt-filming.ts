@@ -23,7 +23,7 @@ export class Filming {
     this.#settings = settings;
   }
 
-  /** Appends the present pose as a keyframe. */
+  /** Appends the present pose to the film as a keyframe, and moves the film to it. */
   addKey(): void {
     const { film, pose } = this.#settings;
     const known =

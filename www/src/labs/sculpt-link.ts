@@ -40,7 +40,10 @@ export interface SceneSettings {
   layout: string;
 }
 
-/** Returns the settings that differ from those of the example, and the parameters that differ from `usual`. */
+/**
+ * Returns the settings that differ from those of the example, and the parameters that differ from `usual`; keyframes
+ * only if there are at most {@link MOST_KEYS}.
+ */
 export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
   const own = film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS;
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
@@ -56,14 +59,18 @@ export function linkOf({ example, file, params, usual, pose, film, color, layout
   };
 }
 
-/** Returns the film that a link asks for, based on the example's. */
+/**
+ * Returns the film that a link asks for: of its keyframes or, if it has none, the example's, `usual`; the link may also
+ * set whether the film loops.
+ */
 export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undefined): Film | undefined {
   const film = keys && keys.length > 0 ? { keys, between: between ?? 24, loop: false } : usual;
   return film && loop !== undefined ? { ...film, loop } : film;
 }
 
 /**
- * Converts a pose to text, rounded to at most 10⁻⁴ of each ellipsoid's longest semi-axis, which is finer than any drag.
+ * Converts a pose to text. The numbers of an ellipsoid are rounded to multiples of a power of ten that is at most 10⁻⁴
+ * of its longest semi-axis, which is finer than any drag.
  */
 function asText(pose: Pose): string {
   return pose
@@ -100,8 +107,8 @@ export function toHash(linked: LinkedScene): string {
 }
 
 /**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
- * ignored.
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedScene | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);

@@ -28,7 +28,7 @@ const DONE: Record<HandleMode, string> = {
   size: text('sculpt.scaled'),
 };
 
-/** Text keys of the messages on what handles and arrow keys do. */
+/** Keys, in the catalogue of texts, of the messages on what handles and arrow keys do. */
 const MODE_TEXTS = { move: 'sculpt.handlesMove', turn: 'sculpt.handlesRotate', size: 'sculpt.handlesScale' } as const;
 
 /** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
@@ -78,7 +78,7 @@ export class Posing {
     this.#settings.choose(pose.length);
   }
 
-  /** Removes the selected ellipsoid; the model lets it shrink until it vanishes. */
+  /** Removes the selected ellipsoid, unless it is the only one; the model lets it shrink until it vanishes. */
   remove(): void {
     const { pose, chosen, names } = this.#settings;
     if (chosen === undefined || pose.length < 2) return;
@@ -123,7 +123,10 @@ export class Posing {
     this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre: place }));
   }
 
-  /** Handles a key in the view; returns whether it was for an ellipsoid. */
+  /**
+   * Handles a key in the view: selects an ellipsoid, chooses what handles and arrow keys do, or changes the selected
+   * ellipsoid. Returns whether the key did one of these.
+   */
   #key({ key, shiftKey }: KeyboardEvent, directions: Vec3[]): boolean {
     const mode = MODE_KEYS[key];
     const number = /^[1-9]$/.test(key) ? Number(key) : 0;
@@ -164,7 +167,7 @@ export class Posing {
 }
 
 interface Step {
-  /** 0 to the right, 1 upwards, 2 towards the viewer. */
+  /** Axis of the view: 0 to the right, 1 upwards, 2 towards the viewer. */
   axis: 0 | 1 | 2;
   sign: 1 | -1;
 }
@@ -178,12 +181,15 @@ const STEPS: Record<string, Step> = {
   PageDown: { axis: 2, sign: -1 },
 };
 
-/** Signs of the rotations, by axis: the front of the ellipsoid turns in the direction of the arrow. */
+/**
+ * Signs of the rotations by arrow and page keys, by axis of the key: the front of the ellipsoid turns in the direction
+ * of the arrow.
+ */
 const TURN_SIGNS = [1, -1, 1] as const;
 
 /**
- * Scales an ellipsoid: by up and down along all axes, by left and right along the first, by the page keys along the
- * third.
+ * Scales an ellipsoid by a key: by up and down along all axes, by left and right along the first, by the page keys
+ * along the third.
  */
 function sized(ellipsoid: ControlEllipsoid, { axis, sign }: Step, much: number): ControlEllipsoid {
   const factor = SCALE_STEP ** (sign * much);

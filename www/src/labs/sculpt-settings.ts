@@ -117,14 +117,17 @@ export class SculptSettings {
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
-   * one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
+   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
-  /** Sends the worker a target pose for the ellipsoids; `names` if ellipsoids were added or removed. */
+  /**
+   * Sends the worker a target pose for the ellipsoids, unless settings cannot be changed now; `names` are the
+   * ellipsoids' names if some were added or removed.
+   */
   send(pose: Pose, dragging: boolean, names = this.#names): void {
     if (!this.#states.canChange) return;
     this.#ui.banner.hide();
@@ -216,7 +219,9 @@ export class SculptSettings {
     });
   }
 
-  /** Builds a new model of the same meshes with the parameters in force, before its first step. */
+  /**
+   * Builds a new model of the same meshes with the parameters in force, before its first step; clears the undo history.
+   */
   rebuild(start: Pose | undefined): Promise<void> {
     return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });

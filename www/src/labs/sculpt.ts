@@ -148,7 +148,10 @@ export class SculptLab implements Lab {
     ];
   }
 
-  /** Displays an opened scene, with the settings of its example or link, and plays it. */
+  /**
+   * Displays an opened scene, with the settings of its example or link. Plays its film; without one, with a pose from a
+   * link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
+   */
   async #adopt(opened: OpenedScene, { name, example, linked }: SculptSource): Promise<void> {
     this.#states.ready = true;
     this.#usual = { ...opened.params };

@@ -72,8 +72,8 @@ export function toHash({ example, file, params, preparation, box, at, view }: Li
 }
 
 /**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
- * ignored.
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether parameters and view options are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedTrack | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);

@@ -88,7 +88,7 @@ const COLUMNS = [
   ],
 ] as const;
 
-/** Returns the data of all tracked frames as CSV, one line per frame, in world units. */
+/** Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units. */
 export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
   const known = frames.some(({ error }) => error);
   const head = ['frame', ...COLUMNS, 'self-intersections', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];

@@ -132,7 +132,7 @@ export class TrackResults {
     this.#frameChosen = false;
   }
 
-  /** Takes the result of a step. */
+  /** Records the result of a step; displays the newest frame, unless the user has chosen another. */
   take({ report, index, frame, closing }: StepEvent): void {
     this.#history.add([report]);
     this.#closing = closing;

@@ -81,8 +81,8 @@ export class TrackSettings {
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
-   * one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
+   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
@@ -114,7 +114,7 @@ export class TrackSettings {
 
   /**
    * Sets parameters, discards the surfaces tracked so far, and runs the tracker again from the first step that depends
-   * on the changed parameters.
+   * on the changed parameters. If the values are in force already, nothing changes.
    */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
@@ -145,7 +145,7 @@ export class TrackSettings {
     });
   }
 
-  /** Builds a new tracker of the same image, before its first step. */
+  /** Builds a new tracker of the same image, before its first step; clears the undo history. */
   rebuild(): Promise<void> {
     return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', this.#setup);

@@ -2,7 +2,7 @@ import { UndoStack } from './undo';
 
 /** Limits of the undo history: number of states, and their total size in bytes. */
 const LIMITS = { entries: 60, bytes: 96e6 };
-/** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
+/** Milliseconds within which repeated changes of the same setting are undone as one, as when a slider is dragged. */
 const MERGE_MS = 1500;
 
 /** A state to go back to: of the model, and of the page. */
@@ -82,8 +82,8 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
 
   /**
    * Saves the present state for undo, before a change. Requests are answered in order, so the state is that before any
-   * request made after this call. Changes with the same `mergeKey` in short succession count as one. Returns a function
-   * that forgets the state, to call if the change fails.
+   * request made after this call. Changes with the same `mergeKey`, unless empty, in short succession ({@link
+   * MERGE_MS}) are undone as one. Returns a function that forgets the state, to call if the change fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     const now = performance.now();

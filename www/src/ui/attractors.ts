@@ -7,7 +7,10 @@ const STRENGTH = 0.1;
 const PLACE = text('extractPanels.attractorPlace');
 const STRONGEST = 1000;
 
-/** Text keys for the strength and the radius of an attractor: short label, full label, and name of a change. */
+/**
+ * Keys, in the catalogue of texts, for the strength and the radius of an attractor: short label, full label, and name
+ * of a change.
+ */
 const FIELDS = {
   strength: {
     shown: 'extractPanels.attractorStrength',

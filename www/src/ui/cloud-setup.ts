@@ -5,7 +5,7 @@ const DEFAULT_MAX_POINTS = 20_000;
 
 /**
  * Settings of the Reconstruct lab's model besides its parameters: the largest number of points used, and the number of
- * clusters kept; undefined for the default and for all.
+ * clusters kept; undefined stands for the default number of points, and for all clusters.
  */
 export interface CloudChoice {
   maxPoints: number | undefined;

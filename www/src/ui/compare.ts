@@ -139,8 +139,9 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 }
 
 /**
- * Creates the table of durations in seconds, for both runs: rows T, N and F as in the paper, the sum of all parts, and
- * the number of iterations; a column per pyramid level and one for the whole run.
+ * Creates the table of durations in seconds, for both runs: rows T (topology), N (normals) and F (forces and motion) as
+ * in the paper, the sum of all parts, and the number of iterations; a column per pyramid level and one for the whole
+ * run.
  */
 function timeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);

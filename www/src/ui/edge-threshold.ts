@@ -10,8 +10,8 @@ import { figure } from './format';
 const NOISE_FACTOR = 2.5;
 
 /**
- * Control for the edge threshold τ, with the estimated noise level, a suggested value, and a warning if noise exceeds
- * the threshold.
+ * Control for the edge threshold τ, with the estimated noise level, a suggested value, and a warning if the threshold
+ * is below {@link NOISE_FACTOR} times the noise.
  */
 export class EdgeThreshold {
   readonly element: HTMLElement;
@@ -25,7 +25,7 @@ export class EdgeThreshold {
 
   /**
    * `onTry` is called with the value while the slider is dragged, and with undefined when it is released; `onChange`
-   * once with the final value.
+   * with each value that is to take effect: released, entered or suggested.
    */
   constructor(
     { label, symbol: letter, help }: ParamSpec,
@@ -79,7 +79,8 @@ export class EdgeThreshold {
 
   /**
    * Shows the threshold, the noise's standard deviation and the suggested threshold, all in intensity units. `largest`:
-   * the largest possible difference of intensities; the slider ends at half of it.
+   * the largest possible difference of intensities; the slider ends at half of it, or at the threshold if that is
+   * larger.
    */
   show(threshold: number, noise: number, suggested: number, largest: number): void {
     this.#suggested = suggested;

@@ -15,7 +15,10 @@ import {
 import type { ContentBelow } from '../view/track';
 import { h, uniqueId } from './dom';
 
-/** Default settings of Canny's detector for greys of 0 to 255; the paper used 1.5, 10 and 20 for its image. */
+/**
+ * Default settings of Canny's detector for greys of 0 to 255; for its image, the paper used a deviation of 1.5, and
+ * thresholds of 10 and 20.
+ */
 const CANNY: CannySettings = { deviation: 1, low: 6, high: 14 };
 const CANNY_FIELDS = [
   { name: 'deviation', label: 'σ', min: 0.1 },

@@ -3,7 +3,7 @@ import { h } from './dom';
 
 /** One of the images of a paper's figure, with its own settings. */
 interface FigureVariant {
-  /** Label of its button. */
+  /** Label of the image's button. */
   name: string;
   /** Describes the result of the lab for comparison with the paper. */
   ourResult: string;

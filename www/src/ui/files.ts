@@ -17,7 +17,7 @@ export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): 
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, text('controls.openFile')));
 }
 
-/** Accepts files dropped anywhere on the page, until aborted, and shows an overlay during the drag. */
+/** Accepts files dropped anywhere on the page, until `signal` is aborted, and shows an overlay during the drag. */
 export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void, signal: AbortSignal): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   window.addEventListener(

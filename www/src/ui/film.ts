@@ -133,7 +133,7 @@ export class FilmControls {
           : plural('sculptPanels.keyframeCount', keys);
   }
 
-  /** Index of the keyframe at the current frame; undefined between keyframes. */
+  /** Index of the keyframe at the current frame; undefined between keyframes, or if the film has none. */
   get #present(): number | undefined {
     const film = this.#film;
     if (!film || !('keys' in film) || this.#frame % film.between !== 0) return undefined;

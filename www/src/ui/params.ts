@@ -4,16 +4,18 @@ import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
- * Number of steps of a slider with a nonlinear scale, or with a linear one for which the specification gives no step.
+ * Number of steps of a slider with a nonlinear scale, or with a linear one for a real number whose specification gives
+ * no step.
  */
 const LOG_STEPS = 200;
 /** Upper bound from which a range counts as unbounded and has no slider. */
 const ENDLESS = 1e9;
 /**
- * If the default is below this fraction of the range, the slider is scaled by a power law with the exponent below, so
- * that most of it is for small values.
+ * If a real number's range begins at 0 and its default is below this fraction of the upper bound, the slider is scaled
+ * by a power law with the exponent {@link SMALL_POWER}, so that most of it is for small values.
  */
 const SMALL_SHARE = 0.01;
+/** Exponent of the power law that scales a slider for small values. */
 const SMALL_POWER = 4;
 /** Value of the extra option in the list of a parameter that accepts a number as well as its named choices. */
 const NUMBER = 'number';

@@ -52,7 +52,9 @@ export class PhaseList {
   }
 }
 
-/** Shows progress; unknown progress is animated only while the run is in progress. */
+/**
+ * Shows progress, 0 to 1; unknown progress (NaN) is animated while the run is in progress, and else shown as one half.
+ */
 function showBar(bar: HTMLProgressElement, part: number, going: boolean): void {
   if (Number.isFinite(part)) bar.value = part;
   else if (going) bar.removeAttribute('value');

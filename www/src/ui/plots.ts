@@ -209,13 +209,13 @@ function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Ra
   return [low - margin, high + margin];
 }
 
-/** Rounds a range outwards to whole powers of ten. */
+/** Rounds a range outwards to whole powers of ten; 10⁻⁷ to 1 without data. */
 function logRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (!low || !high) return [1e-7, 1];
   return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
 }
 
-/** Returns ticks at every power of ten, or at every n-th one if there are many. */
+/** Returns ticks at every power of ten, or at every n-th one where more than five would result. */
 function decades(_: uPlot, __: number, low: number, high: number): number[] {
   const [first, last] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
   const step = Math.max(1, Math.ceil((last - first) / 4));

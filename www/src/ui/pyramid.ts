@@ -54,7 +54,7 @@ export class PyramidPanel {
     this.redraw();
   }
 
-  /** Marks the level of the model. */
+  /** Marks the level that the model is on; shows it in the slices if they are to follow the model. */
   setInUse(level: number): void {
     if (level === this.#inUse) return;
     this.#inUse = level;

@@ -20,7 +20,7 @@ const VIEW_KEYS: [string, string][] = [
 
 /**
  * Installs keyboard shortcuts and a dialog that lists them, opened by `?` or by a button, with links to further help;
- * removed when aborted.
+ * removed when `signal` is aborted.
  */
 export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide: string, signal: AbortSignal): void {
   const list: Shortcut = { key: '?', shown: '?', text: text('controls.keyList'), act: () => dialog.showModal() };
@@ -29,7 +29,7 @@ export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide
   listenForShortcuts([...shortcuts, list], signal);
 }
 
-/** Handles keys anywhere on the page, until aborted, unless the focused element uses the key. */
+/** Handles keys anywhere on the page, until `signal` is aborted, unless the focused element uses the key. */
 function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
   const typing = new Typing(signal);
   const onKey = (event: KeyboardEvent) => {
@@ -80,7 +80,7 @@ function isTakenBy({ target, key }: KeyboardEvent): boolean {
   return key === ' ' && target.closest('button, summary, a, label.button') !== null;
 }
 
-/** Creates the dialog that lists the shortcuts, opened by a button or by `?`; removed when aborted. */
+/** Creates the dialog that lists the shortcuts, opened by a button or by `?`; removed when `signal` is aborted. */
 function shortcutDialog(
   shortcuts: Shortcut[],
   opener: HTMLElement,

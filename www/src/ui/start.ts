@@ -86,7 +86,10 @@ export class StartControls {
     };
   }
 
-  /** The initial surface of the current model; while another one is being tried, {@link value} is ahead of it. */
+  /**
+   * The initial surface of the current model; while another one is being tried, {@link value} is that other one
+   * already.
+   */
   get inForce(): StartChoice {
     return this.#inForce;
   }

@@ -2,8 +2,8 @@ import { text } from '../texts';
 import { h } from './dom';
 
 /**
- * Milliseconds between the last message and a progress report: rarely enough for screen readers, and for the rest of
- * the page.
+ * Smallest number of milliseconds between the last message and a progress report: rarely enough for screen readers, and
+ * for the rest of the page.
  */
 const REPORT_EVERY = 10_000;
 

@@ -211,7 +211,7 @@ function tableOf(runs: [TrackingRun, TrackingRun]): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** Names a tracked run for the comparison. */
+/** Returns a run that was tracked for the comparison in the form that the panel shows, with its name. */
 export function comparedRun(name: string, { facts, closing, error, duration }: ComparedTrack): TrackingRun {
   return { name, facts, closing, error, duration };
 }

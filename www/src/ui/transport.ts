@@ -72,7 +72,7 @@ export class Transport {
     this.showUndo(undefined, undefined);
   }
 
-  /** Sets the descriptions of the actions that can be undone and redone. */
+  /** Shows on the buttons which change undo and redo would affect; a button without one is disabled. */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
     for (const [button, verb, what] of [
       [this.#undo, text('controls.undo'), undoable],
@@ -86,7 +86,10 @@ export class Transport {
     }
   }
 
-  /** `ready`: whether there is a model to run. */
+  /**
+   * Shows the state: enables the buttons that apply, and labels the play button. `ready`: whether there is a model to
+   * run.
+   */
   showState(state: LabState, ready: boolean): void {
     const running = state === 'running';
     this.#playIcon.replaceChildren(icon(running ? PAUSE : PLAY));

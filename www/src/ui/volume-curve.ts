@@ -6,7 +6,7 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 190;
-/** Space above the plot for the names of the marks. */
+/** Space above the plot for the names of end-diastole and end-systole, pixels. */
 const MARK_HEIGHT = 18;
 
 export interface VolumeCurves {

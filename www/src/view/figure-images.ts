@@ -146,8 +146,8 @@ export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subje
 }
 
 /**
- * Paints the row of pixels through the crosshair in all frames, one column per frame, and marks its intersections with
- * the outlines of the surface; `outlines` by frame. Returns the number of intersections.
+ * Paints the row of pixels through the crosshair in all frames, one column per frame, and marks the frame shown and the
+ * intersections of the row with the outlines of the surface; `outlines` by frame. Returns the number of intersections.
  */
 export function paintTime(
   picture: FigureImage,

@@ -20,11 +20,12 @@ export type HandleMode = 'move' | 'turn' | 'size';
 
 const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
 /**
- * Opacities of an ellipsoid, of the selected one, and of their wireframes: high enough to find the ellipsoids, low
- * enough to see the surface through them.
+ * Opacity of the surface of an ellipsoid that is not selected: high enough to find it, low enough to see through it.
  */
 const ELLIPSOID_OPACITY = 0.05;
+/** Opacity of the surface of the selected ellipsoid. */
 const SELECTED_OPACITY = 0.16;
+/** Opacity of the wireframes of all ellipsoids. */
 const WIRE_OPACITY = 0.13;
 
 /**

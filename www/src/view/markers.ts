@@ -9,7 +9,7 @@ import {
 } from 'three';
 import type { Attractor, UncoveredRegion } from '../protocol';
 
-/** Radius of an attractor's point, as a fraction of its radius of influence. */
+/** Radius of the ball drawn at an attractor's point, as a fraction of its radius of influence. */
 const POINT = 0.12;
 
 /** Smallest and largest radius of the mark of an uncovered region, as a fraction of the volume's smallest side. */

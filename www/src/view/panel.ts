@@ -112,7 +112,7 @@ export class SlicePanel {
 
   /**
    * Draws the image, the crosshair, the outline and all overlays on the visible canvas, at the resolution of the
-   * screen.
+   * screen, but at most two pixels per CSS pixel.
    */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;

@@ -12,8 +12,8 @@ import { Viewport } from './viewport';
 /** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
 const OUTLIER_FRACTION = 0.02;
 /**
- * Diameter of a point's disc, as a fraction of the box diagonal: two to three pixels. Smaller ones are hard to see,
- * larger ones hide the surface.
+ * Diameter of a point's disc, as a fraction of the diagonal of the points' box: two to three pixels. Smaller ones are
+ * hard to see, larger ones hide the surface.
  */
 const DISC = 0.014;
 /** Number of points above which the discs are smaller, so that they do not cover everything. */

@@ -58,7 +58,8 @@ export class SculptureView {
   /** Called with the index of the ellipsoid that was clicked, or with undefined. */
   onPick: (index: number | undefined) => void = () => undefined;
   /**
-   * Called whenever the captions of the meshes in the row may have changed; without captions if a single mesh is shown.
+   * Called whenever the captions of the meshes in the row may have changed; with an empty list if a single mesh is
+   * shown.
    */
   onCaptions: (captions: string[]) => void = () => undefined;
   readonly #viewport: Viewport;

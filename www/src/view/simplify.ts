@@ -1,13 +1,13 @@
 /**
- * Simplified surface on the same vertices, drawn while the view is rotated in software: by vertex clustering (Rossignac
- * and Borrel 1993).
+ * Simplified surface on the same vertices, drawn while the view is rotated without a GPU: by vertex clustering
+ * (Rossignac and Borrel 1993).
  */
 
 /** Number of edges sampled for the mean edge length; up to twice as many if they do not divide evenly. */
 const SAMPLES = 1000;
 /**
- * Factor of the area of a cell's side, relative to the squared mean edge length times the ratio of triangles before and
- * after; with it, the number of remaining triangles is close to the target.
+ * The cells for clustering are chosen so that the area of a cell's side is this factor times the squared mean edge
+ * length, times the ratio of the present number of triangles to the target; about the target then remains.
  */
 const TRIANGLES_PER_CELL = 1.5;
 /** Ratio of triangles to the target above which larger cells are tried. */

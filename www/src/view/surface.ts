@@ -21,8 +21,8 @@ import { simplifiedIndices } from './simplify';
 
 const BONE: ColorRepresentation = '#e9dcc3';
 /**
- * Gain of a surface's own colours under lighting. Colours from photographs already contain shading; lit again, white
- * would appear grey.
+ * Factor by which a surface's own colours are brightened under lighting. Colours from photographs already contain
+ * shading; lit again, white would appear grey.
  */
 const OWN_GAIN = 1.6;
 
@@ -62,8 +62,9 @@ export class SurfaceObject {
   #coarse: BufferGeometry | undefined;
   readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
-  /** Numbers of vertices and of triangle corners in use in the buffers. */
+  /** Number of vertices in use in the buffers. */
   #vertices = 0;
+  /** Number of triangle corners in use in the buffers: three times the triangles. */
   #corners = 0;
   #color: SurfaceColor = 'plain';
   #texture: Texture | null = null;
@@ -73,7 +74,7 @@ export class SurfaceObject {
   #values: Float32Array = new Float32Array(0);
   /** The surface's own colours, sRGB of each vertex, 0..1; empty if it has none. */
   #colors: Float32Array = new Float32Array(0);
-  /** The value at the ends of the colour scale; 0 if no values are shown. */
+  /** The magnitude at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
 
   constructor() {
@@ -120,7 +121,7 @@ export class SurfaceObject {
     return this.#range;
   }
 
-  /** The unsimplified mesh, to test for intersections with a ray. */
+  /** The mesh, to test for intersections with a ray; reading it ends the simplified drawing. */
   get target(): Mesh {
     this.#dropCoarse();
     return this.#mesh;

@@ -21,7 +21,7 @@ import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 /** Content below the 3D view: the slices, or one of the paper's figures. */
 export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
 
-/** Boundary votes that are shown: those near the surface, or all in the box. */
+/** Boundary votes that are shown: none, those near the surface (all if the frame has no surface), or all in the box. */
 export type VisibleVotes = 'none' | 'near' | 'all';
 
 export interface TrackViewOptions {

@@ -20,8 +20,9 @@ import { applyPinhole, type PinholeCamera } from './pinhole';
 import { WebGlRendering } from './rendering';
 
 const FIELD_OF_VIEW = 30;
-/** Rotation of the view by an arrow key, radians, and zoom factor of + and -. */
+/** Rotation of the view by one press of an arrow key, radians. */
 const KEY_ROTATION = 0.12;
+/** Factor of the distance to the object by one press of − (or, inverted, of +). */
 const KEY_ZOOM = 1.12;
 /** Largest distance in pixels between pointer down and up for a click; beyond it the pointer rotates the view. */
 const CLICK_TOLERANCE = 4;
@@ -245,7 +246,7 @@ export class Viewport {
     });
   }
 
-  /** Handles a click at a position of the view, −1 to 1 each way. */
+  /** Handles a click at a position of the view, −1 to 1 from left to right and from bottom to top. */
   #click(x: number, y: number): void {
     // Includes changes since the last rendering, or before the first.
     this.#scene.updateMatrixWorld();

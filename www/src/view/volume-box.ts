@@ -72,8 +72,8 @@ function boxOf(grid: Grid, color: ColorRepresentation): LineSegments<EdgesGeomet
 }
 
 /**
- * Returns a point on an axis through the centre of the volume's box, in world space: `part` is 0 at the first voxel's
- * face, 1 at the last one's.
+ * Returns a point on the line along a voxel axis through the centre of the volume's box, in world space: `part` is 0 at
+ * the first voxel's face, 1 at the last one's.
  */
 function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   const at = grid.dims.map((n) => (n - 1) / 2) as Vec3;

@@ -3,8 +3,9 @@ import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { BoundaryVotes } from '../track/protocol';
 import { type SliceOrientation, toWorld } from './anatomy';
 
-/** Colours of votes by none and by all of the windows, sRGB 0..1. */
+/** Colour of boundary votes in the limit of no windows voting for them, sRGB 0..1. */
 const FEW: Vec3 = [0.99, 0.82, 0.38];
+/** Colour of boundary votes that all windows voted for, sRGB 0..1. */
 const MANY: Vec3 = [0.78, 0.1, 0.24];
 /** Number of colour steps of votes on slices. */
 const SHADES = 6;
@@ -19,8 +20,8 @@ export function voteColors(weights: Float32Array): Float32Array {
 }
 
 /**
- * Returns the votes near the surface: all within `reach` (world units) of a vertex, and some up to twice as far along
- * an axis.
+ * Returns the votes near the surface: all within `reach` (world units) of a vertex, some up to twice as far along an
+ * axis, and rarely others.
  */
 export function votesNear(
   { frame, points, weights }: BoundaryVotes,
