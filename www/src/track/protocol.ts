@@ -54,8 +54,8 @@ export interface Preparation {
   binning: 1 | 2;
   enrichment: Enrichment;
   /**
-   * Factor by which slice interpolation increases the number of slices; 0 chooses the one that makes voxels most nearly
-   * cubic.
+   * Factor by which inserted slices divide the distance between slices; 0 chooses the integer that makes voxels most
+   * nearly cubic.
    */
   factor: number;
 }
