@@ -12,9 +12,10 @@ const LARGEST_TURN: f64 = 0.5;
 const MIN_VALENCE: u32 = 3;
 
 /// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
-/// model starts. Vertices in the same cell that are connected by edges within it are merged at their mean. A cluster is
-/// merged only if this neither changes the topology nor turns a triangle by more than 60°, and if each of its vertices
-/// is within `furthest` of the mean along its normal. Only positions and triangles are kept.
+/// model starts. Vertices that are connected by edges within one cell, as returned by `cell` for each position, form a
+/// cluster and are merged at their mean. A cluster is merged only if this neither changes the topology nor turns a
+/// triangle by more than 60°, and if each of its vertices is within `furthest` of the mean, measured along the normal
+/// of the vertex. The result has positions and triangles, but no attributes.
 pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
     let mut clusters = Clusters::new(mesh, cell);
     clusters.keep_contractible(mesh);
@@ -104,7 +105,7 @@ impl Clusters {
     }
 
     /// Dissolves the clusters at edges of more than two triangles of `merged`, at vertices of fewer than three, and at
-    /// triangles turned by more than 60° against `mesh`; returns whether there were any.
+    /// triangles turned by more than 60° against `mesh`; returns whether one of them had more than one vertex.
     fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);

@@ -4,9 +4,9 @@ use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
-/// Positions of the rim of a tube on the edges around a joined vertex, as fractions of the edge from that vertex.
-/// Nearer to it the tube is thin and is cut again at once; further out the strip around it is thinner than δ and
-/// collapses. The others are tried in turn if the first would cause a self-intersection.
+/// Where the rim of a tube lies on the edges around a joined vertex, as fractions of the edge from that vertex. Nearer
+/// to the vertex than the first, the tube is so thin that it is cut again at once; further out, the strip around it is
+/// thinner than δ and collapses. The others are tried in turn if the first causes a self-intersection.
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower id first, with their squared distance.
@@ -83,8 +83,9 @@ impl Resolver {
         contacts
     }
 
-    /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge, otherwise by a tube,
-    /// if `guide` allows it. `None` if nothing was changed.
+    /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge longer than their
+    /// distance, whose square is `square`; by a tube if they are opposite across no edge and `guide` allows it. `None`
+    /// if nothing was changed.
     fn resolve_contact(
         &mut self,
         mesh: &mut Mesh,

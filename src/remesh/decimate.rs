@@ -13,30 +13,33 @@ use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The weight of the squared distance from the original vertices, relative to that from the planes. It regularises flat
-/// regions, where the minimiser is undetermined and needles would develop; at a hundredth, detail is rounded off.
+/// The weight of the squared distance from the original vertices, relative to that from the planes of the triangles. It
+/// regularises flat regions, where the position of least error is undetermined and needles would develop; with 0.01,
+/// detail is rounded off.
 const POINT_WEIGHT: f64 = 1e-4;
 
-/// The highest valence after a collapse: vertices of higher valence are surrounded by needles, and the intersection
-/// test is quadratic in it.
+/// The highest valence of the vertex that remains after a collapse: vertices of higher valence are surrounded by
+/// needles, and the intersection test is quadratic in it.
 const MAX_NEIGHBOURS: usize = 24;
 
 /// The cosine of the largest angle by which one collapse may turn a triangle, 78°.
 const MIN_COSINE: f64 = 0.2;
 
-/// The number of times all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds
-/// that free one edge each would make the work quadratic.
+/// The largest number of times all edges are queued. A rejected edge may become possible once its neighbours are gone;
+/// rounds that free one edge each would make the work quadratic.
 const ROUNDS: usize = 4;
 
 /// The work limit of the intersection tests, in boxes visited and pairs of triangles tested: this much per triangle of
-/// the mesh, plus `WORK_AT_LEAST`. 200 to 600 per triangle are common. With five times as much, 42,000 triangles whose
-/// boxes all overlap took 48 s.
+/// the mesh, plus [`WORK_AT_LEAST`]. 200 to 600 per triangle are common. With five times as much, 42,000 triangles
+/// whose boxes all overlap took 48 s.
 const WORK_PER_TRIANGLE: u64 = 2_000;
+/// The constant part of the work limit, in the units of [`WORK_PER_TRIANGLE`], for small meshes.
 const WORK_AT_LEAST: u64 = 10_000_000;
 
 /// Decimates a mesh: collapses edges in the order of their quadric error until at most `target_triangles` are left, no
-/// edge can be collapsed safely, or the work limit is reached, as among thousands of needles that block each other.
-/// Returns the number of collapses, each of which removes two triangles. Vertices are renumbered.
+/// safe collapse is found (rejected edges are tried again in up to four passes), or the work limit is reached, as among
+/// thousands of needles that block each other. Returns the number of collapses, each of which removes two triangles.
+/// Vertices are renumbered unless the target is met from the start.
 ///
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
 /// intersection. The attributes of the remaining vertex are the means of both.
@@ -155,8 +158,8 @@ impl<'a> Decimation<'a> {
         self.stamps[u.index()] + self.stamps[v.index()]
     }
 
-    /// Returns the candidate positions for the remaining vertex by increasing error: the minimiser, if it is in range,
-    /// the midpoint and both ends.
+    /// Returns the candidate positions for the remaining vertex by increasing error: the position of least error, if it
+    /// is determined and finite, the midpoint of the edge and both ends.
     fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[RatedPosition; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());

@@ -10,8 +10,9 @@ use crate::mesh::{EditError, Mesh, OppositeVertices, VertexId};
 /// collapses would produce needles.
 const LENGTHENED: f32 = 1.6;
 
-/// The largest number of edits around one vertex in a call; it is then skipped until it is marked again. Edits of edges
-/// with different bounds may undo each other; on a head scan they used up the work of a whole call, 20 s.
+/// The largest number of edits around one vertex in a call. The vertex is then skipped for the rest of the call, and
+/// not left pending for the next. Edits of edges with different bounds may undo each other; on a head scan they used up
+/// the work of a whole call, 20 s.
 const MAX_EDITS: u8 = 40;
 
 impl Resolver {
@@ -26,8 +27,8 @@ impl Resolver {
         }
     }
 
-    /// Makes a split, flip or collapse at a vertex, and rolls it back if triangles would intersect. Outside the tested
-    /// cells, only triangles with a common corner are tested.
+    /// Makes a split, flip or collapse at a vertex, and rolls it back if triangles would intersect. Outside the cells
+    /// of [`Self::set_tested_cells`], only pairs of triangles with a common corner are tested.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -82,7 +83,7 @@ impl Resolver {
     }
 
     /// Removes an edge that is too long: flips it if a vertex at its midpoint would be too near an opposite one and the
-    /// flip makes it shorter, otherwise splits it. `Ok(false)` at the limit of vertices.
+    /// flip makes it shorter; otherwise, or if the flip is rejected, splits it. `Ok(false)` at the limit of vertices.
     fn shorten(
         &mut self,
         mesh: &mut Mesh,

@@ -15,8 +15,8 @@ const CUT_PUSH_LIMIT: f32 = 0.6;
 
 impl Resolver {
     /// Cuts the neck along a ring of three edges through the edge `uv` and a common neighbour (annular change): the
-    /// shortest such ring that `guide` allows and whose cut causes no self-intersection. `Ok(false)` if `guide` allows
-    /// none.
+    /// shortest such ring that `guide` allows and whose cut causes no self-intersection. `Ok(false)` if there is none
+    /// that `guide` allows.
     pub(super) fn cut_neck(
         &mut self,
         mesh: &mut Mesh,

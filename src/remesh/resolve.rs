@@ -12,11 +12,12 @@ use std::collections::VecDeque;
 /// violated. Hard scenes never needed more than five; the rest stays pending for the next call.
 const PASSES: usize = 8;
 
-/// The work limit of a call, in nearby vertices visited: this much per vertex of the mesh, plus `MIN_EFFORT`; the rest
-/// stays pending for the next call. An edit visits about 60, and ordinary iterations make less than one edit per ten
-/// vertices. Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the
-/// surface edges cannot be brought within bounds.
+/// The work limit of a call, in nearby vertices visited: this much per vertex of the mesh, plus [`MIN_EFFORT`]; the
+/// rest stays pending for the next call. An edit visits about 60, and ordinary iterations make less than one edit per
+/// ten vertices. Without this limit a call might never return: edits can undo each other, and on a needle pulled out of
+/// the surface edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
+/// The constant part of the work limit, in nearby vertices visited, for small meshes.
 const MIN_EFFORT: u64 = 100_000;
 
 /// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
@@ -182,12 +183,14 @@ impl Resolver {
     /// call; returns the changes made.
     ///
     /// Other vertices are processed only if an edit or a contact reaches them. First, components crushed by the last
-    /// move are removed, and necks held in it are cut.
+    /// move are removed, and necks held in it are cut. What is left after eight rounds or at the work limit stays
+    /// pending.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }
 
-    /// Does the same as [`Self::resolve`], but changes the topology only if `guide` allows it.
+    /// Restores the edge bounds and resolves contacts as [`Self::resolve`] does, but joins, cuts and collapses only if
+    /// `guide` allows it, and removes small components depending on [`TopologyGuide::has_content`].
     pub fn resolve_guided(
         &mut self,
         mesh: &mut Mesh,
@@ -304,7 +307,7 @@ impl Resolver {
         }
     }
 
-    /// Does the same as [`Self::touch`], for a vertex that an edit created or displaced.
+    /// Records a vertex that an edit created or displaced, and marks it as [`Self::touch`] does.
     pub(super) fn touch_edited(&mut self, v: VertexId) {
         self.edited.push(v);
         self.touch(v);

@@ -26,16 +26,17 @@ impl EdgeBounds {
     }
 }
 
-/// The largest number of vertices of a result: a limit for use in a browser, where each takes about `BYTES_PER_VERTEX`
-/// during remeshing.
+/// The largest number of vertices of a result: a limit for use in a browser.
 pub(super) const MAX_VERTICES: usize = 8_000_000;
+/// The memory that a vertex takes during remeshing, in bytes.
 const BYTES_PER_VERTEX: f64 = 250.0;
 
 /// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length): 2 / √3.
 const VERTICES_PER_AREA: f64 = 1.1547;
 
 impl EdgeBounds {
-    /// Checks the bounds, and that a mesh of the shape of `mesh` with edges within them fits into memory.
+    /// Checks the bounds, and that a mesh of the shape of `mesh` with edges within them fits into memory, by an
+    /// estimate from its area and edge lengths.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
@@ -221,7 +222,7 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
 }
 
 /// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (figure 5) or the
-/// mesh has `most` vertices.
+/// mesh has `most` vertices; rejected splits are skipped.
 pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let longest = bounds.max * bounds.max;
@@ -249,7 +250,8 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
-/// Flips edges while that lowers Σ (valence − 6)² over the four corners around them (figure 6).
+/// Flips edges while that brings the valences of the four corners around them nearer to six: lowers their sum of
+/// (valence − 6)² (figure 6).
 pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     // Vertices whose edges have to be tested again since a flip changed valences near them.
@@ -277,8 +279,8 @@ pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Ed
     changes
 }
 
-/// Flips the edge if that lowers Σ (valence − 6)² and is allowed, and marks as stale the vertices of all edges with
-/// changed corners; returns whether it was flipped.
+/// Flips the edge if that lowers the sum of (valence − 6)² over its four corners and is allowed, and marks as stale the
+/// vertices of all edges with changed corners; returns whether it was flipped.
 fn flip_if_wanted(
     mesh: &mut Mesh,
     bounds: EdgeBounds,

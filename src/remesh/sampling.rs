@@ -26,8 +26,8 @@ impl Sampling {
         Self { delta, sizes: None }
     }
 
-    /// Returns this sampling with δ · (1 + scalar) at each vertex, read from a scalar attribute above −1. Small
-    /// components are still measured by δ.
+    /// Returns this sampling with a local δ at each vertex: δ times 1 + the scalar attribute `sizes`, which must be
+    /// above −1. Small components are still measured by δ.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
     }

@@ -60,7 +60,7 @@ impl Resolver {
     /// It may have been removed before: the two sides of a cut handle are one component.
     ///
     /// A negligible component has at most 32 vertices and a signed volume less than δ³, and is not a cavity of at least
-    /// δ³ that `guide` confirms. Other components of negative volume would grow in empty space.
+    /// δ³ in which `guide` finds background. Other components of negative volume would grow in empty space.
     pub(super) fn remove_if_negligible(
         &mut self,
         mesh: &mut Mesh,
@@ -86,10 +86,10 @@ impl Resolver {
     /// Removes small components that were crushed or inverted by a move.
     ///
     /// When two sides press against each other, vertices are held, no edge becomes short, and a component would persist
-    /// for ever. So a component with held vertices is removed if it is smaller than the smallest sphere, if none of its
-    /// vertices could move, or if it is solid, more than half of them could not, and `guide` finds it empty. A
-    /// component this small can also be inverted between two states without self-intersections, as when the apex of a
-    /// tetrahedron passes through its base.
+    /// for ever. So a component with held vertices is removed if it is smaller than the smallest sphere (as a cavity
+    /// without background always is), if none of its vertices could move, or if it is solid, more than half of them
+    /// could not, and `guide` finds it empty. A component this small can also be inverted between two states without
+    /// self-intersections, as when the apex of a tetrahedron passes through its base.
     pub(super) fn remove_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -117,8 +117,8 @@ impl Resolver {
     }
 
     /// Updates the list of small components after the edits of a call, and removes cavities smaller than the smallest
-    /// sphere, except for those of at least δ³ that `guide` confirms: an edit may have inverted a solid, which would
-    /// grow in empty space.
+    /// sphere, except for those of at least δ³ in which `guide` finds background: an edit may have inverted a solid,
+    /// which would grow in empty space.
     pub(super) fn update_small_components(
         &mut self,
         mesh: &mut Mesh,
@@ -167,8 +167,8 @@ impl Resolver {
         found
     }
 
-    /// Removes all negligible components, of at most 32 vertices and less than δ³, except for cavities that `guide`
-    /// confirms; returns the number of components removed.
+    /// Removes all negligible components, of at most 32 vertices and less than δ³, except for cavities of at least δ³
+    /// in which `guide` finds background; returns the number of components removed.
     pub fn remove_negligible(
         &mut self,
         mesh: &mut Mesh,
@@ -199,7 +199,7 @@ fn is_crushed(
 }
 
 /// Returns the volume of a component to be compared with the thresholds of removal: that of a cavity counts as positive
-/// if `guide` confirms it, otherwise as negative.
+/// if `guide` finds background in it, otherwise as negative.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
@@ -251,8 +251,8 @@ mod tests {
         resolver.resolve(mesh, sampling, &all)
     }
 
-    /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and
-    /// split, seed 297).
+    /// The component intersects itself neither before nor after the inversion. Regression: an inverted component grew
+    /// until it filled the image (merge and split, seed 297).
     #[test]
     fn an_inverted_component_is_removed() {
         let rim = |k: u32| {
@@ -385,7 +385,7 @@ mod tests {
         assert_eq!(both.vertex_count(), 12);
     }
 
-    /// Returns three icosahedra, a cavity, a solid inside it and another solid beside it, and the vertices of the
+    /// Returns three icosahedra: a cavity, a solid inside it and another solid beside it, and the vertices of the
     /// cavity.
     fn nested() -> (Mesh, Vec<VertexId>) {
         let mut hollow = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();

@@ -16,7 +16,8 @@ impl Volume {
     /// information in fewer voxels, and windows of a fixed number of voxels then cover a larger region.
     ///
     /// # Errors
-    /// A factor not in 1..=16, or larger than the number of voxels along its axis; [`VolumeError::TooLarge`].
+    /// [`VolumeError::InvalidArgument`] for a factor not in 1..=16 or larger than the number of voxels along its axis,
+    /// and if no complete block has a finite voxel; [`VolumeError::TooLarge`].
     pub fn binned(&self, factors: [usize; 3]) -> Result<Volume, VolumeError> {
         let dims = self.dims();
         if (0..3).any(|axis| !(1..=MAX_FACTOR).contains(&factors[axis]) || factors[axis] > dims[axis]) {

@@ -83,8 +83,8 @@ struct MarchingCubes<'a> {
     pairs: [Vec<u8>; 2],
     /// Marching cubes case of each cube in the current row.
     row: Vec<u8>,
-    /// Index of the vertex on each grid edge, found by the node where the edge starts: x edges of an even and an odd
-    /// slice, y edges of an even and an odd slice, z edges between the two.
+    /// Index of the mesh vertex on each grid edge, by the node where the edge starts, in five tables: x edges of the
+    /// current even and odd slice, y edges of these, and z edges between the two.
     vertices: Vec<u32>,
     mesh: TriangleMesh,
 }

@@ -131,10 +131,11 @@ impl Volume {
 
 /// Memory layout of the slices perpendicular to one axis.
 struct Slices {
-    /// Number of voxels along the lower one of the two axes within a slice; `down` is that along the other one, and
-    /// `steps` are the memory strides of these two axes and of the slice axis.
+    /// Number of voxels along the lower one of the two axes within a slice.
     across: usize,
+    /// Number of voxels along the higher one of these axes.
     down: usize,
+    /// Memory strides, in voxels, of the lower and the higher axis within a slice and of the axis across slices.
     steps: [usize; 3],
 }
 

@@ -40,7 +40,8 @@ pub(super) struct Image {
     pub values: Vec<f32>,
 }
 
-/// Optical flow along x and y for each pixel of the midpoint image, in pixels.
+/// Optical flow along x and y for each pixel of the midpoint image: the displacement from the first image to the
+/// second, in pixels.
 pub(super) struct Flow {
     pub x: Image,
     pub y: Image,

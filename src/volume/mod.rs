@@ -283,7 +283,7 @@ impl Volume {
         ))
     }
 
-    /// Returns the intensity of one voxel, made finite by [`Self::finite`].
+    /// Returns the intensity of one voxel, given by its index in the stored values, made finite by [`Self::finite`].
     fn intensity_at(&self, index: usize) -> f64 {
         let stored = self.voxels.get(index).unwrap_or(f64::NAN);
         self.finite(stored * self.slope + self.intercept)

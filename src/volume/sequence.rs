@@ -16,8 +16,8 @@ impl Volume {
     /// If `frame_seconds` is `None`, that of the first volume is used. The affine is that of the first volume.
     ///
     /// # Errors
-    /// No frame; a frame whose dimensions, position, space or unit differ from those of the first; a negative time;
-    /// [`VolumeError::TooLarge`].
+    /// No frame; a frame whose dimensions, space or unit differ from those of the first, or its position by more than a
+    /// thousandth of a voxel; a time that is negative or not finite; [`VolumeError::TooLarge`].
     pub fn from_frames(frames: &[Volume], frame_seconds: Option<f64>) -> Result<Volume, VolumeError> {
         let Some(first) = frames.first() else {
             return Err(VolumeError::invalid("frames", "must contain at least one volume"));
@@ -42,7 +42,7 @@ impl Volume {
 }
 
 /// Returns the stored values of all frames, and their common slope and intercept; if frames differ in these or in their
-/// type, the intensities as `f32`.
+/// type, the intensities as `f32`, slope 1 and intercept 0.
 fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
     let (slope, intercept) = (frames[0].slope, frames[0].intercept);
     if frames.iter().all(|f| f.slope == slope && f.intercept == intercept) {

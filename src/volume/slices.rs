@@ -46,7 +46,7 @@ impl Volume {
     /// fixed z has rows of x, one per y; fixed y rows of x, one per z; fixed x rows of y, one per z.
     ///
     /// # Errors
-    /// `axis`, `index` or `frame` out of range.
+    /// `axis`, `index` or `frame` out of range; [`VolumeError::TooLarge`].
     pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, VolumeError> {
         let start = self.frame_start(frame)?;
         let strides = [1, self.dims[0], self.dims[0] * self.dims[1]];

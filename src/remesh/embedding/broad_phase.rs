@@ -12,8 +12,8 @@ use crate::spatial::{Proximity, VertexBall, near_pairs};
 const MANY: usize = 8;
 
 impl Embedding {
-    /// Measures the longest edges of dirty vertices, and updates grid positions and pairs of those whose skin is used
-    /// up.
+    /// Measures the longest edge at each of the `dirty` vertices; for those with a pending search, updates the position
+    /// in the grid and finds the pairs anew.
     pub(super) fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let is_entered = self.entered == Some(mesh.geometry_version());
         let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
@@ -90,7 +90,8 @@ impl Embedding {
         }
     }
 
-    /// Stores a pair at both of its vertices, unless these are identical or adjacent, and whether the two may touch.
+    /// Stores a pair at both of its vertices, unless these are identical or adjacent, and marks both if they may come
+    /// within contact distance.
     fn add_pair(&mut self, mesh: &Mesh, a: &VertexBall, b: &VertexBall, proximity: Proximity) {
         if a.vertex == b.vertex || mesh.ring(a.vertex).contains(b.vertex) {
             return;
@@ -113,8 +114,8 @@ impl Embedding {
         self.nearby[v.index()].iter().position(|near| near.vertex == w)
     }
 
-    /// Returns the distance between two vertices below which their triangles can intersect, or the two touch, before
-    /// either is searched around again.
+    /// Returns the distance between two vertices below which their triangles can intersect, or the two come within
+    /// contact distance, before either is searched around again.
     fn proximity(&self) -> Proximity {
         // Distance and edges change by twice the skin at most.
         let change = 2.0 * (SEARCH_SKIN * self.ordinary_edge + self.exact_below());

@@ -37,10 +37,10 @@ pub(super) struct Certificates {
     /// The odometer of each vertex: the sum of the largest displacements in its one-ring, increased further by edits
     /// that change it.
     odometer: Vec<f32>,
-    /// The odometer reading up to which the one-ring of each vertex itself is certified.
+    /// The odometer reading up to which the triangles around each vertex are certified not to intersect each other.
     own: Vec<f32>,
-    /// The sum of both odometers up to which a pair of adjacent vertices is certified, by vertex and position of the
-    /// other in its ring.
+    /// The sum of both odometers up to which the triangles at two adjacent vertices are certified not to intersect, by
+    /// vertex and position of the other in its ring.
     along_edges: Vec<SmallVec<[f32; ORDINARY]>>,
     worn: bool,
 }
@@ -94,14 +94,15 @@ impl Certificates {
         self.odometer[v.index()] + self.odometer[w.index()]
     }
 
-    /// Returns the displacement that remains for each vertex of a pair certified up to the odometer sum `until`; `None`
-    /// if it is too small to reuse the certificate.
+    /// Returns how far the one-ring of each vertex of a pair may still move before the pair is tested again, where
+    /// `until` is the odometer sum up to which it is certified; `None` if that is too little to reuse the certificate.
     pub(super) fn left(&self, pair: [VertexId; 2], until: f32) -> Option<f32> {
         let left = 0.5 * (until - self.sum(pair));
         (left > WORTH * self.edge).then_some(left)
     }
 
-    /// Returns the odometer sum up to which a clearance found by a test certifies a pair.
+    /// Returns the sum of both odometers up to which a clearance found by a test certifies that a pair does not
+    /// intersect.
     pub(super) fn until(&self, pair: [VertexId; 2], clearance: f32) -> f32 {
         let sum = self.sum(pair);
         let until = (sum + 2.0 * lower(MAX_CLEARANCE * self.edge, clearance)) * (1.0 - ROUNDING);
@@ -109,8 +110,8 @@ impl Certificates {
         if until < f32::INFINITY { until } else { 0.0 }
     }
 
-    /// Returns the displacement that remains by the certificate of the one-ring of `v` itself; `None` if it is too
-    /// small.
+    /// Returns how far the one-ring of `v` may still move before its triangles are tested against each other again;
+    /// `None` if that is too little to reuse the certificate.
     pub(super) fn left_of_own(&self, v: VertexId) -> Option<f32> {
         self.left([v, v], 2.0 * self.own[v.index()])
     }
@@ -119,8 +120,8 @@ impl Certificates {
         self.own[v.index()] = 0.5 * self.until([v, v], clearance);
     }
 
-    /// Returns the displacement that remains by the certificate of a vertex and its neighbour at `position` in its
-    /// ring; `None` if it is too small.
+    /// Returns how far the one-rings of a vertex and its neighbour at `position` in its ring may still move before the
+    /// pair is tested again; `None` if that is too little to reuse the certificate.
     pub(super) fn left_along(&self, pair: [VertexId; 2], position: usize) -> Option<f32> {
         self.left(pair, *self.along_edges[pair[0].index()].get(position)?)
     }

@@ -16,7 +16,8 @@ const SHORTEST: f32 = 1e-30;
 type Triangle = [Vec3; 3];
 
 /// Returns the clearance between the triangles at `u` and those at `v` without a common corner; not positive if some
-/// pair is not known to be disjoint. The search ends at `enough`. `longest` is the longest edge at `u` and `v`.
+/// pair is not known to be disjoint. Of clearances above `enough`, any may be returned. `longest` is the longest edge
+/// at `u` and `v`.
 pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
     // Lengths are relative to the longest edge, so that squares of products of edges neither over- nor underflow.
     let (origin, per_length) = (mesh.position(u), 1.0 / longest);

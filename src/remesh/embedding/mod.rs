@@ -43,16 +43,17 @@ const NEAREST_CORNER: f32 = 0.577_351;
 /// to the longest edge of both.
 const PIERCING: f32 = 0.763_763;
 
-/// The skin of the broad phase: the displacement of a one-ring after which its vertex is searched for neighbours again,
-/// relative to the ordinary edge (that of [`Embedding::sync_with_edge`]). A wider skin gives more pairs, a narrower one
-/// more searches. Few vertices of an ordinary mesh have any pair.
+/// The skin of the broad phase: the displacement of a one-ring after which the vertices near its centre are searched
+/// for again, relative to the ordinary edge (that of [`Embedding::sync_with_edge`]). A wider skin gives more pairs, a
+/// narrower one more searches. Few vertices of an ordinary mesh have any pair.
 const SEARCH_SKIN: f32 = 0.04;
 
 /// The smallest length that is distinguished, in units of the mesh: squares of shorter lengths lose their digits to
 /// rounding. Edges and displacements count as at least this long, and a smaller clearance as none.
 const MIN_LENGTH: f32 = 1e-17;
 
-/// A non-adjacent vertex found near another by the broad phase, and the odometer sum up to which the pair is certified.
+/// A non-adjacent vertex found near another by the broad phase, and the sum of both odometers (see [`Certificates`]) up
+/// to which their triangles are certified not to intersect.
 #[derive(Clone, Copy, Debug)]
 struct Nearby {
     vertex: VertexId,
@@ -76,15 +77,16 @@ pub struct Embedding {
     /// The remaining motion bounds of each vertex: the displacement of its one-ring up to the next test.
     motion_bounds: Vec<MotionBounds>,
     certificates: Certificates,
-    /// The largest displacement in the one-ring of each vertex during a move; `touched` are the vertices where it is
-    /// not 0.
+    /// The largest displacement in the one-ring of each vertex during a move.
     ring_displacement: Vec<f32>,
+    /// The vertices whose `ring_displacement` is not 0.
     touched: Vec<VertexId>,
     /// Vertices that edits created or changed since the last move; the pairs of their neighbours do not include them
     /// yet.
     edited: Vec<VertexId>,
-    /// The pending checks of each vertex; `dirty` are the vertices that have any.
+    /// The pending checks of each vertex.
     pending: Vec<Checks>,
+    /// The vertices with pending checks.
     dirty: Vec<VertexId>,
     /// The geometry version of the mesh with which this is synchronised.
     version: Option<u32>,
@@ -96,7 +98,7 @@ pub struct Embedding {
     found: Vec<VertexId>,
     /// Vertex positions before the current move.
     from: Vec<Vec3>,
-    /// Whether a self-intersection was found at a vertex without displacement since the last full synchronisation.
+    /// Whether a corner of an intersecting triangle had no displacement in a move since the last full synchronisation.
     stuck: bool,
     effort: u64,
     /// The output space, in which triangles must not intersect either.
@@ -213,7 +215,7 @@ impl Embedding {
     }
 
     /// Returns whether the mesh is free of self-intersections: no two triangles have more than their common corners and
-    /// edges in common; exact.
+    /// edges in common, also after the map of [`Self::watch_output`]; exact.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
         self.check_all(mesh).is_empty()
     }

@@ -26,8 +26,8 @@ impl Embedding {
         self.check(mesh, true)
     }
 
-    /// Runs the pending checks of dirty vertices, and stores the clearances found as motion bounds and certificates.
-    /// Returns the corners of all triangles that intersect another, sorted.
+    /// Runs the pending collision checks of all vertices that have any, and stores the clearances found as motion
+    /// bounds and certificates. Returns the corners of all triangles that intersect another, sorted.
     pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check(mesh, false)
     }
@@ -176,7 +176,7 @@ impl Embedding {
         higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.ordinary_edge))
     }
 
-    /// Returns the clearance, or 0 if exact tests have to decide.
+    /// Returns `clearance`, or 0 if it is so small that exact tests have to decide.
     fn or_zero(&self, clearance: f32) -> f32 {
         if clearance > self.exact_below() { clearance } else { 0.0 }
     }

@@ -18,14 +18,14 @@ pub(super) const ORDINARY_RING: usize = 16;
 /// actual one.
 pub(super) const ROUNDING: f32 = 1e-4;
 
-/// The largest clearance, relative to the lengths from which it was derived: the bounds hold for smaller displacements
-/// only.
+/// The largest clearance that [`facing_clearance`] returns, relative to the longest edge: its bound holds for smaller
+/// displacements only.
 const SMALL: f32 = 0.125;
 
 /// The remaining share of the distance from a plane after the plane was turned by the displacements of two vertices in
-/// it that are at least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down. `TURN` is the
-/// largest such displacement relative to their distance.
+/// it that are at least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down.
 const LEFT_BY_TURN: f32 = 0.94;
+/// The largest displacement of two vertices, relative to their distance, for which [`LEFT_BY_TURN`] holds.
 const TURN: f32 = 1.0 / 6.0;
 
 /// Returns the length of the longest edge at `v`; not less than [`MIN_LENGTH`].
@@ -166,22 +166,22 @@ pub(super) fn clearance_beside_line(gap: f32, reach: f32, square: f32, longest: 
     lower(clearance, TURN * square.sqrt())
 }
 
-/// Returns the clearance as [`plane_clearance`] does, by the plane through the common neighbour `p` that is normal to
-/// `v` − `u`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, by the plane through
+/// the common neighbour `p` that is normal to `v` − `u`.
 pub(super) fn corner_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
     let normal = unit(mesh.position(v) - mesh.position(u));
     // The plane moves with p and keeps its normal.
     0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
 }
 
-/// Returns the clearance as [`plane_clearance`] does, by the bisecting plane of `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v`, by the bisecting plane of `u` and `v`.
 pub(super) fn mid_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let (p, q) = (mesh.position(u), mesh.position(v));
     gap(mesh, [u, v], [u, v], (p + q) * 0.5, unit(q - p)) - ROUNDING * longest
 }
 
-/// Returns the clearance as [`plane_clearance`] does, by a plane between two sheets that face each other or away from
-/// each other.
+/// Returns the clearance between the triangles at `u` and those at `v`, by a plane between two sheets that face each
+/// other or away from each other.
 pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let normal = unit(mesh.area_normal(u) - mesh.area_normal(v));
     let (p, q) = (mesh.position(u), mesh.position(v));

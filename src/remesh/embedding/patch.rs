@@ -7,8 +7,7 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
-/// Number of changed triangles for which the work of an edit is counted twice, for double of it three times, and so on;
-/// most edits change fewer.
+/// The work of an edit that changes n triangles is counted 1 + ⌊n / this⌋ times; most edits change fewer than this.
 const ORDINARY_PATCH: usize = 24;
 
 /// The work counted for an edit that is tested in one-rings only, in units of nearby vertices visited.

@@ -23,7 +23,8 @@ type Moves = Vec<(VertexId, Vec3)>;
 impl Embedding {
     /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other; used
     /// for the start from a contour and for remeshing, after edits that were not fully tested. Returns whether none
-    /// intersect afterwards; if some do, other clusters may have been changed.
+    /// intersect afterwards; if some do, other clusters may have been changed. With more than 4000 corners, nothing is
+    /// tried.
     ///
     /// `intersecting` must contain all corners of intersecting triangles, as returned by
     /// [`Self::intersecting_vertices`].

@@ -8,7 +8,8 @@ use crate::mesh::{Mesh, VertexId};
 const STEPS: usize = 200;
 
 /// A point inside a triangle is accepted at once if its squared distance from the query point is below this share of
-/// that of the corner: no other triangle around the corner is much nearer, except on rough surfaces.
+/// the squared distance of the vertex around which triangles are tested: no other triangle there is much nearer, except
+/// on rough surfaces.
 const NEAR: f32 = 0.04;
 
 /// The squared sine of an angle below which only the edges of a triangle are tested: rounding makes barycentric

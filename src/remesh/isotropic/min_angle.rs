@@ -13,8 +13,9 @@ const POOR: f32 = 0.2966;
 /// The largest number of passes over all poor triangles; most improvements are made in three.
 const ROUNDS: usize = 6;
 
-/// Step lengths tried in turn, as fractions of the target edge; a vertex makes at most `MOVES` steps.
+/// Step lengths tried in turn, as fractions of the target edge.
 const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
+/// The largest number of steps that a vertex makes in one attempt.
 const MOVES: usize = 4;
 
 /// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
@@ -141,8 +142,8 @@ fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, sessio
     }
 }
 
-/// Moves `v` by the best step of length `reach` parallel to one of its edges, if that increases the smallest angle
-/// around it; returns whether it moved.
+/// Moves `v` by the best step of length `reach` parallel to one of its edges, then to the closest point on the input
+/// surface, if that increases the smallest angle around it; returns whether it moved.
 fn best_step<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,

@@ -28,15 +28,17 @@ use min_angle::improve_angles;
 use relax::relax;
 use session::Session;
 
-/// The largest number of rounds of restructuring, each followed by up to `SWEEPS` relaxation sweeps. One fewer of
-/// either leaves twice as many poor angles for the final optimisation; more cost more than they save.
+/// The largest number of rounds of restructuring. One fewer leaves twice as many poor angles for the final
+/// optimisation; more cost more than they save.
 const ROUNDS: usize = 5;
+/// The largest number of relaxation sweeps after each round; for one fewer or more, the same holds as for [`ROUNDS`].
 const SWEEPS: usize = 2;
 
 /// The ratio of the longest to the shortest edge allowed in rounds, by Botsch & Kobbelt: triangles with such edges have
 /// no angle below 33°. With a smaller ratio, halves of long edges are too short. To reach it, the requested bounds are
-/// narrowed by a factor of at most `MAX_NARROWING` each.
+/// narrowed.
 const INNER_RATIO: f32 = 5.0 / 3.0;
+/// The largest factor by which each of the requested bounds is narrowed in rounds.
 const MAX_NARROWING: f32 = 1.2;
 
 /// The largest number of runs with unchecked edits. Usually the second one has no intersections; if all have, a last

@@ -90,8 +90,9 @@ pub(super) struct Move {
     pub deviation: f32,
 }
 
-/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn over or face
-/// inwards, an edge leave its bounds or get further out of them, or the surface deviate too far.
+/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn by 78° or more,
+/// or face inwards as it did not before, an edge leave its bounds or get further out of them, or the surface deviate
+/// too far.
 pub(super) fn moved<E: EditPolicy>(
     mesh: &Mesh,
     v: VertexId,

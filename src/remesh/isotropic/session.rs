@@ -8,9 +8,10 @@ use crate::mesh::{EditError, Mesh, VertexId};
 use crate::remesh::EditPolicy;
 
 /// The largest deviation from the input surface that collapses and moves may accumulate at a vertex, as a fraction of
-/// the target edge; `FLIP_DEPTH` is the largest distance between the old and the new edge of a flip. Higher values
-/// shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces stay out of bounds.
+/// the target edge. Higher values shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces
+/// stay out of bounds.
 const MAX_DEVIATION: f32 = 0.25;
+/// The largest distance between the old and the new edge of a flip, as a fraction of the target edge.
 const FLIP_DEPTH: f32 = 0.15;
 
 /// State of a remeshing run, and the [`EditPolicy`] that keeps the mesh close to the input surface.

@@ -140,8 +140,9 @@ pub struct SurfaceExtractor {
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Largest number of refinement steps of a vertex; `refine_steps_done` is the number performed.
+    /// Largest number of refinement steps of a vertex.
     refine_steps: usize,
+    /// Number of refinement steps performed.
     refine_steps_done: usize,
     /// The surface during and after refinement; `None` before.
     surface: Option<Surface>,
