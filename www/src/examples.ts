@@ -14,7 +14,7 @@ export interface Example {
   /** Unit of lengths in world space; empty if the file does not state one. */
   unit: Unit;
   levels: number;
-  /** Mean edge length in world units; if undefined, the model chooses it. */
+  /** Target edge length on the finest level, in world units; if undefined, the model derives it from the voxel size. */
   edge?: number;
   params: ParamValues & { iso: number };
   credit: string;

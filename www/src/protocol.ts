@@ -44,7 +44,7 @@ export interface Setup {
   start: StartShape;
   /** Number of coarser pyramid levels that the run starts with, besides the volume itself. */
   levels: number;
-  /** Mean edge length on the finest level in world units; if undefined, the model chooses it. */
+  /** Target edge length on the finest level, in world units; if undefined, the model derives it from the voxel size. */
   edge: number | undefined;
   /** Parameters that differ from the defaults; without `iso` the worker chooses an iso value from the histogram. */
   params: ParamValues;
