@@ -250,7 +250,7 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
-/// Flips edges while that brings the valences of the four corners around them nearer to six: lowers their sum of
+/// Flips edges while that brings the valences of the four corners around them nearer to six, as measured by the sum of
 /// (valence − 6)² (figure 6).
 pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();

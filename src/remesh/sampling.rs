@@ -27,7 +27,8 @@ impl Sampling {
     }
 
     /// Returns this sampling with a local δ at each vertex: δ times 1 + the scalar attribute `sizes`, which must be
-    /// above −1. Small components are still measured by δ.
+    /// above −1. Small components are still measured by δ, and no contacts beyond its contact distance are found, also
+    /// where the local δ is larger.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
     }
