@@ -7,8 +7,8 @@ use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measu
 /// areas in single precision are rounded to few digits, or to 0.
 const MIN_MEAN_EDGE: f64 = 1e-12;
 
-/// Converts a caller's mesh to a [`Mesh`] after checking that it is not empty, closed, faces outwards, does not
-/// intersect itself, and passes [`check_edges`]. `parameter` is the name used in errors.
+/// Converts a caller's mesh to a [`Mesh`] after checking that it has triangles, is a closed manifold, passes
+/// [`check_edges`], faces outwards and does not intersect itself. `parameter` is the name used in errors.
 pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     if mesh.triangles.is_empty() {
         return Err(MethodError::invalid(parameter, "the mesh is empty; it must be a closed surface"));
@@ -25,8 +25,8 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
     }
 }
 
-/// Checks that the mean edge of a mesh is at least [`MIN_MEAN_EDGE`], long enough for computations in single precision.
-/// `parameter` is the name used in errors.
+/// Checks that the mean edge length of a mesh is at least [`MIN_MEAN_EDGE`], long enough for computations in single
+/// precision. `parameter` is the name used in errors.
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {

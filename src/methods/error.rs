@@ -6,12 +6,12 @@ use crate::volume::VolumeError;
 /// An error from setting up, stepping or restoring a method.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MethodError {
-    /// A parameter or option is outside its accepted range.
+    /// A parameter, option or input is not accepted, such as a number out of its range.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
         /// The name of the parameter in the public API.
         parameter: &'static str,
-        /// The reason, with the accepted range and the invalid value if there is a range.
+        /// The reason; if it is a range, usually with the accepted range and the invalid value.
         problem: String,
     },
     /// The caller's mesh is unsuitable, a mesh would intersect itself, or one does not fit into memory.
@@ -28,7 +28,7 @@ pub enum MethodError {
         /// The largest number of vertices accepted.
         most: usize,
     },
-    /// A linear system could not be solved.
+    /// A linear system could not be solved to the requested tolerance.
     #[error("the system of {constraints} constraints cannot be solved to the requested tolerance: {cause}")]
     Singular {
         /// The number of equations in the system.
@@ -36,7 +36,7 @@ pub enum MethodError {
         /// The likely cause, and how to avoid it.
         cause: &'static str,
     },
-    /// The bytes are not a saved state of this model.
+    /// The bytes from which a run should be restored are not a valid state of this model.
     #[error("saved state, {field}: {problem}")]
     BadState {
         /// The invalid part of the state.

@@ -48,12 +48,12 @@ pub fn decode<T: DeserializeOwned>(magic: &Magic, bytes: &[u8]) -> Result<T, Met
 pub struct Hash(u64);
 
 impl Hash {
-    /// The hash of no words.
+    /// Returns the hash of an empty sequence of words.
     pub fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
 
-    /// Adds a word.
+    /// Adds a word to the sequence that is hashed.
     pub fn mix(&mut self, word: u64) {
         self.0 = (self.0 ^ word).wrapping_mul(0x100_0000_01b3);
     }

@@ -21,22 +21,22 @@ pub struct ParamSpec {
     pub kind: ParamKind,
     /// The default value.
     pub default: ParamDefault,
-    /// The smallest value accepted.
+    /// The smallest value accepted, if there is a bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// The largest value accepted.
+    /// The largest value accepted, if there is a bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
     /// A suitable increment for the control.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<f64>,
-    /// How values are spread over a slider.
+    /// How values are spread over a slider; `None` for parameters without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<ParamScale>,
     /// The unit, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
-    /// The words that a choice accepts; a number is accepted, too, if `min` is set.
+    /// The words that a parameter of kind [`ParamKind::Choice`] accepts; a number is accepted, too, if `min` is set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub choices: Option<&'static [&'static str]>,
 }
@@ -83,7 +83,7 @@ pub enum ParamKind {
     Number,
     /// An integer in the range.
     Integer,
-    /// One of the choices.
+    /// One of the words in [`ParamSpec::choices`], or a number if [`ParamSpec::min`] is set.
     Choice,
     /// On or off.
     Boolean,
@@ -95,7 +95,7 @@ pub enum ParamKind {
 pub enum ParamDefault {
     /// A number.
     Number(f64),
-    /// One of the choices.
+    /// One of the words in [`ParamSpec::choices`].
     Choice(&'static str),
     /// On or off.
     Boolean(bool),

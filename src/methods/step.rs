@@ -7,7 +7,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct StepReport {
-    /// The number of steps since the start.
+    /// The number of steps since the start, without calls after the end.
     pub iteration: u32,
     /// Whether the method has finished.
     pub done: bool,
@@ -33,7 +33,7 @@ pub struct StepReport {
     pub times: Times,
 }
 
-/// Durations in milliseconds of named parts of a step, in the order in which they ran.
+/// Durations in milliseconds of named parts of a step, in the order in which they first ran.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times(pub Vec<(&'static str, f64)>);
 

@@ -5,11 +5,12 @@
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// The number of still iterations, those in which a vertex is slower than [`stillness`], after which it sleeps.
+/// The count of still iterations in a row, those in which a vertex is slower than [`stillness`], from which on the
+/// vertex sleeps: it is not moved until something wakes it.
 pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
-/// The speed below which a vertex is still, as a share of the speed that each vertex of a surface with the tolerated
-/// mean energy would have.
+/// The speed below which a vertex is still, as a share of the speed at which all vertices would move if they were
+/// equally fast and their mean energy were the tolerance.
 const STILLNESS: f64 = 0.5;
 
 /// The share of sleeping vertices below which all vertices are processed, which takes no longer.
@@ -27,7 +28,7 @@ pub(super) struct Awake {
 
 impl Awake {
     /// Collects the vertices with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, or all vertices if `all` is set
-    /// or few sleep.
+    /// or fewer than [`FEW_ASLEEP`] of them sleep.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();

@@ -18,38 +18,44 @@ use super::{DeformableParams, Integrator};
 /// offset, since parts lost on a coarse level come back.
 const MARGIN: f32 = 0.35;
 
-/// The largest factor on α_I on coarse levels with the integrators of the paper.
+/// The largest factor on the strength of the image force, α_I, on coarse levels with [`Integrator::Euler`] and
+/// [`Integrator::RungeKutta`].
 ///
 /// Where the image hardly differs from π_I, as in the soft tissue around bone, the surface creeps: with α_I unchanged
 /// it took 2,500 iterations of 3,000 to cross a head. The finest level undoes the effect of the factor in a few
 /// iterations; area and volume are the same within 0.1 %.
 const MAX_GAIN: f32 = 8.0;
 
-/// The smallest ratio of rigidity to amplified α_I on coarse levels. With less, the surface is drawn into holes that a
-/// coarse mesh cannot follow, and splits and merges there for ever.
+/// The smallest ratio of the rigidity α_c to the factor on α_I, unless that factor is 1, on coarse levels with
+/// [`Integrator::Euler`] and [`Integrator::RungeKutta`]. With less, the surface is drawn into holes that a coarse mesh
+/// cannot follow, and splits and merges there for ever.
 const MIN_RIGIDITY: f32 = 0.025;
 
-/// The largest stiffness of the amplified image force where the image is steep, in units of m/Δt². With more, the
-/// surface oscillates.
+/// The largest stiffness of the amplified image force, its change over one voxel of the finest level where the image is
+/// steep, in units of m/Δt². With more, the surface oscillates. It limits the factor on α_I on coarse levels with
+/// [`Integrator::Euler`] and [`Integrator::RungeKutta`].
 const MAX_STIFFNESS: f32 = 1.0;
 
-/// The least steepness of the image at π_I, in ranges of intensity per voxel of the finest level. If the median is
-/// smaller, α_I is amplified by the ratio in runs with the implicit integrator that adapt to the image. A few voxels
-/// much brighter than all others make the object faint; rigidity would then pull the surface off its contour, slowly.
-/// Computed tomographies have 0.1 to 0.6.
+/// The least steepness of the image at π_I: the difference between neighbouring voxels on opposite sides of it, in
+/// ranges of the volume's intensities per voxel of the finest level. If the median is smaller, α_I is amplified by the
+/// ratio in runs with the implicit integrator that adapt to the image. A few voxels much brighter than all others make
+/// the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to
+/// 0.6.
 const MIN_STEEPNESS: f32 = 0.1;
 /// The largest factor by which α_I is amplified in faint images.
 const MAX_AMPLIFICATION: f32 = 1e4;
 
-/// The number of iterations of a level with the full factor on α_I, with the integrators of the paper. A head takes
-/// 300. If the factor did not decay then, a vertex where the image is steeper than usual could oscillate for ever: one
-/// on a tooth did, at an iso value at which the model converges with a factor of 4.
+/// The number of iterations of a level with the full factor on α_I, with [`Integrator::Euler`] and
+/// [`Integrator::RungeKutta`]. A head takes 300. If the factor did not decay then, a vertex where the image is steeper
+/// than usual could oscillate for ever: one on a tooth did, at an iso value at which the model converges with a factor
+/// of 4.
 const FULL_GAIN_ITERATIONS: u32 = 600;
-/// The number of iterations between halvings of the factor on α_I, the first of which follows [`FULL_GAIN_ITERATIONS`].
+/// The number of iterations between halvings of the factor on α_I that a level began with, the first of which follows
+/// [`FULL_GAIN_ITERATIONS`].
 const HALVING_ITERATIONS: u32 = 100;
 
 /// Returns the normalised π_I of a level in runs without seeding, moved by [`MARGIN`] towards the background on coarse
-/// levels. The enclosing start surface is made around the voxels brighter than it.
+/// levels. In all runs the enclosing start surface is made around the voxels brighter than it.
 pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) -> f32 {
     let iso = pyramid.normalised(params.iso);
     let outside =
@@ -57,9 +63,10 @@ pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) ->
     outside.map_or(iso, |outside| iso + MARGIN * (outside - iso))
 }
 
-/// Returns the factor on α_I on a level, at least 1, for the normalised π_I `iso` and the δ `delta` of that level. With
-/// the implicit integrator it makes up for faint images on all levels if the model adapts to the image, and is 1
-/// otherwise; with the others it speeds up coarse levels.
+/// Returns the factor, at least 1, by which the strength of the image force, α_I, is multiplied on a level, for the
+/// normalised π_I `iso` and the δ `delta` of that level. With the implicit integrator it makes up for faint images on
+/// all levels if the model adapts to the image, and is 1 otherwise; with the others it speeds up coarse levels, and is
+/// 1 on the finest.
 pub(super) fn gain(
     pyramid: &Pyramid,
     params: &DeformableParams,
@@ -80,7 +87,7 @@ pub(super) fn gain(
 }
 
 /// Returns the factor on α_I, at least 1, that is left of a level's `gain` after a number of iterations on that level;
-/// used with the integrators of the paper.
+/// used with [`Integrator::Euler`] and [`Integrator::RungeKutta`].
 pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
     let times = iterations.saturating_sub(FULL_GAIN_ITERATIONS).div_ceil(HALVING_ITERATIONS);
     // Eight halvings reduce any gain up to 256 to 1.

@@ -9,12 +9,12 @@ use crate::methods::MethodError;
 use crate::remesh::clustered;
 use crate::volume::{Grid, marching_cubes};
 
-/// The least δ, in voxels of the level, for which a contour is simplified; for finer meshes, clusters as large as a
-/// voxel are too coarse.
+/// The least δ, in voxels of the level, for which a contour is simplified by merging the vertices of each cluster; for
+/// finer meshes, clusters as large as a voxel are too coarse.
 const MIN_SIDE: f32 = 0.7;
 
-/// The largest distance along its normal, in voxels of the level, between a vertex and the mean of its cluster. Without
-/// this bound, a tube of radius 1.2 became a square prism.
+/// The largest distance along its normal, in voxels of the level, between a vertex and the mean of its cluster;
+/// clusters with a vertex further away are not merged. Without this bound, a tube of radius 1.2 became a square prism.
 const FLATNESS: f32 = 0.15;
 
 /// The side of the iso value on which the object is.
@@ -52,7 +52,7 @@ impl ObjectIs {
 
 /// Extracts the iso-surface of a level in model space, closed and facing away from the object. Closed parts, of the
 /// object or around cavities, that enclose less than `smallest_part` voxels of the finest level are left out. Empty if
-/// no part remains, or the image never crosses `iso`.
+/// no such part remains.
 pub(super) fn contour(
     image: &LevelImage,
     iso: f32,
@@ -71,7 +71,8 @@ pub(super) fn contour(
 }
 
 /// Simplifies a contour by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are
-/// merged. This saves more than half of the edits that bring edges within bounds. Unchanged if δ is below [`MIN_SIDE`].
+/// merged where the surface is flat, see [`FLATNESS`]. This saves more than half of the edits that bring edges within
+/// bounds. Unchanged if δ is below [`MIN_SIDE`].
 pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
     if side < MIN_SIDE {

@@ -10,7 +10,8 @@ use crate::spatial::TriangleTree;
 /// The largest distance between a covered point and the other surface, in voxels of the finest level.
 const COVERED_DISTANCE: f64 = 1.0;
 
-/// The largest side of the pieces into which triangles are divided for the test, in voxels of the finest level.
+/// The largest side of the pieces of triangles, in voxels of the finest level: the covered share of a triangle is that
+/// of its pieces whose centroids are covered.
 const PIECE: f32 = 1.0;
 
 /// The direction of rays that classify points as inside or outside; along no grid line, so that they rarely hit an
@@ -27,11 +28,12 @@ pub struct Coverage {
     pub recall: f64,
     /// The share of the model's area within one voxel of the iso-surface; 1 if the model is empty.
     pub precision: f64,
-    /// The connected parts formed by the triangles of the iso-surface that are not fully covered, largest first.
+    /// The connected parts of the iso-surface formed by its triangles that are not entirely within one voxel of the
+    /// model, the largest area first.
     pub uncovered: Vec<UncoveredRegion>,
 }
 
-/// A connected part of the iso-surface whose triangles are not fully covered by the model.
+/// A connected part of the iso-surface whose triangles are not entirely within one voxel of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncoveredRegion {
     /// A point on the part near its centroid, in world space.
@@ -61,7 +63,7 @@ pub struct CoverageSurvey {
     model_tree: TriangleTree,
     /// The number of triangles tested, first of the iso-surface, then of the model.
     tested: usize,
-    /// Whether all of each triangle of the iso-surface tested so far is covered.
+    /// By triangle of the iso-surface, for those tested so far: whether all of it is within one voxel of the model.
     is_covered: Vec<bool>,
     /// Covered area and total area of the triangles tested so far, in square world units, of the iso-surface and of the
     /// model.
@@ -72,7 +74,7 @@ impl DeformableModel {
     /// Begins to measure [`Coverage`]; [`CoverageSurvey::advance`] does the work in slices.
     ///
     /// # Errors
-    /// If the iso-surface does not fit into memory.
+    /// If the iso-surface or its search tree does not fit into memory.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
         let iso = self.pyramid.normalised(self.params.iso);
         let object = ObjectIs::by(&self.params);
@@ -93,7 +95,7 @@ impl DeformableModel {
     /// Measures [`Coverage`] in one call.
     ///
     /// # Errors
-    /// As [`Self::survey_coverage`].
+    /// If the iso-surface or its search tree does not fit into memory.
     pub fn coverage(&self) -> Result<Coverage, MethodError> {
         let mut survey = self.survey_coverage()?;
         survey.advance(usize::MAX);
@@ -137,7 +139,7 @@ impl CoverageSurvey {
         covered == count
     }
 
-    /// Returns the result; all triangles must have been tested.
+    /// Returns the measured [`Coverage`]; all triangles must have been tested.
     pub fn finish(self) -> Coverage {
         let share = |[covered, whole]: [f64; 2]| if whole > 0.0 { covered / whole } else { 1.0 };
         Coverage {

@@ -2,7 +2,8 @@
 
 use crate::math::{Bounds, Vec3};
 
-/// The size of the domain as a multiple of the enclosing start surface.
+/// The size of the domain, the box in which vertices must stay, as a multiple of the rounded box around the whole
+/// image.
 const DOMAIN_SCALE: f32 = 1.5;
 
 /// 3^(1/4), the ratio of the half axes of the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 to the half sides of a box
@@ -18,11 +19,12 @@ const MAX_ELONGATION: f32 = 6.0;
 /// wasm32 has 4 GiB.
 const MAX_VERTICES: f64 = 4e6;
 
-/// A box around the image in model space, in which all vertices must stay.
+/// A box around the image in model space, in which all vertices must stay, with the rounded box that it is made from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Domain {
     pub(super) centre: Vec3,
-    /// The half axes of the rounded box from which the enclosing start surface is made.
+    /// The half axes of the rounded box around the whole image, the enclosing start surface if no object is found to
+    /// enclose.
     pub(super) axes: Vec3,
     pub(super) bounds: Bounds,
 }

@@ -15,14 +15,15 @@ use crate::volume::CellCache;
 /// sliding does not fade everywhere.
 const FULL_TANGENTIAL_SPEED: f32 = 0.1;
 
-/// The approximate distance from the contour, in voxels, to which rigidity may pull the surface: with more, thin
-/// strands shrink; with less, noise is not smoothed.
+/// The approximate distance from the contour, in voxels of the finest level, up to which rigidity may pull the surface:
+/// with more, thin strands shrink; with less, noise is not smoothed.
 const MAX_RIGIDITY_OFFSET: f32 = 0.1;
 
-/// The largest offset between a vertex and the mean of its triangles that is compensated, in voxels.
+/// The largest distance, in voxels of the finest level, between a vertex and the point on its normal at which the image
+/// is sampled for it, see [`Forces::mean_of_triangles`].
 const MAX_INSET: f32 = 0.15;
 
-/// An attractor in model space.
+/// An [`Attractor`](super::Attractor), a point that attracts or repels the surface, in model space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LocalAttractor {
     pub(super) point: Vec3,
@@ -31,7 +32,7 @@ pub(super) struct LocalAttractor {
     pub(super) in_radii: Mat3,
 }
 
-/// The parameters of the forces in model units: lengths in voxels, intensities in 0..1.
+/// The parameters of the forces in model units: lengths in voxels of the finest level, intensities in 0..1.
 #[derive(Clone, Debug)]
 pub(super) struct ForceScale {
     iso: f32,
@@ -45,15 +46,16 @@ pub(super) struct ForceScale {
     rest: RestLength,
     voxel: f64,
     delta: f32,
-    /// Whether the normal part of rigidity is limited by the image.
+    /// Whether the surface adapts to the image: the image limits rigidity along the normal, and is sampled at the mean
+    /// of the triangles at a vertex instead of the vertex.
     adapts_to_image: bool,
-    /// Whether [`Forces::slope`] is needed.
+    /// Whether [`Forces::slope`] is needed, to limit rigidity or by the implicit integrator.
     needs_slope: bool,
 }
 
 impl ForceScale {
-    /// Converts parameters to model units. `iso` is normalised, `gain` is the factor on α_I, and `voxel` is the length
-    /// of a model unit in the world.
+    /// Converts parameters to model units. `iso` is the normalised π_I, `gain` the factor on α_I, `delta` is δ in
+    /// voxels, and `voxel` is the length of a model unit in the world.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
         let yields = params.adapts_to_image();
         Self {
@@ -73,8 +75,8 @@ impl ForceScale {
         }
     }
 
-    /// Returns the image force per unit of difference between the iso value and the intensity: δ |α_I|, times the level's
-    /// gain.
+    /// Returns the image force per unit of difference between the iso value and the intensity: δ |α_I|, times the
+    /// level's gain.
     pub(super) fn iso_stiffness(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }
@@ -115,7 +117,7 @@ impl Forces {
         self.cells.fill(CellCache::default());
     }
 
-    /// Computes normals and L of some vertices.
+    /// Computes the normals of some vertices, and L, the vectors from them to the means of their neighbours.
     pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
@@ -179,8 +181,9 @@ impl Forces {
         }
     }
 
-    /// Returns f_c = α_c (L(x) − mean of L over the neighbours) (5). Its tangential part fades out as the surface
-    /// settles; the length of its normal part is at most `limit`.
+    /// Returns the force of rigidity, which resists changes of curvature: f_c = α_c (L(x) − mean of L over the
+    /// neighbours) (5), with L(x) the vector from a vertex to the mean of its neighbours. Its tangential part fades out
+    /// as the surface settles; the length of its normal part is at most `limit`.
     #[inline]
     fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, limit: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
@@ -205,7 +208,8 @@ impl Forces {
         x + normal * inset.clamp(-MAX_INSET, MAX_INSET)
     }
 
-    /// Returns the absolute difference of Π over one voxel of the finest level along the normal.
+    /// Returns the absolute difference of the intensity Π, in 0..1, over one voxel of the finest level along the
+    /// normal.
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
@@ -213,8 +217,8 @@ impl Forces {
         (at(x + half) - at(x - half)).abs()
     }
 
-    /// Returns the largest normal part of rigidity that the image balances, so that no settled vertex is further than
-    /// 4/3 [`MAX_RIGIDITY_OFFSET`] from the contour.
+    /// Returns the largest force of rigidity along the normal that the image balances, so that no settled vertex is
+    /// further than 4/3 [`MAX_RIGIDITY_OFFSET`] from the contour.
     #[inline]
     fn rigidity_limit(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> f32 {
         scale.iso_stiffness() * (MAX_RIGIDITY_OFFSET * self.slope[v] + 0.25 * iso_difference.abs())
@@ -230,20 +234,23 @@ impl Forces {
         across + (force - across) * (speed * speed).min(1.0)
     }
 
-    /// Returns π_I − Π(x), with x the mean position of the triangles at the vertex if the surface adapts to the image.
+    /// Returns the difference π_I − Π(x) between the iso value and the intensity at a vertex, normalised; sampled at
+    /// the mean position of the triangles at the vertex if the surface adapts to the image.
     #[inline]
     fn iso_difference(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let p = if scale.adapts_to_image { self.mean_of_triangles(v, x) } else { x };
         scale.iso - image.intensity(p, scale.background, &mut self.cells[v])
     }
 
-    /// Returns f_I = δ α_I (π_I − Π(x)) n (7).
+    /// Returns the image force, which moves a vertex along its normal n towards the iso-surface: f_I = δ α_I (π_I −
+    /// Π(x)) n (7), with α_I multiplied by the level's gain.
     #[inline]
     fn iso_force(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> Vec3 {
         self.normal[v] * (scale.delta * scale.iso_force * iso_difference)
     }
 
-    /// Returns f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).
+    /// Returns the gradient force, which attracts a vertex to bright ridges: f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π)
+    /// (8), with n the normal and ∇Π the gradient of the intensity, bounded.
     fn gradient_force(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
         let gradient = image.gradient(x, scale.gradient_bound);
         let normal = self.normal[v];
@@ -252,7 +259,7 @@ impl Forces {
     }
 }
 
-/// Returns the rest length d of the springs in model units.
+/// Returns the rest length d of the springs in model units; 0, whatever the mean, if the springs have no stiffness.
 fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     match scale.rest {
         RestLength::Zero => 0.0,
@@ -271,7 +278,8 @@ fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     }
 }
 
-/// Returns f_e / α_e = Σ (|y − x| − d)(y − x)/|y − x| (6).
+/// Returns the force of the edges of a vertex as springs, per unit of stiffness: f_e / α_e = Σ (|y − x| − d)(y − x)/|y
+/// − x| over its neighbours y, with the rest length d (6).
 fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     ring.as_slice().iter().fold(Vec3::ZERO, |sum, w| {
         let edge = positions[w.index()] - x;

@@ -7,10 +7,12 @@ use crate::math::Vec3;
 use crate::methods::MethodError;
 use crate::volume::{CellCache, Grid, VectorGrid, Volume};
 
-/// The reduction factor ρ of the pyramid, which belongs to √3 refinement (15).
+/// The reduction factor ρ = √3: δ and the shortest side of a voxel grow by it with each level of the pyramid. It is
+/// that of √3 refinement, by which the mesh gets finer (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
-/// The bound of the absolute value of normalised intensities; within it no force overflows.
+/// The largest absolute value of an intensity given by the caller, such as π_I, once it is normalised; within it no
+/// force overflows.
 const MAX_NORMALISED: f64 = 100.0;
 
 /// One level of the image pyramid, sampled at positions in model space.
@@ -66,7 +68,7 @@ impl LevelImage {
         (count > 0).then(|| (sum / f64::from(count)) as f32)
     }
 
-    /// Returns, in model space, the first and the last voxel brighter than `iso` of each row that has one; the
+    /// Returns, in model space, the first and the last voxel brighter than `iso` of each row along x that has one; the
     /// enclosing start surface is made around them.
     pub(super) fn ends_of_rows(&self, iso: f32) -> Vec<Vec3> {
         let (Grid { dims: [nx, ny, _], values }, position) = (&self.grid, self.grid().1);
@@ -103,7 +105,8 @@ impl LevelImage {
         *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
     }
 
-    /// Calls `visit` with the signed difference of each pair of neighbouring voxels on opposite sides of `iso`.
+    /// Calls `visit` with the signed difference of each pair of voxels that share a face and are on opposite sides of
+    /// `iso`.
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
@@ -142,7 +145,11 @@ pub(super) struct Pyramid {
 }
 
 impl Pyramid {
-    /// Builds a pyramid with `above` levels above the volume itself.
+    /// Builds the image pyramid of a frame, with `above` levels above the volume itself.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for more levels than the volume allows; [`MethodError::Volume`] if there is no
+    /// such frame or memory does not suffice.
     pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
         let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
         if above > possible {

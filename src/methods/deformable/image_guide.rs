@@ -30,7 +30,8 @@ const SAMPLE_DEPTH: f32 = 0.35;
 
 /// A topology guide that allows only changes that agree with the image. Sheets are joined across a gap if all between
 /// them is object, across a wall if all is background; a strand is cut if its middle is background, a tunnel if its
-/// middle is object.
+/// middle is object. Edges are not collapsed across walls and gaps that the image shows, nor are small components
+/// removed that it shows.
 #[derive(Clone, Copy)]
 pub(super) struct ImageGuide<'a> {
     pub(super) image: &'a LevelImage,
@@ -71,8 +72,8 @@ impl<'a> ImageGuide<'a> {
     }
 }
 
-/// Returns what decides which topology changes are made: the image, if the parameters adapt the surface to it; else, as in
-/// the paper, all are allowed.
+/// Returns what decides which topology changes are made: the image, if the parameters adapt the surface to it; else, as
+/// in the paper, all are allowed.
 pub(super) fn guide<'a>(
     image: &'a LevelImage,
     iso: f32,

@@ -84,11 +84,12 @@ pub struct DeformableOptions {
     pub frame: usize,
     /// The start surface.
     pub start: Start,
-    /// The number of pyramid levels above the volume itself; 0 evolves on the volume directly. Without seeding, the
-    /// surface settles a little outside the iso value on coarse levels, so that thin walls are not lost there.
+    /// The number of pyramid levels above the volume itself; 0 evolves on the volume directly. In runs that do not seed
+    /// missing parts, the surface settles a little outside the iso-surface on coarse levels, so that thin walls are not
+    /// lost there.
     pub levels: usize,
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
-    /// default derived from the voxel size.
+    /// default 1.53 times the side of a cube with the volume of a voxel.
     pub edge: Option<f64>,
     /// The parameters; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -105,7 +106,7 @@ impl Default for DeformableOptions {
 pub struct Attractor {
     /// The position in world space.
     pub point: DVec3,
-    /// The spring constant; negative values repel.
+    /// The spring constant of the force towards the point; negative values repel.
     pub strength: f64,
     /// The distance in world units beyond which the force is zero.
     pub radius: f64,
@@ -114,8 +115,8 @@ pub struct Attractor {
 /// The mean edge length of a mesh within its edge bounds, in δ, measured on converged spheres and skulls.
 const MEAN_EDGE: f64 = 1.7;
 
-/// The default δ on the finest level in voxels. It is near the upper end of 0.693 ≤ δ/U ≤ 1 (14), since the number of
-/// vertices grows as 1/δ².
+/// The default δ on the finest level in voxels. It is near the upper end of the accepted ratios of δ to the side of a
+/// voxel, 0.693 to 1 (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
 /// The accepted range of δ on the finest level in voxels: with less, a mesh of the whole image does not fit into
@@ -134,7 +135,7 @@ const CHECK_TRAVEL: f32 = 0.1;
 /// would miss slow vertices that travel far.
 const CHECK_PERIOD: usize = 50;
 
-/// The share of live vertex slots below which the mesh is renumbered.
+/// The share of live vertex slots below which the mesh is renumbered, which removes free slots.
 const MIN_OCCUPANCY: f32 = 0.7;
 
 /// The keys of the model's vertex attributes.
@@ -145,9 +146,10 @@ struct Keys {
     checked_position: VectorKey,
     /// The count of still iterations in a row; from [`awake::ITERATIONS_TO_SLEEP`] on the vertex sleeps.
     still_iterations: ScalarKey,
-    /// The number of iterations since an edit made or displaced the vertex.
+    /// The number of iterations since an edit made or displaced the vertex, without those in which it slept.
     since_edit: ScalarKey,
-    /// The decaying count of recent reversals of the velocity along the normal.
+    /// The decaying count of recent reversals of the velocity along the normal, by which the implicit integrator
+    /// shortens steps.
     reversals: ScalarKey,
     /// The size of the vertex less 1: the local δ is δ · (1 + this).
     size: ScalarKey,
@@ -163,13 +165,14 @@ pub struct DeformableModel {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
-    /// Whether the run started from the contour ([`Start::Contour`]).
+    /// Whether the start was [`Start::Contour`], even if that contour was empty.
     from_contour: bool,
     finest_delta: f64,
     level: usize,
-    /// π_I on this level, normalised to the range of the volume.
+    /// π_I on this level, normalised to the range of the volume; moved towards the background on coarse levels of runs
+    /// that do not seed missing parts.
     level_iso: f32,
-    /// The factor by which α_I is multiplied on this level.
+    /// The factor by which α_I is multiplied on this level, before it decays.
     image_force_factor: f32,
     mesh: Mesh,
     keys: Keys,
@@ -186,7 +189,9 @@ impl DeformableModel {
     /// Creates the model of one frame of `volume` on the coarsest level, with its start surface within edge bounds.
     ///
     /// # Errors
-    /// A [`MethodError`] that names the invalid option or parameter and the accepted values.
+    /// [`MethodError::InvalidArgument`] for an option or parameter that is not accepted; [`MethodError::Mesh`] for a
+    /// start mesh that is not closed or intersects itself; [`MethodError::TooManyVertices`]; [`MethodError::Volume`] if
+    /// there is no such frame or memory does not suffice.
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
@@ -262,13 +267,15 @@ impl DeformableModel {
         Ok(model)
     }
 
-    /// Runs one iteration of figure 9, and descends one level if the surface has converged.
+    /// Runs one iteration of figure 9: moves the vertices, then restores edge bounds and resolves contacts around those
+    /// that travelled; descends one level if the surface has converged.
     ///
     /// Once the finest level has converged, calls change nothing and report `done`.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`] if the surface grows without bound. It remains valid, but some edges are too
-    /// long; other parameters may reduce it again.
+    /// long; other parameters may reduce it again. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
+    /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -479,7 +486,8 @@ impl DeformableModel {
         self.attractors.iter().map(local).collect()
     }
 
-    /// Computes the quantities that depend on the level and the parameters: gradient image, π_I and the factor on α_I.
+    /// Computes the quantities that depend on the level and the parameters: the gradient image if a gradient force
+    /// acts, π_I and the factor on α_I.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
@@ -533,7 +541,8 @@ impl DeformableModel {
         self.mesh.vertices().zip(normals).map(along).collect()
     }
 
-    /// Sets the clock, in milliseconds, with which steps measure the duration of each part.
+    /// Sets the clock, in milliseconds, with which steps measure the duration of each part. By default all durations
+    /// are 0.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }

@@ -11,7 +11,8 @@ use crate::mesh::{Mesh, VertexId};
 /// The speed of the mesh in one iteration, by which convergence is judged.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SpeedSummary {
-    /// The mean of ½ m (v·n)² / δ², the criterion of section 5.1.
+    /// The mean kinetic energy of the vertices along their normals, ½ m (v·n)² / δ²: the criterion of convergence of
+    /// section 5.1.
     pub(super) energy: f64,
     /// The largest speed along a normal, in δ per unit of time, of vertices that no edit displaced recently. Edits
     /// displace single vertices of a settled surface, which return in a few iterations.
@@ -22,8 +23,8 @@ pub(super) struct SpeedSummary {
 /// not delay convergence.
 pub(super) const ITERATIONS_AFTER_EDIT: f32 = 6.0;
 
-/// The number of still iterations counted in addition for a vertex that could not move at all: it is pressed against
-/// others and will not move in the next iteration either.
+/// The number of still iterations counted in addition for a vertex that could not move at all without a
+/// self-intersection: it is pressed against others and will not move in the next iteration either.
 const STILL_IF_STUCK: f32 = 2.0;
 
 /// The number of still iterations that a still iteration with the implicit integrator counts as, since its steps are
@@ -34,10 +35,11 @@ const STILL_PER_IMPLICIT_STEP: f32 = 2.0;
 /// neighbour of valence six moves by at most a sixth of the displacement.
 const WAKING_SPEED: f32 = 4.0;
 
-/// The stiffness of f_c against displacing a vertex of valence 6 from its neighbours, as a multiple of α_c; the
-/// implicit integrator uses it.
+/// The stiffness of the force of rigidity, f_c, against displacing a vertex of valence 6 from its neighbours: force per
+/// displacement, as a multiple of α_c. The implicit integrator uses it.
 const BENDING_STIFFNESS: f32 = 1.3;
-/// The stiffness of f_e against displacing a vertex of valence 6 from its neighbours, as a multiple of α_e.
+/// The stiffness of the force of the edges as springs, f_e, against displacing a vertex of valence 6 from its
+/// neighbours: force per displacement, as a multiple of α_e. The implicit integrator uses it.
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
 /// The share of its speed that a vertex must keep after a reversal of its velocity for the reversal to be counted;
@@ -70,14 +72,16 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Selects the vertices to process, those awake or all if `examine_all`, and computes normals and L around them.
+    /// Selects the vertices to process, those awake or all if `examine_all`, and computes their normals and L, the
+    /// vectors to the means of their neighbours, and those of the neighbours.
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool) {
         self.awake.find(mesh, keys.still_iterations, examine_all);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
 
-    /// Moves the vertices by one time step as far as `displace` allows; needs [`Self::prepare`] for the current mesh.
+    /// Moves the vertices by one iteration as far as `displace` allows, and returns their energy and largest speed;
+    /// needs [`Self::prepare`] for the current mesh.
     ///
     /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns
     /// the vertices held back, each with the share of its displacement that it moved by.
@@ -207,8 +211,8 @@ impl Motion {
         }
     }
 
-    /// Keeps as moving, and wakes, the examined vertices whose displacement exceeds that of a still vertex; stops the
-    /// others.
+    /// Keeps as moving, and wakes, the examined vertices whose displacement along the normal exceeds that of a still
+    /// vertex; stops the others.
     fn wake_unsettled(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
         let stillness = stillness(context.params.mass, context.params.energy_tolerance);
         let least = stillness * context.params.step_length() as f32 * context.delta;

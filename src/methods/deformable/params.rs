@@ -18,7 +18,8 @@ pub struct DeformableParams {
     /// β_g: strength of the gradient force along the tangent plane, which attracts vertices to bright ridges; negative
     /// values repel them.
     pub gradient_tangent: f64,
-    /// The length to which longer image gradients are shortened, in ranges of intensity per voxel of the level.
+    /// The length to which longer image gradients are shortened, in ranges of the volume's intensities per voxel of the
+    /// level.
     pub gradient_bound: f64,
     /// α_c: rigidity, the resistance to changes of curvature.
     pub rigidity: f64,
@@ -41,8 +42,8 @@ pub struct DeformableParams {
     /// Whether the mesh may change its sampling and topology.
     pub topology: Topology,
     /// The degree of local adaptation to the image. At 0, as in the paper, δ is uniform, and contact is decided by
-    /// distance alone; with any larger value the image decides on topology changes and limits rigidity, and edge
-    /// lengths vary with the curvature in proportion to it.
+    /// distance alone; with any larger value, unless α_I is 0, the image decides on topology changes and limits
+    /// rigidity, and edge lengths vary with the curvature in proportion to it.
     pub adaptivity: f64,
     /// Whether parts of a level's contour that the mesh lacks are added to it.
     pub seeding: Seeding,
@@ -96,7 +97,8 @@ pub enum Seeding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// Edges are split and collapsed, parts in contact joined, and necks cut, by the three bounds derived from δ.
+    /// Edges are split and collapsed, parts in contact joined, and necks cut, by three bounds derived from δ: the
+    /// shortest and the longest edge, and the contact distance.
     Adaptive,
     /// Vertices move, but the mesh keeps its edges.
     Fixed,
@@ -123,7 +125,7 @@ impl DeformableParams {
         }
     }
 
-    /// Whether sampling, topology and rigidity adapt to the image.
+    /// Whether sampling, topology and rigidity adapt to the image: the image force and `adaptivity` are not 0.
     pub(super) fn adapts_to_image(&self) -> bool {
         self.iso_force != 0.0 && self.adaptivity > 0.0
     }

@@ -14,7 +14,7 @@ use crate::spatial::TriangleTree;
 /// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the contour.
 const COVERED_DISTANCE: f32 = 1.0;
 
-/// The components to replace on a level change.
+/// The components of the mesh to replace by parts of the finer level's contour on a level change.
 #[derive(Default)]
 pub(super) struct Renewal {
     /// A vertex of each component to remove from the mesh.
@@ -24,8 +24,8 @@ pub(super) struct Renewal {
 }
 
 impl DeformableModel {
-    /// Returns the components to replace for the next finer level; empty if the mesh lacks nothing, the image force is
-    /// 0, or the topology is fixed.
+    /// Returns the components of the mesh to replace by parts of the next finer level's contour; empty if the mesh
+    /// lacks no point of it, the image force is 0, or the topology is fixed.
     ///
     /// # Errors
     /// If the contour does not fit into memory.

@@ -33,8 +33,8 @@ const SETTLED_DISPLACEMENT: f32 = 0.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Convergence {
     quiet: u32,
-    /// Whether all vertices have been examined since the surface was first quiet on this level, or since parts were
-    /// seeded.
+    /// Whether all vertices have been examined, the forces on them evaluated whether asleep or not, since the surface
+    /// was first quiet on this level, or since parts were seeded.
     was_examined: bool,
     /// Whether the next iteration evaluates the forces on all vertices, asleep or not.
     pub(super) examine_next: bool,
@@ -78,8 +78,8 @@ impl DeformableModel {
         self.convergence = Convergence { began: self.convergence.began, ..Convergence::default() };
     }
 
-    /// Counts quiet iterations. After enough of them it examines all vertices, checks the whole mesh, and descends one
-    /// level or ends the run.
+    /// Counts quiet iterations. After enough of them it sets sizes and seeds missing parts on the finest level,
+    /// examines all vertices, checks the whole mesh, and descends one level or ends the run.
     pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let is_slow = self.convergence.began_on_contour || self.speed.fastest < self.settled_speed();
         let quiet = is_slow && self.speed.energy < self.params.energy_tolerance;
@@ -137,8 +137,8 @@ impl DeformableModel {
         if longest < SETTLED_SPEED { longest } else { SETTLED_SPEED }
     }
 
-    /// Returns the number of quiet iterations for convergence, at least the response time m/γ: a surface that has just
-    /// begun to move is slow, too, without having converged.
+    /// Returns the number of quiet iterations in a row for convergence, at least those of the response time m/γ, but at
+    /// most [`MAX_QUIET_ITERATIONS`]: a surface that has just begun to move is slow, too, without having converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let is_settled = integrator == Integrator::Implicit && !self.convergence.began_on_contour;
@@ -163,7 +163,7 @@ impl DeformableModel {
     }
 
     /// Refines the mesh and descends to the next finer image (figure 13). In runs that seed, components that lack part
-    /// of the finer contour are renewed; if that fails, missing parts are seeded instead.
+    /// of the finer contour are replaced by it; if that fails, missing parts are seeded instead.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };

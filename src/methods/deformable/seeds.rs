@@ -35,7 +35,7 @@ impl DeformableModel {
     /// topology is fixed or the image force is zero.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`]; out of memory.
+    /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let changes = self.seed_missing(&mut times)?;
@@ -179,7 +179,8 @@ impl Comparison<'_> {
         self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
-    /// Returns the misplaced voxels that are further from the mesh than [`CLEARANCE`], in ascending order.
+    /// Returns the voxels on the wrong side of the mesh, see [`Self::misplaced_voxels`], that are further from the mesh
+    /// than [`CLEARANCE`], in ascending order.
     fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
         let mut missing = self.misplaced_voxels(kind);
         if missing.is_empty() {

@@ -13,12 +13,14 @@ use crate::mesh::VertexId;
 use crate::remesh::Sampling;
 use crate::volume::CellCache;
 
-/// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many
-/// vertices as marching cubes; with 0.5, small features are sampled no better than without sizes.
+/// The distance of an edge's midpoint from the contour, the sagitta, in voxels of the finest level, above which edges
+/// are made shorter. With 0.1 the surface of a rough image has as many vertices as marching cubes; with 0.5, small
+/// features are sampled no better than without sizes.
 const MAX_SAGITTA: f32 = 0.25;
 
-/// The sagitta, in voxels, below which edges are made longer. The surface is inside its contour by two thirds of it:
-/// with 0.25, a ball of 7 voxels has 7 % less volume.
+/// The distance of an edge's midpoint from the contour, the sagitta, in voxels of the finest level, below which edges
+/// are made longer. The surface is inside its contour by two thirds of it: with 0.25, a ball of 7 voxels has 7 % less
+/// volume.
 const MIN_SAGITTA: f32 = 0.05;
 
 /// The smallest size of a vertex, a factor on δ, with full adaptivity.
@@ -33,7 +35,8 @@ const GRADATION: f32 = 0.3;
 /// The step of the search for the opposite side of a wall or a gap, in voxels.
 const STRIDE: f32 = 0.5;
 
-/// The number of passes over the mesh that bound the gradation; each reaches one edge further.
+/// The number of passes over the mesh that bound the difference of size between neighbours; each reaches one edge
+/// further.
 const PASSES: usize = 3;
 
 /// The length of an edge of size 1, in δ.
@@ -55,7 +58,8 @@ impl DeformableModel {
         true
     }
 
-    /// Sets the sizes of the vertices of whole components by curvature, with bounded gradation.
+    /// Sets the sizes of the vertices of whole components by curvature, with bounded differences between neighbours,
+    /// and scaled by the parameter `adaptivity`.
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
         for _ in 0..PASSES {
@@ -67,7 +71,7 @@ impl DeformableModel {
     }
 
     /// Returns for each vertex, by slot, the smallest size of its edges by curvature. At thin walls and gaps, sizes
-    /// above 1 are bounded by the thickness.
+    /// above 1 are bounded by the thickness, but not below 1.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let offsets = self.offsets_from_contour(members);
@@ -131,8 +135,9 @@ impl DeformableModel {
         offsets
     }
 
-    /// Returns the size of an edge by its sagitta, infinite if it is straight; `offsets` are those of its ends from the
-    /// contour.
+    /// Returns the size, a factor on δ, at which an edge would have a sagitta, the distance of its midpoint from the
+    /// contour, of [`MAX_SAGITTA`] if that is below 1, or of [`MIN_SAGITTA`] if that is above 1, else 1; infinite if
+    /// the edge is straight. `offsets` are those of its ends from the contour, in voxels.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());

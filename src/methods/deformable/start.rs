@@ -19,8 +19,8 @@ pub enum Start {
     /// [`super::DeformableParams::smallest_part`]. If it is empty, the mesh is empty, too, if the model adapts to the
     /// image and seeds missing parts; otherwise the enclosing surface is used.
     Contour,
-    /// A rounded box around all voxels of the coarsest level brighter than its π_I; around the whole image if there are
-    /// none, or if α_I is not negative.
+    /// A rounded box around all voxels of the coarsest level brighter than π_I, or than an intensity a little below it if
+    /// that level is not the volume itself; around the whole image if there are none, or if α_I is not negative.
     Enclosing,
     /// A grid of n³ small spheres that fills the image.
     Bubbles(u32),
@@ -31,9 +31,9 @@ pub enum Start {
         /// The common radius.
         radius: f64,
     },
-    /// The iso-surface of the coarsest level at this intensity, with the brighter side inside.
+    /// The iso-surface of the coarsest level at this intensity, in the volume's units, with the brighter side inside.
     MarchingCubes(f64),
-    /// A closed mesh without self-intersections.
+    /// A closed mesh without self-intersections, its triangles counter-clockwise seen from outside.
     Mesh(TriangleMesh),
 }
 
@@ -85,15 +85,16 @@ const MAX_BUBBLES: u32 = 100;
 /// The largest number of start spheres at given points: with more, memory, not the method, is the limit.
 const MAX_SEEDS: usize = 10_000;
 
-/// The side of the cells around self-intersections of a resolved contour in which edits are tested in full, as a
-/// multiple of the longest edge.
+/// The side of the cells around self-intersections of a contour with its edges within bounds, as a multiple of the
+/// longest edge allowed; when the contour is resolved again, edits in these cells are tested in full.
 const TESTED_CELL: f32 = 2.5;
 
-/// The number of times that a contour is resolved with some edits not tested in full, before all are.
+/// The number of times that a contour is brought within edge bounds with some edits not tested in full for
+/// self-intersections, before all are.
 const MAX_RUNS: usize = 2;
 
-/// The largest number of resolver calls to bring the edges of a start mesh within bounds; each refines a coarse mesh
-/// several times.
+/// The largest number of further resolver calls, after the first, to bring the edges of a start mesh within bounds;
+/// each refines a coarse mesh several times.
 const MAX_CALLS: usize = 20;
 
 impl Start {
@@ -103,9 +104,10 @@ impl Start {
     /// `iso` normalises intensities.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if a number is out of range, spheres or the caller's mesh are misplaced, or the
-    /// iso-surface is empty; [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if the caller's mesh is open, not
-    /// manifold or intersects itself.
+    /// [`MethodError::InvalidArgument`] if a number is out of range, spheres or the caller's mesh are out of the
+    /// domain, spheres in contact, the caller's mesh empty or inside out, or the iso-surface is empty;
+    /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if the caller's mesh is open, not manifold or intersects
+    /// itself, or the result does; [`MethodError::Volume`] if memory does not suffice.
     pub(super) fn make(
         &self,
         context: &StartContext,

@@ -12,18 +12,19 @@ use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
 use std::collections::BTreeSet;
 
-/// Maximum number of rounds that search for vertices without a boundary.
+/// Maximum number of rounds in a frame that search for vertices at which the image shows no boundary.
 const ROUNDS: usize = 10;
-/// Minimum number of rounds if there are vertices without a boundary.
+/// Minimum number of these rounds while there are vertices without a boundary.
 const MIN_ROUNDS: usize = 2;
 
-/// Rounds end when at least this share of the vertices without a boundary remains from the round before.
+/// After [`MIN_ROUNDS`], rounds end when at least this share of the vertices without a boundary remains from the round
+/// before.
 const LITTLE_PROGRESS: f64 = 0.9;
 
 /// Number of times that the vertices without a boundary are moved in each round.
 const MOVES: usize = 2;
 
-/// Largest distance between the two walls of a sheet, in the shortest side of a voxel.
+/// Largest distance between the two walls of a sheet, in units of the shortest side of a voxel.
 const THICKNESS: f64 = 1.5;
 
 /// Largest cosine between the normals of the two walls of a sheet, which face away from each other.
@@ -73,8 +74,8 @@ impl FrameTracker {
         changes
     }
 
-    /// Moves vertices without a boundary: outwards if they are surrounded by bright voxels and on no sheet, else to the
-    /// mean of their neighbours. Returns the vertices that moved outwards.
+    /// Moves vertices without a boundary: outwards if the image is bright on both sides of them and they are on no
+    /// sheet, else to the mean of their neighbours. Returns the vertices chosen to move outwards.
     fn move_without_boundary(&mut self, mesh: &mut Mesh, context: &FrameContext) -> Vec<VertexId> {
         let without_boundary = without_boundary(mesh, context);
         let sheets = on_sheets(mesh, &without_boundary, context);

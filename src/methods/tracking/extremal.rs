@@ -11,7 +11,7 @@ pub(super) struct PlaneFit {
     pub normal: DVec3,
     /// The temporal component of the normal, with time measured as c·t; 0 for a plane in space.
     pub along_time: f64,
-    /// Signed distance from the position to the plane, along the normal.
+    /// Signed distance from the position to the plane, positive if the plane is on the side that the normal points to.
     pub distance: f64,
     /// Total weight of the points.
     pub weight: f64,

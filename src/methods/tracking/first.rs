@@ -11,8 +11,8 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Grid, marching_cubes};
 
-/// Half-width of the band around the points in which their distance is used, as a share of the radius; elsewhere only
-/// the inside/outside labelling counts.
+/// Half-width of the band around the boundary points in which the distance from their planes is used, as a share of the
+/// radius; elsewhere only the inside/outside labelling counts.
 const BAND: f64 = 0.8;
 
 /// Voxels to either side over which the intensity gradient is estimated.
@@ -25,7 +25,8 @@ struct Oriented {
     weight: f64,
 }
 
-/// Returns the surface of all bright regions in the first frame, in world coordinates; empty without a boundary.
+/// Extracts the closed surface around all bright regions of the first frame, in world coordinates; empty without a
+/// boundary.
 pub(super) fn extract_bright_surface(
     region: &Region,
     faces: &Faces,
@@ -48,8 +49,8 @@ pub(super) fn extract_bright_surface(
     Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
 }
 
-/// Returns the centres of the faces of walls with the normals of their fitted planes, oriented towards falling
-/// intensity, or outwards in the sides of the box.
+/// Returns the centres of the faces of walls, those with a weight of at least [`MIN_WEIGHT`], with the normals of their
+/// fitted planes, oriented towards falling intensity, or outwards in the sides of the box.
 fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
@@ -67,8 +68,8 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     points
 }
 
-/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame: the covariance of
-/// intensity and position.
+/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame: a multiple of the
+/// covariance of intensity and position.
 fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
     let range =

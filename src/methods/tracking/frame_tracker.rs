@@ -14,10 +14,11 @@ use serde::{Deserialize, Serialize};
 /// good.
 const SMOOTHINGS: usize = 5;
 
-/// Largest curvature correction of a vertex, in the shortest side of a voxel; larger ones occur at sharp corners.
+/// Largest curvature correction of a vertex, in units of the shortest side of a voxel; larger ones occur at sharp
+/// corners.
 const MAX_CURVATURE_CORRECTION: f64 = 0.3;
 
-/// Maximum number of passes that smooth folds in a frame.
+/// Maximum number of passes that smooth folded triangles in a frame.
 const UNFOLDINGS: usize = 3;
 
 /// Number of times that the mesh is projected in the first frame: it comes from a grid, not from a tracked frame.
@@ -39,15 +40,16 @@ pub struct FrameStatistics {
     pub area: f64,
     /// Number of triangles.
     pub triangles: usize,
-    /// Number of triangles that stay folded: they face away from the sum of their three neighbours.
+    /// Number of triangles that stay folded: they face away from the sum of the normals of the three triangles beside
+    /// them.
     pub folded: usize,
     /// Number of projections that failed: there were too few points, the hyperplane was nearly parallel to the frame,
     /// or the vertex moved too far.
     pub rejected: usize,
     /// Number of vertex moves in projections and curvature corrections that were shortened to avoid self-intersections.
     pub held_moves: usize,
-    /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
-    /// smoothed.
+    /// Number of vertices at which the image shows no boundary: collapsed between walls that have met, grown into gaps
+    /// that open, else smoothed.
     pub without_boundary: usize,
     /// Mean number of projection steps per vertex, summed over the projections of all vertices onto space-time and onto
     /// the frame.
@@ -79,8 +81,8 @@ pub(super) enum Support {
 }
 
 impl FrameContext<'_> {
-    /// Classifies a point of the surface by the intensities one voxel inside and one voxel outside, in the shortest
-    /// side of a voxel.
+    /// Classifies a point of the surface by the intensities at two points on its normal, inside and outside by the
+    /// shortest side of a voxel.
     pub fn classify(&self, at: Vec3, normal: Vec3) -> Support {
         let region = self.region;
         let displacement = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
@@ -115,8 +117,8 @@ impl FrameTracker {
         Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
     }
 
-    /// Moves the mesh into the next frame, with a prediction from the samples of the frame before, if any. Returns the
-    /// edits and the statistics of the frame.
+    /// Moves the mesh into the next frame, predicted from the samples of the frame before if there are any and the
+    /// parameters ask for it. Returns the edits and the statistics of the frame.
     pub fn track_frame(
         &mut self,
         mesh: &mut Mesh,
@@ -143,8 +145,8 @@ impl FrameTracker {
         (changes, statistics)
     }
 
-    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, restores its edge bounds, and resolves
-    /// boundary loss. Returns the edits.
+    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, restores its edge bounds, and treats the
+    /// vertices without a boundary. Returns the edits.
     fn project_and_restructure(
         &mut self,
         mesh: &mut Mesh,
@@ -161,8 +163,9 @@ impl FrameTracker {
     }
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
-    /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move along their normals by as
-    /// much, outwards where the surface is convex.
+    /// points along it, R²/8 for points weighted by θ = exp(−4r²/R²) with the radius R of the parameters, times the
+    /// mean curvature. Vertices move along their normals by as much, outwards where the surface is convex, but at most
+    /// by [`MAX_CURVATURE_CORRECTION`].
     fn correct_curvature_bias(
         &mut self,
         mesh: &mut Mesh,
@@ -219,8 +222,9 @@ impl FrameTracker {
         statistics.mean_final_correction = total / count;
     }
 
-    /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. All move at once, with one
-    /// collision test. Returns the total number of steps, and the total displacement by the projection.
+    /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. Where that fails, a vertex
+    /// moves by the mean of its neighbours' displacements. All move at once, with one collision test. Returns the total
+    /// number of steps, and the total displacement by the projection.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
@@ -250,7 +254,8 @@ impl FrameTracker {
         (steps, sum)
     }
 
-    /// Moves the vertices by `displacements` under the collision guard. Returns the number of those held back.
+    /// Moves the vertices by `displacements` as far as the surface does not intersect itself. Returns the number of
+    /// those held back.
     pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
         self.guard.sync_with_edge(mesh, self.bounds.max);
         self.guard.move_all(mesh, &mut displacements).len()
@@ -310,7 +315,7 @@ fn fill_rejected(mesh: &Mesh, displacements: &[Option<Vec3>], rejected: &[Vertex
     out
 }
 
-/// Returns the triangles that face away from the sum of their three neighbours.
+/// Returns the triangles that face away from the sum of the normals of the three triangles beside them.
 fn folded(mesh: &Mesh) -> Vec<[VertexId; 3]> {
     let normal = |[a, b, c]: [VertexId; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.position(v));

@@ -80,7 +80,7 @@ pub(super) fn label_bright(
 }
 
 /// Labels the voxels of a box as [`label_bright`] does, but by comparing each intensity with the middle of the step at
-/// the nearest wall. Needs no solve, but is only right where the signal is as strong as at that wall.
+/// the nearest wall. Solves no equations, but is only right where the signal is as strong as at that wall.
 pub(super) fn label_bright_by_level(
     region: &Region,
     frame: usize,

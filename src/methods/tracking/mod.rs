@@ -58,8 +58,8 @@ pub enum Component {
 /// The region of a volume that is processed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// Opposite corners in world coordinates. If the voxel axes are rotated, the bounding box along the voxel axes is
-    /// used.
+    /// The corners of a box with the least and the largest world coordinates; voxels whose centres are inside are
+    /// processed. If the voxel axes are rotated, the bounding box along the voxel axes is used.
     World([DVec3; 2]),
     /// The first and the last voxel along x, y and z, both inclusive.
     Voxels([[usize; 3]; 2]),
@@ -77,14 +77,14 @@ pub struct TrackingOptions {
     pub component: Component,
     /// The surface in the first frame, in world coordinates; by default it is extracted from the image.
     pub start: Option<TriangleMesh>,
-    /// The parameters; those that are 0 are derived from the volume.
+    /// The parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
 }
 
-/// A projection has converged after a step no longer than this, in the shortest side of a voxel.
+/// A projection has converged after a step no longer than this, in units of the shortest side of a voxel.
 const CONVERGED_STEP: f64 = 0.012;
 
-/// Projections that move a vertex by more than this are rejected, in the shortest side of a voxel.
+/// Projections that move a vertex by more than this are rejected, in units of the shortest side of a voxel.
 const MAX_DISPLACEMENT: f64 = 4.8;
 
 /// Tracks a closed surface through the frames of a 4D image.
@@ -174,7 +174,11 @@ impl SurfaceTracker {
         Ok(tracker)
     }
 
-    /// Validates the parameters, and derives those that are 0 from the volume.
+    /// Derives `threshold`, `radius` and `time_scale` from the volume if they are 0.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for parameters that are not accepted, among them a radius outside the range for
+    /// these voxels.
     fn with_defaults(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
         params.validate()?;
         let shortest_side = self.image.shortest_side;
@@ -209,7 +213,7 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
     }
 
-    /// Sets the parameters during a run. A change of the boundary (`threshold`, `window`, `windowFrames`, `cyclic`)
+    /// Sets the parameters during a run. A change of the boundary (`threshold`, `window`, `window_frames`, `cyclic`)
     /// restarts the run; other changes apply from the next frame on.
     ///
     /// # Errors

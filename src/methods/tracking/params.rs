@@ -4,7 +4,8 @@ use super::ImageStatistics;
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of a [`SurfaceTracker`](super::SurfaceTracker). Those that are 0 are derived from the volume.
+/// Parameters of a [`SurfaceTracker`](super::SurfaceTracker). `threshold`, `radius` and `time_scale` are derived from
+/// the volume if they are 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default, deny_unknown_fields)]
 pub struct TrackingParams {
@@ -54,12 +55,12 @@ const THRESHOLD_IN_NOISE: f64 = 4.0;
 /// Smallest default τ, as a share of the intensity range: images without noise need a threshold as well.
 const MIN_THRESHOLD: f64 = 0.05;
 
-/// Default radius in the shortest side of a voxel, about two voxels and a half: a smaller one follows noise, a larger
-/// one rounds off details of that thickness.
+/// Default radius in units of the shortest side of a voxel, about two voxels and a half: a smaller one follows noise, a
+/// larger one rounds off details of that thickness.
 const RADIUS_IN_PIXELS: f64 = 2.4;
 
-/// Smallest default radius in the longest side of a voxel: with a radius below the slice distance, all points would be
-/// of one slice and the plane fitted to them would be the slice itself.
+/// Smallest default radius in units of the longest side of a voxel: with a radius below the slice distance, all points
+/// would be of one slice and the plane fitted to them would be the slice itself.
 const RADIUS_IN_SLICES: f64 = 1.2;
 
 /// Default c as a share of the radius: neighbouring frames then have next to no weight, unlike the temporal faces half
@@ -67,7 +68,8 @@ const RADIUS_IN_SLICES: f64 = 1.2;
 const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
 impl TrackingParams {
-    /// Checks all values, except those that are 0 and will be derived from the volume.
+    /// Checks all values, but accepts 0 for `threshold`, `radius` and `time_scale`, which are then derived from the
+    /// volume.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted.
@@ -98,7 +100,7 @@ impl TrackingParams {
         key(self) == key(others)
     }
 
-    /// Replaces parameters that are 0 by values derived from the volume.
+    /// Replaces `threshold`, `radius` and `time_scale`, if they are 0, by values derived from the volume.
     pub(super) fn with_volume(mut self, image: &ImageStatistics) -> Self {
         let ImageStatistics { shortest_side, longest_side, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };

@@ -78,8 +78,9 @@ impl SpaceTimeSamples {
         Some((x, STEPS))
     }
 
-    /// Predicts the displacement of the surface from a point to the next frame: −c·nₜ·n₃ / |n₃|², in world units.
-    /// `None` if there are too few points, or the hyperplane is nearly parallel to the frame.
+    /// Predicts the displacement of the surface from a point to the next frame by the slope of the space-time surface:
+    /// −c·nₜ·n₃ / |n₃|², in world units. `None` if there are too few points, or the hyperplane is nearly parallel to
+    /// the frame.
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
         let fit = self.fit(at, Onto::SpaceTime)?;
         let square = fit.normal.length_squared();

@@ -9,7 +9,8 @@ use crate::volume::{Volume, trilinear};
 /// Highest quantised intensity: levels 0 to 254, one byte per voxel.
 const MAX_LEVEL: f64 = 254.0;
 
-/// Share of the region's voxels at either end of the intensities, one in a thousand, that are clamped to the range.
+/// Share of the region's voxels, one in a thousand, that may be below the quantised range of intensities, and above it;
+/// they are clamped to it.
 const OUTLIERS: f64 = 1e-3;
 
 /// Bins of the histogram that determines the range of intensities.
@@ -92,7 +93,7 @@ impl Region {
         Ok(region)
     }
 
-    /// Quantises the intensities of all frames, between the quantiles found by [`intensity_quantiles`].
+    /// Quantises the intensities of all frames, between the quantiles found by [`intensity_quantiles`], to one byte.
     fn read(&mut self, volume: &Volume, low: [usize; 3]) -> Result<(), MethodError> {
         let mut counts = vec![0u64; BINS];
         for frame in 0..volume.frames() {

@@ -295,7 +295,7 @@ impl<const N: usize> RowSums<N> {
     }
 }
 
-/// Sums over the planes along z: `rows` like [`RowSums`], and the others with factors z and z².
+/// Sums over the planes along z: those of [`RowSums`], and those with factors z and z².
 struct PlaneSums<const N: usize> {
     rows: RowSums<N>,
     /// Weights times z, yz and zt.

@@ -9,14 +9,15 @@ use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{EdgeBounds, remesh};
 
-/// Target edge length of the first frame's mesh, in the shortest side of a voxel.
+/// Target edge length of the first frame's mesh, in units of the shortest side of a voxel.
 const EDGE: f64 = 1.2;
 
-/// Factor by which the longest edge of the first frame's mesh may exceed the target, and the shortest fall below it.
+/// Factor by which the longest edge accepted of the first frame's mesh may exceed the target, and the shortest fall
+/// below it.
 const EDGE_BOUND_RATIO: f32 = 1.5;
 
-/// Smallest mean edge of a caller's mesh, in the shortest side of a voxel. Its resolution is kept: with shorter edges,
-/// a surface as large as the image would have more triangles than fit into memory.
+/// Smallest mean edge of a caller's mesh, in units of the shortest side of a voxel. Its resolution is kept: with
+/// shorter edges, a surface as large as the image would have more triangles than fit into memory.
 const MIN_EDGE: f64 = 0.1;
 
 /// Validates the caller's mesh, and converts it to a [`Mesh`] with the same vertices.

@@ -30,10 +30,13 @@ pub(super) struct Window {
     pub cyclic: bool,
 }
 
-/// Directions in which two voxels share a face, X, Y, Z and TIME: indices into [`Faces`].
+/// The direction of faces between voxels next to each other along x: an index into [`Faces`].
 pub(super) const X: usize = 0;
+/// The direction of faces between voxels next to each other along y: an index into [`Faces`].
 pub(super) const Y: usize = 1;
+/// The direction of faces between voxels next to each other along z: an index into [`Faces`].
 pub(super) const Z: usize = 2;
+/// The direction of faces between a voxel and itself in the next frame: an index into [`Faces`].
 pub(super) const TIME: usize = 3;
 
 /// A face between two voxels that has votes.
@@ -366,8 +369,8 @@ impl Histogram {
     }
 }
 
-/// Histograms of intensities around a row (y, z), one for each x: of the voxels at this x, in all given frames, that are at
-/// most a window's half-width from the row along y and along z. That of a window is the sum of consecutive ones.
+/// Histograms of intensities around a row (y, z), one for each x: of the voxels at this x, in all given frames, that
+/// are at most a window's half-width from the row along y and along z. That of a window is the sum of consecutive ones.
 struct Slabs<'a> {
     dims: [usize; 3],
     half_width: usize,
