@@ -24,7 +24,8 @@ impl RawAnimation {
         Ok(self.0.add(&mesh.triangles()).map_err(Failure::from)?)
     }
 
-    /// Returns the bytes of the GLB file, in which each frame lasts `frame_seconds`; the animation is used up.
+    /// Returns the bytes of the GLB file, in which each frame lasts `frame_seconds`; the animation cannot be used
+    /// afterwards.
     pub fn finish(self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
         Ok(self.0.finish(frame_seconds).map_err(Failure::from)?)
     }

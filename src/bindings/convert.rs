@@ -13,8 +13,8 @@ use crate::math::{DVec3, Vec2, Vec3};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Returns the milliseconds since the start of the page, worker or process (`performance.now`), for the clocks of
-    /// the methods.
+    /// Returns the milliseconds since the start of the page, worker or process (`performance.now`); the models measure
+    /// with it how long their steps take.
     #[wasm_bindgen(js_namespace = performance)]
     pub fn now() -> f64;
 }
@@ -29,7 +29,7 @@ pub fn copy_array<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) 
     Ok(values)
 }
 
-/// Copies the bytes of a file.
+/// Copies the bytes of a file from a `Uint8Array`.
 pub fn bytes(array: &Uint8Array) -> Result<Vec<u8>, Failure> {
     copy_array(array.length(), |out| array.copy_to(out))
 }
@@ -44,24 +44,26 @@ pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
     copy_array(array.length(), |out| array.copy_to(out))
 }
 
-/// Converts packed xyz to points; an incomplete last triple is dropped, since the TypeScript side checks lengths.
+/// Converts an array of coordinates, x, y and z of each point in turn, to points. An incomplete last triple is dropped;
+/// the TypeScript side has checked the length.
 pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
     Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
 }
 
-/// Converts packed uv to texture coordinates; an incomplete last pair is dropped.
+/// Converts an array of u and v of each vertex in turn to texture coordinates; an incomplete last pair is dropped.
 pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
     Ok(floats(array)?.chunks_exact(2).map(Vec2::from_slice).collect())
 }
 
-/// Converts packed abc to triangles.
+/// Converts an array of the three vertex indices of each triangle in turn to triangles; an incomplete last triple is
+/// dropped.
 pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
     let indices = copy_array(array.length(), |out| array.copy_to(out))?;
     let (triangles, _) = indices.as_chunks::<3>();
     Ok(triangles.to_vec())
 }
 
-/// Converts three numbers to a point.
+/// Converts three numbers to a point; an error for another count.
 pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
     match values {
         [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
@@ -69,24 +71,26 @@ pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
     }
 }
 
-/// Converts points to packed xyz.
+/// Converts points to an array of x, y and z of each in turn.
 pub fn packed(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(|point| point.to_array()).collect()
 }
 
-/// Converts a serialisable value to plain objects and arrays; members that are `None` are left out.
+/// Converts a serialisable value to plain objects and arrays, in which `None` is `undefined`.
 pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
     value
         .serialize(&Serializer::new().serialize_maps_as_objects(true))
         .map_err(|error| Failure::invalid("result", &error.to_string()))
 }
 
-/// Returns `current` with the properties of a JavaScript object written over its own, used to set parameters.
+/// Returns a copy of `current` in which the properties of a JavaScript object replace those of the same names; used to
+/// set parameters.
 ///
 /// Properties that are `undefined` are ignored.
 ///
 /// # Errors
-/// A name that `current` does not have, or a value of the wrong type: `invalid-argument` with the name.
+/// `invalid-argument` with the name of the property, if `current` has none of that name or its value has the wrong
+/// type.
 pub fn with_overrides<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
     let all = to_js(current)?;
     for name in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {

@@ -23,17 +23,19 @@ pub struct RawStart(Start);
 
 #[wasm_bindgen]
 impl RawStart {
-    /// Returns the start from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level.
+    /// Returns the start from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level, without its
+    /// smallest parts; see [`Start::Contour`].
     pub fn contour() -> RawStart {
         RawStart(Start::Contour)
     }
 
-    /// Returns the start from an icosahedron that encloses the object.
+    /// Returns the start from a rounded box around the voxels of the coarsest pyramid level that are brighter than π_I
+    /// (the parameter `iso`), or around the whole image; see [`Start::Enclosing`].
     pub fn enclosing() -> RawStart {
         RawStart(Start::Enclosing)
     }
 
-    /// Returns the start from a grid of `count` × `count` × `count` bubbles, which are small spheres.
+    /// Returns the start from a grid of `count` × `count` × `count` small spheres that fills the image.
     pub fn bubbles(count: u32) -> RawStart {
         RawStart(Start::Bubbles(count))
     }
@@ -50,7 +52,7 @@ impl RawStart {
         RawStart(Start::MarchingCubes(iso))
     }
 
-    /// Returns the start from a copy of a closed mesh in world space.
+    /// Returns the start from a copy of a mesh in world space, which must be closed and free of self-intersections.
     pub fn mesh(mesh: &RawMesh) -> RawStart {
         RawStart(Start::Mesh(Rc::unwrap_or_clone(mesh.triangles())))
     }
@@ -62,8 +64,9 @@ pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
 
 #[wasm_bindgen]
 impl RawDeformable {
-    /// Creates a model of one frame of a volume. `edge` is the target edge at the finest level, in world units;
-    /// `params` are written over the defaults for that volume.
+    /// Creates a model of one frame of a volume, with a pyramid of `levels` levels. `edge` is the target edge length on
+    /// the finest level, in world units, derived from the volume if not given; properties of `params` replace the
+    /// defaults for that volume.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -102,14 +105,15 @@ impl RawDeformable {
         Ok(to_js(&report)?)
     }
 
-    /// Adds the parts of the current level's contour that the surface lacks; returns a report that counts them.
+    /// Adds the parts of the iso-surface at π_I of the current pyramid level that the model's surface lacks, unless its
+    /// topology is fixed; returns a report that counts them.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
         let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
-    /// Starts a measurement of how far the surface and the iso-surface of the volume cover each other; see
-    /// [`Coverage`].
+    /// Starts a measurement of which fractions of the model's surface and of the volume's iso-surface lie near each
+    /// other; see [`Coverage`].
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
         let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
@@ -130,7 +134,8 @@ impl RawDeformable {
         Ok(())
     }
 
-    /// Replaces the attractors, packed with five numbers each: x, y, z, strength, radius.
+    /// Replaces the attractors, points that pull the surface: five numbers each, which are x, y and z in world space,
+    /// the strength (negative to repel) and the radius, in world units, beyond which there is no force.
     #[wasm_bindgen(js_name = setAttractors)]
     pub fn set_attractors(&self, packed: &Float64Array) -> Result<(), JsValue> {
         let numbers = doubles(packed)?;
@@ -144,12 +149,13 @@ impl RawDeformable {
         Ok(())
     }
 
-    /// Returns the pyramid level of the current step; 0 is the volume itself.
+    /// Returns the index of the current pyramid level; 0 is the volume itself, higher ones are coarser.
     pub fn level(&self) -> usize {
         self.0.borrow().level()
     }
 
-    /// Returns δ of the current level, the lower bound of edge lengths, in world units.
+    /// Returns the lower bound of edge lengths on the current pyramid level, δ, in world units, averaged over
+    /// directions if voxels are not cubes.
     pub fn delta(&self) -> f64 {
         self.0.borrow().delta()
     }
@@ -165,14 +171,16 @@ impl RawDeformable {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
+    /// Restores a state from `save`, if this model has the same volume, frame and levels; the run then continues with
+    /// the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
     }
 }
 
-/// A coverage measurement in progress, of the surface at the moment it was started.
+/// A measurement in progress of how far the surface of a model, as it was at the start of the measurement, and the
+/// iso-surface of the volume cover each other.
 #[wasm_bindgen]
 pub struct RawCoverageSurvey(Option<CoverageSurvey>);
 
@@ -183,7 +191,8 @@ impl RawCoverageSurvey {
         self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
     }
 
-    /// Returns recall, precision and uncovered regions, once all triangles have been tested.
+    /// Returns recall, precision and uncovered regions. All triangles must have been tested by `advance`; an error the
+    /// second time.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
         let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "already finished"))?;
         Ok(to_js(&CoverageResult::from(survey.finish()))?)

@@ -38,7 +38,7 @@ impl RawPoints {
         self.0.normals.as_deref().map(packed)
     }
 
-    /// Returns the colours as packed rgb, if the file has them.
+    /// Returns the colours as red, green and blue of each point in turn, in 0..1, if the file has them.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
     }
@@ -57,8 +57,8 @@ impl RawCameras {
         Self::default()
     }
 
-    /// Appends a camera: a row-major 3 × 4 projection from world to pixels, the image size in pixels, and the image as
-    /// rgba bytes if there is one.
+    /// Appends a camera: the 3 × 4 matrix that projects world space to pixels, row by row, the image size in pixels,
+    /// and the image as four bytes per pixel (red, green, blue, alpha) if there is one.
     pub fn push(
         &mut self,
         projection: &[f64],
@@ -80,7 +80,10 @@ pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
 
 #[wasm_bindgen]
 impl RawImplicit {
-    /// Creates an implicit surface of packed points; `params` are written over the defaults.
+    /// Creates an implicit surface of points, with a normal, a confidence and a colour of each if given, and points
+    /// known to be outside (`exterior`); the images of `cameras` colour it. At most `max_points` become surface
+    /// constraints; only the `keep_components` largest clusters of nearby points are used, all if it is not given.
+    /// Properties of `params` replace the defaults.
     #[wasm_bindgen(constructor)]
     #[expect(
         clippy::too_many_arguments,
@@ -121,8 +124,8 @@ impl RawImplicit {
         RawMesh(MeshKind::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
     }
 
-    /// Returns a copy of the part of the surface extracted so far, and all of it during colouring; empty in other
-    /// phases.
+    /// Returns a copy of the surface while it is made: the part extracted so far, or all of it while it is being
+    /// coloured; empty in other phases.
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
         Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
@@ -155,8 +158,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Replaces all manual edits of the points: points added and exterior points as packed xyz, and the indices of
-    /// points removed.
+    /// Replaces all manual edits of the points: the positions of added points and of exterior points, x, y and z of
+    /// each in turn, and the indices of the input points to leave out.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,
@@ -174,7 +177,7 @@ impl RawImplicit {
         packed(&self.0.borrow().edits().added)
     }
 
-    /// Returns the indices of the points that were removed manually.
+    /// Returns the indices of the input points that were removed manually.
     pub fn removed(&self) -> Vec<u32> {
         self.0.borrow().edits().removed.clone()
     }
@@ -184,14 +187,15 @@ impl RawImplicit {
         packed(&self.0.borrow().edits().exterior)
     }
 
-    /// Returns f minus the iso-value at packed points: above 0 inside, below 0 outside.
+    /// Returns the values of the implicit function f minus its iso-value at packed points in world space: positive
+    /// inside, 0 on the surface, negative outside.
     pub fn evaluate(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let values = self.0.borrow().evaluate(&points(at)?).map_err(Failure::from)?;
         Ok(values.into_iter().map(|value| value as f32).collect())
     }
 
-    /// Returns the gradients ∇f at packed points, as packed vectors per unit of length of the points; on the surface
-    /// they point inwards.
+    /// Returns the gradients of the implicit function, ∇f, at packed points, x, y and z of each in turn, per world
+    /// unit; on the surface they point inwards.
     pub fn gradient(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let gradients = self.0.borrow().gradient(&points(at)?).map_err(Failure::from)?;
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
@@ -202,13 +206,15 @@ impl RawImplicit {
         self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
     }
 
-    /// Returns the distances of all points, with edits, from the surface and its mean curvature, as a `Fitness` object.
+    /// Returns how well the surface fits all points, with the manual edits, as a `Fitness` object: their distances from
+    /// it, and its mean curvature.
     pub fn fitness(&self) -> Result<JsValue, JsValue> {
         let fitness = self.0.borrow().fitness().map_err(Failure::from)?;
         Ok(to_js(&fitness)?)
     }
 
-    /// Returns f minus the iso-value, sampled on a grid of `dims` voxels around the points and the surface.
+    /// Returns the implicit function f minus its iso-value as a volume of `dims` voxels that covers the points and the
+    /// surface: positive inside, negative outside.
     #[wasm_bindgen(js_name = toVolume)]
     pub fn to_volume(&self, dims: &[u32]) -> Result<RawVolume, JsValue> {
         let dims: [u32; 3] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 integers"))?;
@@ -222,7 +228,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Returns further results: cell size, point spacing, numbers of duplicate points and of spurious components, and a
+    /// Returns further results: the edge of an extraction cell in world units, the mean spacing of the surface
+    /// constraints in units of the normalised box, the numbers of duplicate points and of spurious components, and a
     /// warning about the parameters if there is one.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
@@ -240,7 +247,8 @@ impl RawImplicit {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
+    /// Restores a state from `save`, if this model was made of the same points and options, except parameters; the run
+    /// then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

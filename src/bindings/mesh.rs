@@ -41,7 +41,8 @@ pub(super) trait LiveSurface {
     /// Returns the numbers of vertices and triangles.
     fn counts(&self) -> [usize; 2];
     /// Returns the topology version, which increases when connectivity changes, and the geometry version, which
-    /// increases when a vertex moves.
+    /// increases when a vertex moves. Those of an implicit surface are one number, which increases with every new
+    /// surface.
     fn versions(&self) -> [u32; 2];
 }
 
@@ -83,13 +84,14 @@ pub struct RawArrays(Rc<TriangleMesh>);
 
 #[wasm_bindgen]
 impl RawMesh {
-    /// Creates a sphere of nearly equilateral triangles with edges of at most `max_edge`.
+    /// Creates a sphere of nearly equilateral triangles with edges of at most `max_edge`, in world units.
     pub fn icosphere(center: &[f64], radius: f64, max_edge: f64) -> Result<RawMesh, JsValue> {
         let mesh = Mesh::icosphere(point(center)?.as_vec3(), radius as f32, max_edge as f32);
         Ok(RawMesh(MeshKind::Surface(Box::new(mesh.map_err(Failure::from)?))))
     }
 
-    /// Creates a mesh from packed arrays, which are copied.
+    /// Creates a triangle list from copies of arrays: x, y and z of each vertex in turn, three vertex indices per
+    /// triangle, and, if given, u and v of each vertex and a texture.
     #[wasm_bindgen(js_name = fromArrays)]
     pub fn from_arrays(
         positions: &Float32Array,
@@ -144,7 +146,7 @@ impl RawMesh {
         }
     }
 
-    /// Returns a counter that increases when connectivity changes.
+    /// Returns a counter that increases when connectivity changes; 0 for a triangle list.
     #[wasm_bindgen(js_name = topologyVersion)]
     pub fn topology_version(&self) -> u32 {
         match &self.0 {
@@ -154,7 +156,7 @@ impl RawMesh {
         }
     }
 
-    /// Returns a counter that increases when any vertex moves.
+    /// Returns a counter that increases when any vertex moves; 0 for a triangle list.
     #[wasm_bindgen(js_name = geometryVersion)]
     pub fn geometry_version(&self) -> u32 {
         match &self.0 {
@@ -164,8 +166,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns a snapshot of the arrays, with vertex normals; at a texture seam, with the texture coordinates of one
-    /// side.
+    /// Returns a snapshot of the arrays, with vertex normals. A vertex on a texture seam, which has several texture
+    /// coordinates, has only one of them.
     pub fn arrays(&self) -> RawArrays {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
@@ -208,14 +210,15 @@ impl RawMesh {
         self.triangles().components().into_iter().map(|part| RawMesh(triangle_list(part))).collect()
     }
 
-    /// Refines the mesh by one √3-subdivision pass: three triangles for each.
+    /// Refines the mesh by one √3-subdivision pass, which replaces each triangle by three.
     pub fn refine(&mut self) -> Result<(), JsValue> {
         self.editable()?.refine().map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Runs passes of restructuring in the given order: collapses (0), splits (1), flips (2); see [`restructure`].
-    /// Returns the number of edits.
+    /// Runs passes of restructuring in the given order: collapses of edges shorter than `min` (0), splits of edges
+    /// longer than `max` (1), flips (2); both bounds are in world units. Returns the number of edits; see
+    /// [`restructure`].
     ///
     /// [`restructure`]: crate::remesh::restructure
     pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
@@ -233,7 +236,8 @@ impl RawMesh {
         Ok(changes.creations + changes.deletions + changes.inversions)
     }
 
-    /// Decimates the mesh to `target_triangles` by quadric error; see [`decimate`].
+    /// Decimates the mesh by quadric error to at most `target_triangles`, or more if too few edges can be collapsed
+    /// safely; see [`decimate`].
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
         // Truncates a fraction, and saturates a count that no mesh can have.
         let target = target_triangles as usize;
@@ -261,14 +265,14 @@ impl RawMesh {
         to_f32(&curvature(&self.triangles()).mean)
     }
 
-    /// Returns the Gaussian curvature at each vertex, an inverse area.
+    /// Returns the Gaussian curvature at each vertex, an inverse area: positive on a ball, negative on a saddle.
     #[wasm_bindgen(js_name = gaussianCurvature)]
     pub fn gaussian_curvature(&self) -> Vec<f32> {
         to_f32(&curvature(&self.triangles()).gaussian)
     }
 
-    /// Returns the geodesic distance of each vertex from vertex `from_vertex`, in world units; infinite on other
-    /// components.
+    /// Returns the geodesic distance, measured along the surface, of each vertex from vertex `from_vertex`, in world
+    /// units; infinite for vertices that are not connected to it.
     pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
         Ok(to_f32(&geodesic_distances(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
@@ -291,7 +295,8 @@ impl RawMesh {
         Ok(to_js(&hit.map(Hit::from))?)
     }
 
-    /// Returns the line segments in which the plane through `origin` cuts the surface, as packed pairs of points.
+    /// Returns the line segments in which the plane through `origin` with the given normal cuts the surface: six
+    /// numbers each, x, y and z of both ends.
     #[wasm_bindgen(js_name = crossSection)]
     pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
         let (origin, normal) = (point(origin)?.as_vec3(), direction_of(normal)?);
@@ -335,8 +340,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns the mesh for editing; a list of triangles is replaced by an editable mesh first. An error if it is not
-    /// closed, or is the live mesh of a model.
+    /// Returns the mesh for editing; a triangle list is replaced by an editable mesh first. An error if the list is not
+    /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
     fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let MeshKind::Triangles(triangles) = &self.0 {
             self.0 = MeshKind::Surface(Box::new(Mesh::from_triangles(triangles)?));
@@ -399,19 +404,19 @@ impl RawArrays {
         copy_into(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
     }
 
-    /// Copies the triangles to `out`, as packed abc.
+    /// Copies the triangles to `out`, three vertex indices each.
     pub fn indices(&self, out: &Uint32Array) {
         let indices = self.0.triangles.as_flattened();
         out.subarray(0, indices.len() as u32).copy_from(indices);
     }
 
-    /// Returns the texture coordinates as packed uv, if there are any.
+    /// Returns the texture coordinates as u and v of each vertex in turn, if there are any.
     pub fn uvs(&self) -> Option<Vec<f32>> {
         let uvs = self.0.uvs.as_ref()?;
         Some(uvs.iter().flat_map(|uv| uv.to_array()).collect())
     }
 
-    /// Returns the colours as packed rgb, if there are any.
+    /// Returns the colours as red, green and blue of each vertex in turn, if there are any.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
     }
@@ -536,7 +541,7 @@ impl From<Measures> for Info {
     }
 }
 
-/// Returns the unit vector of a direction of any length but 0.
+/// Returns the unit vector along a vector of any length; 0 for a zero vector.
 fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     let given = point(values)?;
     let largest = given.abs().max_element();

@@ -19,14 +19,14 @@ use crate::methods::multires::{
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
-/// One of the three surfaces of a model, as the content of a live mesh.
+/// One of the three surfaces of a multiresolution model, as the content of a live mesh.
 struct LiveView {
     model: Rc<RefCell<MultiresolutionModel>>,
     surface: Surface,
 }
 
-/// The surfaces of a model that have a live mesh: the detailed surface, the deformed base, and the link mesh, which is
-/// the map T.
+/// The surfaces of a model that have a live mesh: the detailed surface, the deformed base, and the link mesh, which has
+/// the triangles of the deformed base with each vertex at its position on the undeformed base (the map T).
 #[derive(Clone, Copy)]
 enum Surface {
     Detailed,
@@ -59,7 +59,9 @@ impl LiveSurface for LiveView {
 
 #[wasm_bindgen]
 impl RawMultires {
-    /// Creates a model of meshes and packed ellipsoids; `params` are written over the defaults.
+    /// Creates a model of a detailed mesh, without which it has no detail, a base mesh, which is derived if not given,
+    /// and control ellipsoids of twelve numbers each: the centre and three semi-axis vectors. Properties of `params`
+    /// replace the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
         detail: Option<TriangleCopy>,
@@ -88,7 +90,8 @@ impl RawMultires {
         RawMesh(MeshKind::Live(Rc::new(RefCell::new(LiveView { model: Rc::clone(&self.0), surface }))))
     }
 
-    /// Returns the meshes of the multi-level solver for the current ellipsoids, from coarse to fine.
+    /// Returns the solutions for the current ellipsoids on the levels of the multi-level solver, one mesh each, from
+    /// coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
@@ -111,25 +114,29 @@ impl RawMultires {
         Ok(to_js(&report)?)
     }
 
-    /// Sets the target ellipsoids, packed with twelve numbers each: centre and three semi-axes.
+    /// Sets the target ellipsoids, towards which the current ones move: twelve numbers each, the centre and three
+    /// semi-axis vectors.
     #[wasm_bindgen(js_name = setEllipsoids)]
     pub fn set_ellipsoids(&self, ellipsoids: &Float64Array) -> Result<(), JsValue> {
         self.0.borrow_mut().set_ellipsoids(&unpacked(ellipsoids)?).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Returns the current ellipsoids, packed with twelve numbers each: centre and three semi-axes.
+    /// Returns the current ellipsoids, including those that are being removed: twelve numbers each, the centre and
+    /// three semi-axis vectors.
     pub fn ellipsoids(&self) -> Vec<f64> {
         packed(&self.0.borrow().ellipsoids())
     }
 
-    /// Returns the target ellipsoids, packed with twelve numbers each: centre and three semi-axes.
+    /// Returns the target ellipsoids, without those that are being removed: twelve numbers each, the centre and three
+    /// semi-axis vectors.
     pub fn targets(&self) -> Vec<f64> {
         packed(&self.0.borrow().targets())
     }
 
-    /// Returns the distortion of areas (`which` 0) or of angles (1) by the map T from the deformed base to the
-    /// undeformed one: a ratio per vertex, 1 without distortion.
+    /// Returns for each vertex how much the map T from the deformed base to the undeformed one distorts areas (`which`
+    /// 0: the area on the undeformed base divided by that on the deformed one) or angles (any other: the ratio of the
+    /// largest to the smallest stretch); 1 without distortion.
     pub fn distortion(&self, which: u32) -> Vec<f32> {
         let found = self.0.borrow().distortion();
         let values = if which == 0 { found.area } else { found.angle };
@@ -150,8 +157,9 @@ impl RawMultires {
         Ok(())
     }
 
-    /// Returns further counts: surfaces in the decomposition, folded triangles of the map T, vertices whose normal
-    /// missed the finer surface, and vertices held back to avoid self-intersections.
+    /// Returns further counts: surfaces in the decomposition, including the base; folded triangles of the map T; and,
+    /// in the last reconstruction of detail, vertices whose normal missed the finer surface, and vertices held back to
+    /// avoid self-intersections.
     pub fn counts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
         let [unmatched_vertices, held_vertices] = model.detail_counts();
@@ -168,7 +176,8 @@ impl RawMultires {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
+    /// Restores a state from `save`, if this model has the same surfaces, given or derived; the run then continues with
+    /// the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -184,7 +193,8 @@ struct Counts {
     held_vertices: usize,
 }
 
-/// Unpacks ellipsoids of twelve numbers each: centre and three semi-axes.
+/// Converts arrays of twelve numbers per ellipsoid, the centre and three semi-axis vectors, to ellipsoids; an
+/// incomplete last one is dropped.
 fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
     let numbers = doubles(packed)?;
     let (all, _) = numbers.as_chunks::<12>();
@@ -195,7 +205,7 @@ fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
         .collect())
 }
 
-/// Packs ellipsoids with twelve numbers each: centre and three semi-axes.
+/// Converts ellipsoids to an array of twelve numbers each: the centre and three semi-axis vectors.
 fn packed(all: &[ControlEllipsoid]) -> Vec<f64> {
     all.iter().flat_map(|e| e.center.into_iter().chain(e.axes.into_iter().flatten())).collect()
 }

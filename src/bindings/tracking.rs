@@ -43,9 +43,11 @@ impl LiveSurface for CurrentFrame {
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// Creates a tracker of a 4D volume. The box is given by two opposite `corners` in world space, or by its first and
-    /// last voxel, `voxels`: six numbers each. `nearest` is a point that selects the surface around it, or the nearest
-    /// one. `params` are written over the defaults.
+    /// Creates a tracker of a 4D volume. The region processed is a box given by two opposite `corners` in world space,
+    /// else by its first and last voxel, `voxels` (six numbers each), else the whole volume. The surface tracked is the
+    /// one that contains the point `nearest`, or has the vertex nearest to it; without that point, the one that
+    /// encloses the largest volume. `start` is the surface in the first frame, by default extracted from the image.
+    /// Properties of `params` replace the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -71,7 +73,8 @@ impl RawTracker {
         Ok(RawTracker(Rc::new(RefCell::new(tracker))))
     }
 
-    /// Returns a live mesh of the current frame's surface.
+    /// Returns a live mesh of the surface in the newest finished frame; before the first one is finished, of the start
+    /// surface if there is one, else empty.
     pub fn mesh(&self) -> RawMesh {
         RawMesh(MeshKind::Live(Rc::new(RefCell::new(CurrentFrame(Rc::clone(&self.0))))))
     }
@@ -110,8 +113,8 @@ impl RawTracker {
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
-    /// Returns the boundary points of a frame, packed with five numbers each: x, y, z in world space, t in frames, and
-    /// the weight.
+    /// Returns the boundary points of a frame, five numbers each: x, y, z in world space, t in frames, and the weight.
+    /// Empty until they are found.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
         self.0.borrow().boundary(frame).into_iter().flatten().collect()
     }
@@ -121,8 +124,8 @@ impl RawTracker {
         self.0.borrow().volumes()
     }
 
-    /// Returns further results: the standard deviation of the image noise, the cycle closure error once it is known,
-    /// and the statistics of each frame.
+    /// Returns further results: the standard deviation of the image noise, in intensity; for a cyclic sequence, once it
+    /// is known, the cycle closure error in world units; and the statistics of each finished frame.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
         let statistics = Statistics {
@@ -159,7 +162,8 @@ impl RawTracker {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`; the run then continues with the same results, bit for bit.
+    /// Restores a state from `save`, if this tracker has the same volume, box, component and start; the run then
+    /// continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

@@ -23,7 +23,9 @@ pub struct RawFrames(Vec<Volume>);
 
 #[wasm_bindgen]
 impl RawVolume {
-    /// Creates a volume from a typed array, x fastest; `dims` has four numbers, `affine` sixteen, column-major.
+    /// Creates a volume from a typed array of stored values, x fastest. `dims` are the numbers of voxels along x, y and
+    /// z and of frames; `affine` is the 4 × 4 matrix from voxel indices to world space, column by column; an intensity
+    /// is `slope` × value + `intercept`. Any `space` but `LPS` means RAS.
     #[wasm_bindgen(constructor)]
     pub fn new(
         data: &JsValue,
@@ -46,7 +48,8 @@ impl RawVolume {
         Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
     }
 
-    /// Reads a volume from the bytes of a file, and those of its payload if the header is detached.
+    /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of
+    /// its own.
     pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
         let payload = data.as_ref().map(bytes).transpose()?;
         Ok(RawVolume(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
@@ -73,7 +76,8 @@ impl RawVolume {
         self.0.spacing().to_vec()
     }
 
-    /// Returns the transform from voxel indices to world space: sixteen numbers, column-major.
+    /// Returns the transform from voxel indices to world space: the sixteen numbers of a 4 × 4 matrix, column by
+    /// column.
     pub fn affine(&self) -> Vec<f64> {
         let columns = self.0.affine().to_cols_array();
         let (columns, _) = columns.as_chunks::<3>();
@@ -81,7 +85,8 @@ impl RawVolume {
         columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
     }
 
-    /// Returns the anatomical orientation of world space, `RAS` or `LPS`.
+    /// Returns which anatomical directions the axes of world space have: `RAS` (right, anterior, superior) or `LPS`
+    /// (left, posterior, superior).
     pub fn space(&self) -> String {
         match self.0.space() {
             Space::Ras => "RAS",
@@ -90,24 +95,24 @@ impl RawVolume {
         .to_owned()
     }
 
-    /// Returns the smallest and the largest intensity of all frames.
+    /// Returns the smallest and the largest finite intensity of all frames.
     pub fn range(&self) -> Vec<f64> {
         self.0.range().to_vec()
     }
 
-    /// Returns the histogram of a frame: the number of voxels in each of `bins` equal parts of the volume's intensity
-    /// range.
+    /// Returns the histogram of a frame: the number of voxels in each of `bins` equal parts of the intensity range of
+    /// all frames.
     pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, JsValue> {
         Ok(self.0.histogram(bins, frame).map_err(Failure::from)?)
     }
 
-    /// Returns the intensity at a world point, by trilinear interpolation.
+    /// Returns the intensity at a world point, by trilinear interpolation; outside the volume the border is replicated.
     pub fn sample(&self, world: &[f64], frame: usize) -> Result<f64, JsValue> {
         Ok(self.0.sample(point(world)?, frame).map_err(Failure::from)?)
     }
 
-    /// Returns the intensities of the slice at `index` along `axis`, row-major; its rows run along the lower one of the
-    /// two other axes.
+    /// Returns the intensities of the slice of one frame at `index` along `axis` (0, 1, 2 for x, y, z), row by row; the
+    /// rows run along the lower one of the two other axes.
     pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
     }
@@ -117,7 +122,8 @@ impl RawVolume {
         Ok(self.0.intensities(frame).map_err(Failure::from)?)
     }
 
-    /// Returns the volumes of a pyramid, one per level; the first is this one.
+    /// Returns the volumes of a pyramid, one per level: the first is this one, each other has the dimensions of the one
+    /// before divided by `factor`.
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<RawVolume>, JsValue> {
         let levels = self.0.pyramid(levels, factor).map_err(Failure::from)?;
         Ok(levels.into_iter().map(RawVolume).collect())
@@ -129,14 +135,16 @@ impl RawVolume {
         self.0.frame_seconds()
     }
 
-    /// Returns the volume downsampled by the means of blocks of `factors` voxels along x, y and z.
+    /// Returns the volume downsampled by blocks of `factors` voxels along x, y and z: each new voxel is the mean of the
+    /// finite voxels of a block, and incomplete blocks are dropped.
     pub fn binned(&self, factors: &[u32]) -> Result<RawVolume, JsValue> {
         let factors = [0, 1, 2].map(|axis| factors.get(axis).map_or(1, |&n| n as usize));
         Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
     }
 
-    /// Returns the volume with in-between slices along the axis of the largest spacing, `factor` slices for each
-    /// original one, interpolated by optical flow if `flow`, else linearly.
+    /// Returns the volume with `factor` − 1 slices inserted between neighbouring ones along the axis of the largest
+    /// spacing, interpolated by optical flow if `flow`, else linearly. Without `factor`, it is chosen so that voxels
+    /// become nearly cubes.
     #[wasm_bindgen(js_name = enrichSlices)]
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
         let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
@@ -152,13 +160,13 @@ impl RawFrames {
         Self::default()
     }
 
-    /// Appends a volume, which contributes all its frames. (Clones of a volume share its voxels.)
+    /// Appends a volume, which contributes all its frames. Its voxels are not copied.
     pub fn push(&mut self, volume: &RawVolume) {
         self.0.push(volume.0.clone());
     }
 
-    /// Returns the 4D volume of all frames; the list is used up. Without `frame_seconds`, those of the first volume are
-    /// used.
+    /// Returns the 4D volume of all frames; the list cannot be used afterwards. Without `frame_seconds`, the time
+    /// between frames is that of the first volume.
     pub fn join(self, frame_seconds: Option<f64>) -> Result<RawVolume, JsValue> {
         Ok(RawVolume(Volume::from_frames(&self.0, frame_seconds).map_err(Failure::from)?))
     }
@@ -184,7 +192,8 @@ fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
     Ok(dims.map(|n| n as usize))
 }
 
-/// Converts sixteen numbers, column-major, to an affine transform.
+/// Converts the sixteen numbers of a 4 × 4 matrix, column by column, to an affine transform; an error if the last row is
+/// not 0, 0, 0, 1.
 fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
     let (columns, _) = affine.as_chunks::<4>();
     let last_row: Vec<f64> = columns.iter().map(|column| column[3]).collect();

@@ -8,7 +8,7 @@ use crate::math::Vec3;
 use crate::mesh::{MeshError, TriangleMesh};
 use std::borrow::Borrow;
 
-/// Shortest duration of an animation frame, in seconds. No screen shows shorter frames, and after hours of animation,
+/// Shortest duration of an animation frame, in seconds. Screens show no shorter frames, and after hours of animation,
 /// times closer together than this are equal in single precision.
 const MIN_FRAME_SECONDS: f64 = 1e-3;
 

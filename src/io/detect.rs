@@ -10,8 +10,9 @@ const ACCEPTED: &str =
 /// Bytes inflated from the start of a gzipped file to detect its format.
 const START: usize = 512;
 
-/// Reads a volume file, whose format is detected from the bytes. `detached` is the payload of a header that refers to
-/// another file for its voxels (several files are concatenated in order).
+/// Reads a volume from a NIfTI file, which may be gzipped, or from an NRRD or MetaImage file; the format is detected
+/// from the bytes. `detached` is the content of the data file if the header in `bytes` refers to one (several data
+/// files are concatenated in order).
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field; the error about an unsupported format names it if it is recognised.

@@ -15,7 +15,7 @@ const INDICES: Option<u32> = Some(34963);
 /// attributes that the mesh has. Without triangles, the scene has one empty node.
 ///
 /// # Errors
-/// [`MeshError::TooLarge`] if there is not enough memory for it.
+/// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
 pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
     let mut parts = DocumentBuilder::default();
     let node = if mesh.triangles.is_empty() {
@@ -58,7 +58,8 @@ impl DocumentBuilder {
         Ok(self.meshes.len() - 1)
     }
 
-    /// Adds the vertex attributes of a mesh and returns the members of the primitive's `attributes` object.
+    /// Adds the vertex attributes of a mesh, including computed normals if it has none, and returns the members of the
+    /// primitive's `attributes` object in JSON.
     fn attributes(&mut self, mesh: &TriangleMesh) -> String {
         let bounds = Bounds::from_points(&mesh.positions);
         let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
@@ -94,7 +95,7 @@ impl DocumentBuilder {
         self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
     }
 
-    /// Adds an accessor of vectors and returns its index; `extra_json` is appended to its JSON.
+    /// Adds an accessor of 3D vectors and returns its index; `extra_json` is appended to its JSON.
     pub(super) fn vectors(
         &mut self,
         vectors: impl ExactSizeIterator<Item = Vec3>,
@@ -140,8 +141,8 @@ impl DocumentBuilder {
         self.views.len() - 1
     }
 
-    /// Returns the index of the material with that texture. It is added if no earlier mesh has the same texture, so
-    /// that each image is stored once.
+    /// Returns the index of the material with that texture. Material and image are added if no earlier mesh has an
+    /// equal texture, so that each image is stored once.
     fn material(&mut self, texture: &Arc<Texture>) -> Result<usize, MeshError> {
         if let Some(known) = self.textures.iter().position(|known| known == texture) {
             return Ok(known);
@@ -191,7 +192,8 @@ impl DocumentBuilder {
         container(json + "}", std::mem::take(&mut self.bytes))
     }
 
-    /// Returns the JSON of materials, textures and images. WebP is an extension of glTF, declared as required.
+    /// Returns the JSON members for materials, textures, samplers and images, and for the extension for WebP images,
+    /// declared as required if there are any.
     fn materials_json(&self) -> String {
         let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
         let (mut materials, mut textures) = (Vec::new(), Vec::new());

@@ -13,7 +13,8 @@ use glam::{DMat4, DQuat};
 use serde_json::Value;
 use std::sync::Arc;
 
-/// Maximum total number of triangle corners: nodes may repeat a mesh, so the size of the file is no bound.
+/// Maximum total number of triangle corners: nodes may repeat a mesh, so that a small file may stand for any number of
+/// triangles.
 const CORNER_LIMIT: u64 = 3 << 23;
 
 /// Accepted alternative named in the errors about compressed data and about required extensions that are not supported.
@@ -23,7 +24,8 @@ const UNCOMPRESSED: &str = "files without compression (save the mesh without it)
 /// [`CORNER_LIMIT`].
 const PRIMITIVE_COST: u64 = 64;
 
-/// Returns whether a file may require the extension: it does not affect positions and triangles, or is supported.
+/// Returns whether a file that requires the extension can be read: those of materials and textures, and that of
+/// quantised vertex attributes.
 fn is_supported_extension(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
         || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
@@ -31,7 +33,8 @@ fn is_supported_extension(extension: &str) -> bool {
 }
 
 /// Returns all triangles of the default scene, transformed to world space by their nodes. Normals, texture coordinates
-/// and colours are read if every primitive has them; with texture coordinates, so is the first base colour texture.
+/// and colours are read if every triangle primitive has them; with texture coordinates, so is the first base colour
+/// texture, if its image is in the file.
 pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, FormatError> {
     let document = Document { root, binary };
     document.check_extensions()?;
@@ -102,7 +105,8 @@ impl<'a> Document<'a> {
         found.ok_or_else(|| FormatError::invalid(FORMAT, table, problem()))
     }
 
-    /// Returns all triangle primitives of the default scene, in the order of its nodes.
+    /// Returns all triangle primitives of the default scene, in the order of its nodes. An error if the nodes are not a
+    /// tree, or the primitives exceed [`CORNER_LIMIT`].
     fn parts(&self) -> Result<Vec<Part<'a>>, FormatError> {
         let nodes = self.root["nodes"].as_array().map_or(0, Vec::len);
         let mut seen = vec![false; nodes];
@@ -150,13 +154,14 @@ impl<'a> Document<'a> {
         Ok((0..).zip(is_child).filter_map(|(n, is)| (!is).then_some(n)).collect())
     }
 
-    /// Returns the primitives of the node's mesh, if it has one.
+    /// Returns the primitives of the node's mesh; none if it has no mesh.
     fn primitives(&self, node: &Value) -> Result<&'a [Value], FormatError> {
         let Some(mesh) = unsigned(node, "mesh")? else { return Ok(&[]) };
         Ok(self.entry("meshes", mesh)?["primitives"].as_array().map_or(&[][..], Vec::as_slice))
     }
 
-    /// Returns the data of accessor `index`, whose elements must have one of the given numbers of components.
+    /// Returns the data of accessor `index`. An error if the number of components of its elements is not one of
+    /// `widths`, if its data is sparse, or if its buffer view is too short.
     fn accessor(&self, index: u64, widths: &[usize]) -> Result<Accessor<'a>, FormatError> {
         let value = self.entry("accessors", index)?;
         let field = format!("accessors[{index}]");
@@ -188,7 +193,7 @@ impl<'a> Document<'a> {
         Ok(Accessor { bytes, count: count as usize, stride: stride as usize, width, component, normalized })
     }
 
-    /// Returns the bytes of buffer view `index`, which must be in the binary chunk and not compressed.
+    /// Returns the bytes of buffer view `index`; an error unless they are in the binary chunk, uncompressed.
     pub(super) fn view(&self, index: u64) -> Result<View<'a>, FormatError> {
         let value = self.entry("bufferViews", index)?;
         let field = format!("bufferViews[{index}]");
@@ -236,7 +241,7 @@ fn compression(value: &Value) -> Option<&'static str> {
     known.into_iter().find(|name| !value["extensions"][name].is_null())
 }
 
-/// The bytes of a buffer view, and the stride between elements if the file gives it.
+/// The bytes of a buffer view, and the number of bytes from one element to the next if the file gives it.
 pub(super) struct View<'a> {
     pub(super) bytes: &'a [u8],
     stride: Option<u64>,
@@ -299,8 +304,8 @@ impl<'a> Primitive<'a> {
         })
     }
 
-    /// Returns the texture coordinates of the base colour, with its texture transform applied; the first set if the
-    /// primitive has no texture.
+    /// Returns the texture coordinates for the base colour texture, with its texture transform applied; those of the
+    /// first set if the primitive has no such texture; `None` if that set is missing.
     fn uvs(&self) -> Result<Option<Vec<Vec2>>, FormatError> {
         let set = self.base_color.as_ref().map_or(0, |base| base.set);
         let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
@@ -343,7 +348,7 @@ impl<'a> Primitive<'a> {
     }
 }
 
-/// Returns an error if a primitive has only compressed data.
+/// Returns an error if a primitive has only compressed data, for which there is no decoder.
 fn check_compression(document: &Document, primitive: &Value) -> Result<(), FormatError> {
     let Some(name) = compression(primitive) else { return Ok(()) };
     let attributes = &primitive["attributes"];
@@ -394,7 +399,7 @@ impl Component {
         }
     }
 
-    /// Returns the value that represents 1 in normalised data.
+    /// Returns the stored value that represents 1 in normalised data.
     fn normalization_scale(self) -> f64 {
         match self {
             Self::I8 => 127.0,
@@ -418,7 +423,7 @@ struct Accessor<'a> {
 }
 
 impl Accessor<'_> {
-    /// Returns component `k` of element `i`, normalised if the accessor says so.
+    /// Returns component `k` of element `i`, scaled to −1..1 or 0..1 if the accessor is marked as normalised.
     fn number(&self, i: usize, k: usize) -> f64 {
         debug_assert!(i < self.count && k < self.width);
         let at = i * self.stride + k * self.component.size();

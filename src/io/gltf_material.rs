@@ -18,7 +18,7 @@ pub(super) struct BaseColor<'a> {
 /// Transform of texture coordinates by `KHR_texture_transform`: scale, then rotation, then offset.
 struct TextureTransform {
     scale: [f64; 2],
-    /// Cosine and sine of the rotation angle, counter-clockwise in the image.
+    /// Cosine and sine of the angle by which texture coordinates are rotated, counter-clockwise as seen in the image.
     rotation: [f64; 2],
     offset: [f64; 2],
 }
@@ -27,7 +27,7 @@ impl<'a> BaseColor<'a> {
     /// Returns the base colour texture of a primitive; `None` if it has none.
     ///
     /// # Errors
-    /// An index out of range, or a texture transform with values that are not numbers.
+    /// An index that is out of range or no integer, or a texture transform whose scale or offset is not two numbers.
     pub(super) fn of(document: &Document<'a>, primitive: &Value) -> Result<Option<Self>, FormatError> {
         let Some(material) = unsigned(primitive, "material")? else { return Ok(None) };
         let info = &document.entry("materials", material)?["pbrMetallicRoughness"]["baseColorTexture"];
@@ -50,7 +50,8 @@ impl<'a> BaseColor<'a> {
     /// Returns the image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
     ///
     /// # Errors
-    /// An index or range out of bounds, or a data URI that cannot be decoded.
+    /// An index or range out of bounds, a buffer view outside the binary chunk or compressed, or a data URI that cannot
+    /// be decoded.
     pub(super) fn texture(&self, document: &Document<'a>) -> Result<Option<Texture>, FormatError> {
         let webp = &self.texture["extensions"]["EXT_texture_webp"];
         let Some(source) = unsigned(self.texture, "source")?.or(unsigned(webp, "source")?) else {
@@ -78,8 +79,9 @@ impl TextureTransform {
         })
     }
 
-    /// Applies the transform as in the extension's first example, three.js and the Khronos viewer; the matrix in the
-    /// draft of the extension rotates in the opposite direction.
+    /// Applies the transform to the texture coordinates of a vertex. The direction of rotation is that of the
+    /// extension's first example, three.js and the Khronos viewer; the matrix in the draft of the extension rotates in
+    /// the opposite direction.
     fn of(&self, uv: Vec2) -> Vec2 {
         let [u, v] = [f64::from(uv.x) * self.scale[0], f64::from(uv.y) * self.scale[1]];
         let [cosine, sine] = self.rotation;

@@ -13,11 +13,12 @@ pub(super) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1F, 0x8B])
 }
 
-/// Returns the content of a gzip stream of one or more members, with their checksums verified.
+/// Returns the content of a gzip stream of one or more members, with their checksums verified; zeros may follow the
+/// last.
 ///
 /// # Errors
-/// A truncated or corrupt stream, a wrong checksum, or content of more than `limit` bytes, which is not inflated any
-/// further.
+/// A truncated or corrupt stream, a wrong checksum, content of more than `limit` bytes, which is not inflated any
+/// further, or not enough memory.
 pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result<Vec<u8>, FormatError> {
     let mut out = Vec::new();
     let mut rest = bytes;
@@ -39,8 +40,8 @@ pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result
     }
 }
 
-/// Returns the first `count` bytes of the content of a gzip stream's first member, or all of it if shorter. Its
-/// checksum is not verified; see [`gunzip`].
+/// Returns the first `count` bytes of the content of a gzip stream's first member, or all of it if shorter, to detect
+/// the format or read a header. The checksum is not verified; see [`gunzip`].
 ///
 /// # Errors
 /// A corrupt stream, or one that ends before `count` bytes without its end mark.
@@ -70,7 +71,7 @@ pub(super) fn unzlib(format: &'static str, bytes: &[u8], limit: usize) -> Result
 /// Result of inflating one deflate or zlib stream: the number of input bytes it took, and whether it was too long.
 struct Inflated {
     consumed: usize,
-    /// Whether the content exceeds the limit, so that it is incomplete.
+    /// Whether the output exceeds the limit; it may then be incomplete.
     full: bool,
 }
 

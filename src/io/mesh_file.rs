@@ -37,7 +37,8 @@ impl MeshFormat {
         }
     }
 
-    /// Returns the format with a file extension, given in lower case and without the dot; `None` if there is none.
+    /// Returns the format whose usual file extension is `extension`, given in lower case and without the dot; `None` if
+    /// there is none.
     pub fn from_extension(extension: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.extension() == extension)
     }
@@ -51,14 +52,17 @@ impl MeshFormat {
 
 /// Reads the mesh in a GLB, PLY, STL or OBJ file, whose format is detected from its content.
 ///
-/// Vertices with equal positions are merged ([`TriangleMesh::welded`]), polygons become triangle fans, positions are in
-/// the file's own units, and texture coordinates are kept as in the file (v points down in glTF, up in OBJ and PLY).
-/// The texture embedded in a GLB is read as well: the base colour image of the first triangles that have one, with
-/// coordinates transformed by `KHR_texture_transform`. Memory is linear in the size of the file.
+/// Vertices with equal positions are merged ([`TriangleMesh::welded`]), and triangles that then have two equal corners
+/// are dropped. Polygons become triangle fans, positions are in the file's own units, and texture coordinates are kept
+/// as in the file (v points down in glTF, up in OBJ and PLY). If all triangles of a GLB have texture coordinates, an
+/// embedded texture is read as well: the base colour image of the first triangles that have one, with coordinates
+/// transformed by `KHR_texture_transform`. Memory is linear in the size of the file, except that nodes of a GLB may
+/// repeat a mesh, up to 25 million triangle corners in total.
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field for bytes in no such format, for files that are truncated,
-/// contradictory or use an unsupported feature, for positions that are not finite, and for files without triangles.
+/// contradictory, too large or use an unsupported feature, for positions that are not finite, and for files without
+/// triangles.
 pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(parse_welded(bytes)?.1)
 }
@@ -81,7 +85,8 @@ pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<Triang
     Ok(mesh)
 }
 
-/// Reads a mesh with its vertices welded, checks it, and returns it with the name of its format.
+/// Reads a mesh, checks it, and returns it with equal vertices merged, with the name of its format. An error if no
+/// triangle with three distinct corners is left.
 fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     let (format, mesh) = parse(bytes)?;
     mesh.validate().map_err(|error| match error {
@@ -143,15 +148,16 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
 }
 
 /// Returns the bytes of a file with the mesh and those of its attributes that the format supports. Attributes are
-/// stored without loss, except that GLB normalises normals and clamps colours to 0..1, and that colours have 8 bits in
-/// PLY, VTP and MZ3. A closed mesh is still closed when it is read back by [`parse_mesh`] (which does not read VTP and
-/// MZ3).
+/// stored without loss, except that GLB normalises normals (or computes them if there are none) and clamps colours to
+/// 0..1, and that colours have 8 bits in PLY, VTP and MZ3. A closed mesh is still closed when it is read back by
+/// [`parse_mesh`] (which does not read VTP and MZ3).
 ///
 /// Only GLB stores the texture. In PLY, OBJ and VTP, where v points up, the texture coordinates of a mesh with a
 /// texture are written with v as 1 − v.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] for a mesh that is not valid, [`MeshError::TooLarge`] if the file would exceed 4 GiB.
+/// [`MeshError::InvalidArgument`] for a mesh that is not valid; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
+/// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
@@ -171,14 +177,14 @@ pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, Me
     })
 }
 
-/// Returns an error if a file of the mesh may exceed 4 GiB: the binary formats store sizes in 32 bits. The bound is the
-/// size of a GLB with seams everywhere: three vertices of 44 bytes and three indices per triangle.
+/// Returns an error if a file of the mesh may exceed 4 GiB: the binary formats store sizes in 32 bits. The bound is
+/// above the size of a GLB with seams everywhere, which has three vertices of 44 bytes and three indices per triangle.
 fn check_size(mesh: &TriangleMesh) -> Result<(), MeshError> {
     let bytes = 64 * mesh.positions.len() as u64 + 160 * mesh.triangles.len() as u64;
     if bytes > u64::from(u32::MAX) { Err(MeshError::TooLarge { bytes }) } else { Ok(()) }
 }
 
-/// Returns a colour with channels in 0..1 as bytes.
+/// Returns the channels of a colour as bytes, 255 for 1; values outside 0..1 are clamped.
 pub(super) fn color_bytes(color: crate::math::Vec3) -> [u8; 3] {
     color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }

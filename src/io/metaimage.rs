@@ -42,7 +42,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source)
 }
 
-/// The header's `key = value` lines, up to the one that names the data file.
+/// The header's `key = value` lines, up to and including the one that names the data file.
 struct Fields {
     pairs: Vec<(String, String)>,
 }
@@ -154,7 +154,7 @@ impl Header {
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
-    /// Returns the voxels in `source`, inflated if compressed.
+    /// Returns the voxels in `source`, which are inflated if compressed, and parsed if written as text.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         if self.compressed {
@@ -179,7 +179,7 @@ impl Header {
     }
 }
 
-/// Returns an error unless the file is an image with one channel.
+/// Returns an error if the file declares an object other than an image, or more than one channel.
 fn check_object(fields: &Fields) -> Result<(), FormatError> {
     if let Some(field) = fields.get("ObjectType").filter(|field| field.text != "Image") {
         return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "Image"));
@@ -227,7 +227,7 @@ fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }
 }
 
-/// Returns the transform from voxel indices to world space.
+/// Returns the transform from voxel indices to world space (LPS).
 fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     let mut columns = axes(fields, rank)?;
     if let Some(field) = fields.any(&["ElementSpacing", "ElementSize"]) {
@@ -242,7 +242,8 @@ fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
 }
 
-/// Returns the directions of the axes, which are the rows of the matrix; the world axes if the file has no matrix.
+/// Returns the directions of the axes, which are the rows of the matrix; the world axes without a matrix, and in place of
+/// axes that the file does not have.
 fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
     let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };
@@ -255,7 +256,7 @@ fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     Ok(columns)
 }
 
-/// Returns the unit of length that `DistanceUnits` names.
+/// Returns the unit of length that `DistanceUnits` names; unknown if it is not mm, um or m, or if the field is missing.
 fn unit(fields: &Fields) -> LengthUnit {
     match fields.get("DistanceUnits").map(|field| field.text) {
         Some("mm") => LengthUnit::Millimetre,

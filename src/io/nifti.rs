@@ -27,7 +27,8 @@ pub(super) fn is_nifti(bytes: &[u8]) -> bool {
     bytes.first_chunk().is_some_and(|&four| version(four).is_some())
 }
 
-/// Returns the version that the first four bytes indicate, and whether the byte order is big-endian.
+/// Returns the NIfTI version, 1 or 2, that the first four bytes indicate, and whether the byte order is big-endian;
+/// `None` if they indicate no NIfTI file.
 fn version(four: [u8; 4]) -> Option<(u8, bool)> {
     let known = |size: u32| match size as usize {
         SIZE_1 => Some(1),
@@ -211,7 +212,8 @@ impl Fields {
         }
     }
 
-    /// Returns the number of voxels along x, y and z, and the number of frames.
+    /// Returns the number of voxels along x, y and z, and the number of frames; an error if a higher axis has more than
+    /// one entry.
     fn dims(&self) -> Result<[usize; 4], FormatError> {
         let rank = self.dim[0];
         if !(1..=7).contains(&rank) {
@@ -256,7 +258,8 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, "bitpix", problem))
     }
 
-    /// Returns the offset of the voxels in bytes; in a single file, a stored 0 means the end of the header.
+    /// Returns the offset of the voxels from the start of their file, in bytes; in a single file, a stored 0 means the
+    /// end of the header.
     fn offset(&self, pair: bool) -> Result<usize, FormatError> {
         let least = if self.version == 1 { 352 } else { 544 };
         let stated = self.vox_offset;
@@ -272,7 +275,7 @@ impl Fields {
         }
     }
 
-    /// Returns slope and intercept; 1 and 0 if the stored slope is 0 or NaN.
+    /// Returns slope and intercept, by which stored values become intensities; 1 and 0 if the stored slope is 0 or NaN.
     fn scaling(&self) -> Result<(f64, f64), FormatError> {
         if self.slope == 0.0 || self.slope.is_nan() {
             return Ok((1.0, 0.0));
@@ -285,7 +288,8 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, field, format!("must be finite, got {value}")))
     }
 
-    /// Returns the transform from voxel indices to world space.
+    /// Returns the transform from voxel indices to world space: the sform if the file has one, else the qform, else a
+    /// scaling by the voxel sizes.
     fn affine(&self) -> Result<DAffine3, FormatError> {
         if self.sform_code > 0 {
             return self.sform();
@@ -296,7 +300,7 @@ impl Fields {
         Ok(DAffine3::from_scale(DVec3::from(self.voxel_sizes()?)))
     }
 
-    /// Returns the affine that the file stores as a matrix.
+    /// Returns the affine that the file stores as a matrix (sform).
     fn sform(&self) -> Result<DAffine3, FormatError> {
         for (row, name) in self.srow.iter().zip(["srow_x", "srow_y", "srow_z"]) {
             if row.iter().any(|v| !v.is_finite()) {
@@ -308,8 +312,8 @@ impl Fields {
         Ok(DAffine3::from_mat3_translation(matrix, column(3)))
     }
 
-    /// Returns the affine that the file stores as a quaternion: scaling by the voxel sizes, then rotation by (a, b, c,
-    /// d) with a ≥ 0. A negative `pixdim[0]` flips z.
+    /// Returns the affine that the file stores as a quaternion (qform): scaling by the voxel sizes, rotation by (a, b,
+    /// c, d) with a ≥ 0, then translation. A negative `pixdim[0]` flips z.
     fn qform(&self) -> Result<DAffine3, FormatError> {
         let finite = |field: &str, values: [f64; 3]| {
             if values.iter().all(|v| v.is_finite()) {
@@ -347,7 +351,7 @@ impl Fields {
     }
 
     /// Returns the seconds between frames; 0 if there is only one frame, `pixdim[4]` is not positive, or the fourth
-    /// axis is not time.
+    /// axis is not time. Without a unit of time, it is taken as seconds.
     fn frame_seconds(&self, frames: usize) -> Result<f64, FormatError> {
         let step = self.pixdim[4];
         if frames < 2 {
@@ -461,10 +465,11 @@ impl Header {
     }
 }
 
-/// Returns the volume as an uncompressed little-endian NIfTI-1 file: voxels as stored, world space converted to RAS,
-/// and the affine as sform.
+/// Returns the volume as an uncompressed little-endian NIfTI file: voxels as stored, world space converted to RAS, and
+/// the affine as sform.
 ///
-/// NIfTI-1 stores the affine in `f32` and dimensions up to 32,767; larger volumes are written as NIfTI-2.
+/// The file is NIfTI-1, which stores the affine in `f32`, or NIfTI-2 if a dimension or the number of frames exceeds
+/// 32,767.
 ///
 /// # Errors
 /// [`FormatError::TooLarge`] if there is not enough memory for the file.
@@ -509,7 +514,7 @@ fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     }
 }
 
-/// Writes bytes at offset `at` of a header.
+/// Writes bytes at offset `at` of a header; nothing if they do not fit.
 fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
     if let Some(target) = out.get_mut(at..at + N) {
         target.copy_from_slice(&bytes);
@@ -571,7 +576,7 @@ fn pixdim_field(volume: &Volume) -> [f64; 8] {
     [1.0, x, y, z, volume.frame_seconds(), 0.0, 0.0, 0.0]
 }
 
-/// Returns the code of the volume's length unit, with seconds as time unit.
+/// Returns the code of the volume's length unit together with that of seconds, for the field `xyzt_units`.
 fn units_field(volume: &Volume) -> u8 {
     8 + match volume.unit() {
         LengthUnit::Unknown => 0,

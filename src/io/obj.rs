@@ -20,8 +20,8 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Reads a mesh from an OBJ file. Texture coordinates and normals are kept if every face has them, colours if every
-/// vertex has one; the normals at the corners are averaged per vertex.
+/// Reads a mesh from an OBJ file. Texture coordinates and normals are kept if every corner of every face has them,
+/// colours if every vertex has one; the normals at the corners are averaged per vertex.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(read(bytes)?.into_mesh())
 }
@@ -183,7 +183,7 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     })
 }
 
-/// Parses the numbers up to a comment; an error if there are fewer than `min_count`.
+/// Parses the numbers up to a comment; an error if one is not a number, or there are fewer than `min_count`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,

@@ -18,7 +18,7 @@ pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> 
     read(bytes, |_, element, body| skip_element(element, body))
 }
 
-/// Reads all elements of a file, with faces read by `faces`.
+/// Reads all elements of a file; `faces` reads or skips its faces.
 fn read(
     bytes: &[u8],
     faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
@@ -253,7 +253,7 @@ fn parse_property(words: &[&str]) -> Result<Property, FormatError> {
     }
 }
 
-/// Truncates text for an error message.
+/// Truncates text for an error message, to 60 characters.
 fn clipped(text: &str) -> String {
     text.chars().take(60).collect()
 }
@@ -336,7 +336,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads the vertices with the attributes that they have.
+    /// Reads the vertices with the attributes that they have; an error if they have no x, y and z.
     fn vertices(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(position) = element.indices_of(&[["x", "y", "z"]]) else {
             return Err(FormatError::invalid(FORMAT, "element vertex", "has no properties x, y and z"));
@@ -367,7 +367,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the faces as triangles, with their texture coordinates.
+    /// Reads the faces as triangles, with the texture coordinates at their corners if there are any.
     fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
             return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));

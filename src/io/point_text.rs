@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::iter::Peekable;
 
 pub(super) const FORMAT: &str = "point text";
-/// Name of the format of the data sets of Hoppe's surface reconstruction, in error messages.
+/// Name in error messages of the format with lines `p x y z`, that of the data sets of Hoppe's surface reconstruction.
 pub(super) const KEYWORD_FORMAT: &str = "PTS";
 
 /// Maximum number of columns; real files have some dozens. Without a limit, a file of nothing but commas would take
@@ -110,7 +110,7 @@ fn announced(line: &Line) -> Option<u64> {
     line.text.parse().ok()
 }
 
-/// Returns an error if the number of points announced by `line` is not `rows`, the number of lines read. No memory is
+/// Returns an error if the number of points announced by `line` is not `rows`, the number of points read. No memory is
 /// reserved by the announced number, so a check at the end suffices.
 fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     if announced(line) == Some(rows as u64) {
@@ -162,7 +162,8 @@ struct Extras {
 }
 
 impl Columns {
-    /// Returns the columns that a line names; `None` if x, y and z are not all named, or there are too many columns.
+    /// Returns the columns that a line names; `None` if it does not name x, y and z (or the axes of napari), or names
+    /// too many columns.
     fn named(line: &str) -> Option<Self> {
         let names: Vec<String> =
             cells(line, separator(line)).into_iter().map(str::to_ascii_lowercase).collect();
@@ -183,7 +184,7 @@ impl Columns {
         Some(Self { count: names.len(), read, extras: Some(extras) })
     }
 
-    /// Returns the columns of a file that does not name them.
+    /// Returns the columns of a file that does not name them; an error unless there are 3, 4, 6, 7 or 9.
     fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
         if ![3, 4, 6, 7, 9].contains(&count) {
             let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
@@ -193,7 +194,8 @@ impl Columns {
     }
 }
 
-/// Returns the columns of x, y and z under the names that napari gives, whose axes are ordered from slowest to fastest.
+/// Returns the columns of x, y and z under the names that napari gives: `axis-0`, `axis-1` and so on for z, y and x,
+/// after time if there are four; `None` for any other number of them.
 fn napari_axes(names: &[String]) -> Option<Vec<usize>> {
     let column_of_axis = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
     let all: Vec<usize> = (0..5).map_while(column_of_axis).collect();
@@ -281,13 +283,13 @@ impl Table {
         self.vectors(at).all(|v| (v.length() - 1.0).abs() <= 0.01)
     }
 
-    /// Returns whether all triples from column `at` can be colours.
+    /// Returns whether all triples from column `at` can be colours: all numbers in 0..1, or all integers in 0..255.
     fn are_colors(&self, at: usize) -> bool {
         full_channel(self.vectors(at)).is_some()
     }
 }
 
-/// Returns whether at least one line is a point with a keyword: `p x y z`.
+/// Returns whether at least one line starts with the keyword `p` and a number, as in `p x y z`.
 pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();

@@ -20,7 +20,8 @@ pub struct PointCloud {
 /// from the content.
 ///
 /// The points of a mesh are its vertices, including those with equal positions. Colours are kept if all are within
-/// 0..1, and divided by 255 if all are integers up to 255. Memory is linear in the size of the file.
+/// 0..1, and divided by 255 if all are integers up to 255; in PLY, unsigned channels of 8 and 16 bits are first divided
+/// by 255 and 65,535. Memory is linear in the size of the file.
 ///
 /// # Text
 /// Columns are separated by semicolons, else by commas, else by spaces and tabs, as in the first line of numbers. Empty
@@ -40,8 +41,8 @@ pub struct PointCloud {
 /// - seven: x y z, an intensity, a colour;
 /// - nine: x y z, a colour and a normal, or the normal first; normals are again recognised by their unit length.
 ///
-/// Lines `p x y z` are points as well; between them, only lines that start with `d`, `s` or `g` are allowed, and
-/// ignored.
+/// Lines `p x y z` are points as well; besides them and comments, only lines that start with `d`, `s` or `g` are allowed,
+/// and ignored.
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field (in text, the line) for bytes in no such format, for files that are

@@ -18,7 +18,7 @@ pub(super) enum Scalar {
     F64,
 }
 
-/// Number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
+/// Maximum number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
 pub(super) const MAX_PADDING: usize = 512;
 
 /// Largest integer up to which `f64` represents every integer.
@@ -43,7 +43,7 @@ impl Scalar {
     }
 }
 
-/// Returns the size of the voxels in bytes.
+/// Returns the size of the voxels in the file, uncompressed and binary, in bytes.
 ///
 /// # Errors
 /// A dimension of 0, or a size that cannot be addressed.
@@ -147,11 +147,12 @@ fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> 
     }
 }
 
-/// Parses `count` numbers written as text, separated by whitespace or commas. All become `f64`, after a check that the
-/// stated type can represent them.
+/// Parses `count` numbers written as text, separated by whitespace or commas. All become `f64`, after a check that they
+/// are in the range of the stated type.
 ///
 /// # Errors
-/// Too few or too many numbers, a word that is not a number, or a number out of the range of its type.
+/// Too few or too many numbers, a word that is not a number, a number that the type does not have, or not enough
+/// memory.
 pub(super) fn decode_text(
     name: FieldName,
     bytes: &[u8],

@@ -93,7 +93,7 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
     }
 }
 
-/// Returns the bytes of a binary STL file, with the normals of the triangles.
+/// Returns the bytes of a binary STL file, with the unit normals of the triangles, 0 for one without area.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.

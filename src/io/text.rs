@@ -64,7 +64,7 @@ impl Field<'_> {
         FormatError::invalid(self.format, self.name, format!("'{shown}': {problem}"))
     }
 
-    /// Parses `count` numbers separated by whitespace; NaN is accepted.
+    /// Parses `count` numbers separated by whitespace; NaN and infinities are accepted.
     ///
     /// # Errors
     /// A word that is not a number; a number of words other than `count`.

@@ -5,7 +5,8 @@ use super::mesh_file::{color_bytes, push_floats};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 
-/// Returns the text of a VTP file with points and triangles; normals, texture coordinates and colours are point data.
+/// Returns the text of a VTP file with points and triangles; normals, texture coordinates and colours are point data,
+/// for which vertices on texture seams are duplicated.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {

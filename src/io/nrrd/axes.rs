@@ -177,7 +177,7 @@ fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
 }
 
 /// Returns the columns of the affine of a file without directions: along the world axes, with the lengths in
-/// `spacings`; 1 if those are missing or NaN.
+/// `spacings`, or 1 if those are missing or NaN. An error if the file gives the ends of axes instead.
 fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     let Some(field) = fields.get("spacings") else {
         return match fields.get("axismaxs") {
@@ -198,7 +198,8 @@ fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], 
     Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
 }
 
-/// Returns the affine from the columns and the file's origin, converted to RAS or LPS.
+/// Returns the affine of the given columns and the file's origin, 0 if it has none; x is flipped if that converts the
+/// file's space to RAS or LPS.
 fn affine_of(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
     let origin = fields.get("spaceorigin").map(|field| world.vector(&field, field.text)).transpose()?;
     let origin = origin.flatten().map(|v| v.space).filter(|v| !v.is_nan()).unwrap_or(DVec3::ZERO);

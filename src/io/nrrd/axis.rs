@@ -85,7 +85,7 @@ fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<AxisKind>, FormatError>
     Ok(kinds)
 }
 
-/// Returns the kind that a word of the header names.
+/// Returns the kind of an axis that a word of the header names; an error for kinds that hold the components of a voxel.
 fn kind(axis: usize, word: &str, size: usize) -> Result<AxisKind, FormatError> {
     match word.to_ascii_lowercase().as_str() {
         "space" => Ok(AxisKind::Space),
@@ -126,7 +126,7 @@ fn zero_means_none(kind: AxisKind, rank: usize) -> bool {
     kind.counts_frames() || rank == 4 && kind != AxisKind::Space
 }
 
-/// Reads the vectors of a field, `None` for each `none`.
+/// Reads the vectors of a field, one per axis; `None` for the word `none`.
 fn vectors(field: &Field<'_>, world: &World) -> Result<Vec<Option<Vector>>, FormatError> {
     // Spaces inside the parentheses are allowed: a vector ends at its ')'.
     let mut entries = Vec::new();

@@ -141,7 +141,7 @@ impl Header {
         }
     }
 
-    /// Decodes binary voxels; `size` is their number of bytes.
+    /// Decodes binary voxels, after the bytes to skip; `size` is their number of bytes.
     fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
         let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
         decode(DATA, payload(DATA, skipped, size)?, self.scalar, self.big)
@@ -197,7 +197,7 @@ fn encoding(field: &Field<'_>) -> Result<Encoding, FormatError> {
     }
 }
 
-/// Returns whether numbers are big-endian; false if the byte order does not matter.
+/// Returns whether numbers are big-endian; false if the byte order does not matter, as for bytes and text.
 fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<bool, FormatError> {
     if scalar.size() == 1 || encoding == Encoding::Text {
         return Ok(false);
@@ -211,7 +211,7 @@ fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<boo
 }
 
 /// Returns the number of bytes before the voxels from the field `byte skip`, 0 if it is missing; `None` for -1, which
-/// means that the voxels are the last bytes.
+/// means that the voxels are the last bytes, and is valid only in the raw encoding.
 fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
     match field.integer(-1)? {
@@ -221,8 +221,8 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
     }
 }
 
-/// Decodes pairs of hexadecimal digits to bytes, ignoring whitespace; an error if there are more than `size` plus
-/// [`MAX_PADDING`].
+/// Decodes pairs of hexadecimal digits to bytes, ignoring whitespace; an error for any other character, or if there are
+/// more bytes than `size` plus [`MAX_PADDING`].
 fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
     let digits = text.iter().filter(|b| !b.is_ascii_whitespace());
     let mut out = Vec::new();
