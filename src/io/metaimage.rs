@@ -242,8 +242,8 @@ fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
 }
 
-/// Returns the directions of the axes, which are the rows of the matrix; the world axes without a matrix, and in place of
-/// axes that the file does not have.
+/// Returns the directions of the axes, which are the rows of the matrix; the world axes without a matrix, and in place
+/// of axes that the file does not have.
 fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
     let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };

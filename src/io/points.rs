@@ -41,8 +41,8 @@ pub struct PointCloud {
 /// - seven: x y z, an intensity, a colour;
 /// - nine: x y z, a colour and a normal, or the normal first; normals are again recognised by their unit length.
 ///
-/// Lines `p x y z` are points as well; besides them and comments, only lines that start with `d`, `s` or `g` are allowed,
-/// and ignored.
+/// Lines `p x y z` are points as well; besides them and comments, only lines that start with `d`, `s` or `g` are
+/// allowed, and ignored.
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field (in text, the line) for bytes in no such format, for files that are
