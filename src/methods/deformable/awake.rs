@@ -6,7 +6,7 @@
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
 /// The count of still iterations in a row, those in which a vertex is slower than [`stillness`], from which on the
-/// vertex sleeps: it is not moved until something wakes it.
+/// vertex sleeps: it is left out, except when all vertices are processed, until something wakes it.
 pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
 /// The speed below which a vertex is still, as a share of the speed at which all vertices would move if they were

@@ -36,11 +36,11 @@ const MIN_RIGIDITY: f32 = 0.025;
 /// [`Integrator::Euler`] and [`Integrator::RungeKutta`].
 const MAX_STIFFNESS: f32 = 1.0;
 
-/// The least steepness of the image at π_I: the difference between neighbouring voxels on opposite sides of it, in
-/// ranges of the volume's intensities per voxel of the finest level. If the median is smaller, α_I is amplified by the
-/// ratio in runs with the implicit integrator that adapt to the image. A few voxels much brighter than all others make
-/// the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to
-/// 0.6.
+/// The least steepness of the image at π_I: the difference between neighbouring voxels on opposite sides of it, as a
+/// share of the volume's intensity range, per voxel of the finest level. If the median is smaller, α_I is amplified by
+/// the ratio in runs with the implicit integrator that adapt to the image. A few voxels much brighter than all others
+/// make the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1
+/// to 0.6.
 const MIN_STEEPNESS: f32 = 0.1;
 /// The largest factor by which α_I is amplified in faint images.
 const MAX_AMPLIFICATION: f32 = 1e4;

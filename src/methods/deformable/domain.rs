@@ -23,8 +23,8 @@ const MAX_VERTICES: f64 = 4e6;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Domain {
     pub(super) centre: Vec3,
-    /// The half axes of the rounded box around the whole image, the enclosing start surface if no object is found to
-    /// enclose.
+    /// The half axes of the rounded box around the whole image, which is the enclosing start surface if no object is
+    /// found to enclose.
     pub(super) axes: Vec3,
     pub(super) bounds: Bounds,
 }

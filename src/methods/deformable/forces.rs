@@ -278,8 +278,8 @@ fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     }
 }
 
-/// Returns the force of the edges of a vertex as springs, per unit of stiffness: f_e / α_e = Σ (|y − x| − d)(y − x)/|y
-/// − x| over its neighbours y, with the rest length d (6).
+/// Returns the force of the edges of a vertex as springs, per unit of stiffness, f_e / α_e: the sum over its neighbours
+/// y of (|y − x| − d)(y − x)/|y − x|, with the rest length d (6).
 fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     ring.as_slice().iter().fold(Vec3::ZERO, |sum, w| {
         let edge = positions[w.index()] - x;

@@ -115,8 +115,8 @@ pub struct Attractor {
 /// The mean edge length of a mesh within its edge bounds, in δ, measured on converged spheres and skulls.
 const MEAN_EDGE: f64 = 1.7;
 
-/// The default δ on the finest level in voxels. It is near the upper end of the accepted ratios of δ to the side of a
-/// voxel, 0.693 to 1 (14), since the number of vertices grows as 1/δ².
+/// The default δ on the finest level in voxels. It is near the upper end of the range that the paper gives, 0.693 to 1
+/// voxels (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
 /// The accepted range of δ on the finest level in voxels: with less, a mesh of the whole image does not fit into

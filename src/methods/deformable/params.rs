@@ -18,8 +18,8 @@ pub struct DeformableParams {
     /// β_g: strength of the gradient force along the tangent plane, which attracts vertices to bright ridges; negative
     /// values repel them.
     pub gradient_tangent: f64,
-    /// The length to which longer image gradients are shortened, in ranges of the volume's intensities per voxel of the
-    /// level.
+    /// The length to which longer image gradients are shortened, as a share of the volume's intensity range, per voxel
+    /// of the level.
     pub gradient_bound: f64,
     /// α_c: rigidity, the resistance to changes of curvature.
     pub rigidity: f64,

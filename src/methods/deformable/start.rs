@@ -19,7 +19,7 @@ pub enum Start {
     /// [`super::DeformableParams::smallest_part`]. If it is empty, the mesh is empty, too, if the model adapts to the
     /// image and seeds missing parts; otherwise the enclosing surface is used.
     Contour,
-    /// A rounded box around all voxels of the coarsest level brighter than π_I, or than an intensity a little below it if
+    /// A rounded box around all voxels of the coarsest level brighter than π_I, or an intensity a little below it if
     /// that level is not the volume itself; around the whole image if there are none, or if α_I is not negative.
     Enclosing,
     /// A grid of n³ small spheres that fills the image.

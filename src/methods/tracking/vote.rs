@@ -370,7 +370,8 @@ impl Histogram {
 }
 
 /// Histograms of intensities around a row (y, z), one for each x: of the voxels at this x, in all given frames, that
-/// are at most a window's half-width from the row along y and along z. That of a window is the sum of consecutive ones.
+/// are at most a window's half-width from the row along y and along z. The histogram of a window is the sum of those at
+/// consecutive x.
 struct Slabs<'a> {
     dims: [usize; 3],
     half_width: usize,
