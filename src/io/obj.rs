@@ -74,9 +74,9 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads one line; unknown keywords are ignored.
+    /// Reads one line up to a comment; unknown keywords are ignored.
     fn line(&mut self, line: &[u8], number: usize) -> Result<(), FormatError> {
-        let mut words = words(line);
+        let mut words = words(line).take_while(|word| !word.starts_with(b"#"));
         match words.next() {
             Some(b"v") => self.vertex(&numbers(words, number, 3)?),
             Some(b"vt") => {
@@ -183,14 +183,14 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     })
 }
 
-/// Parses the numbers up to a comment; an error if one is not a number, or there are fewer than `min_count`.
+/// Parses numbers; an error if one is not a number, or there are fewer than `min_count`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
     min_count: usize,
 ) -> Result<Vec<f32>, FormatError> {
     let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
-    let found: Option<Vec<f32>> = words.take_while(|word| !word.starts_with(b"#")).map(number).collect();
+    let found: Option<Vec<f32>> = words.map(number).collect();
     found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
         FormatError::invalid(
             FORMAT,

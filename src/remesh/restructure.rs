@@ -250,8 +250,8 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
-/// Flips edges while that brings the valences of the four corners around them nearer to six, as measured by the sum of
-/// (valence − 6)² (figure 6).
+/// Flips edges where that is allowed and lowers the sum of (valence − 6)² over the four corners around them (figure 6).
+/// Allowed are flips that `may_flip` and `edits` permit. Ends when a pass flips none, or after `PASSES` passes.
 pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     // Vertices whose edges have to be tested again since a flip changed valences near them.

@@ -292,7 +292,7 @@ fn ply_of_both_byte_orders() {
 #[test]
 fn obj_in_every_notation() {
     let text = "# a cube\nmtllib none.mtl\no caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\n\
-                v 1.0e0 1 +1 # last\nvt 0 0\nvt 1\nvn 0 0 1\ng side\ns off\nf 1 3 4 2\nf 5/1 6/2 8/1 7/2\nf 1//1 2//1 \\\n6//1 5//1\n\
+                v 1.0e0 1 +1 # last\nvt 0 0\nvt 1\nvn 0 0 1\ng side\ns off\nf 1 3 4 2 # a face\nf 5/1 6/2 8/1 7/2\nf 1//1 2//1 \\\n6//1 5//1\n\
                 f -6/-1/-1 -2/1/1 -1/2/1 -5/1/1\rf 1 5 7 3\r\nf 2 4 8 6\nl 1 2\n";
     let mesh = parse_mesh(text.as_bytes()).unwrap();
     assert_cube(&mesh);

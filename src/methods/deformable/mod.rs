@@ -390,7 +390,8 @@ impl DeformableModel {
         }
     }
 
-    /// Makes the resolver prevent self-intersections also in the output: world space, in single precision.
+    /// Also prevents self-intersections that arise when the surface is mapped to world space and rounded to single
+    /// precision; not where rounding is too coarse for that.
     fn watch_output(&mut self) {
         self.resolver.watch_output(self.to_world, &self.domain.bounds);
     }

@@ -295,7 +295,7 @@ impl<const N: usize> RowSums<N> {
     }
 }
 
-/// Sums over the planes along z: those of [`RowSums`], and those with factors z and z².
+/// Sums over the planes along z: those of [`RowSums`], and those with a factor z or z² that [`Sums`] needs.
 struct PlaneSums<const N: usize> {
     rows: RowSums<N>,
     /// Weights times z, yz and zt.
@@ -361,6 +361,6 @@ impl<const N: usize> PlaneSums<N> {
 pub(super) struct Sums {
     pub weight: f64,
     pub first: [f64; 4],
-    /// Products in the order xx xy xz xt yy yz yt zz zt tt.
+    /// Weighted sums of the products of two coordinates, in the order xx xy xz xt yy yz yt zz zt tt; t stands for ct.
     pub second: [f64; 10],
 }

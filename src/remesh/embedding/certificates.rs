@@ -77,7 +77,8 @@ impl Certificates {
         self.advance(v, 2.0 * MAX_CLEARANCE * self.edge);
     }
 
-    /// Makes room for the certificates of a vertex with the given valence before its tests; if `anew`, discards them.
+    /// Prepares the certificates of a vertex before its one-ring is tested: discards those along its edges if their number
+    /// is not `valence`; with `anew`, discards them and that of the vertex itself in any case.
     pub(super) fn prepare(&mut self, v: VertexId, valence: usize, anew: bool) {
         let along_edges = &mut self.along_edges[v.index()];
         if anew || along_edges.len() != valence {

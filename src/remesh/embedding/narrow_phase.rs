@@ -145,8 +145,8 @@ impl Embedding {
         self.certificates.until(pair, clearance)
     }
 
-    /// Returns the clearance between the one-rings of two non-adjacent vertices; not positive if exact tests have to
-    /// decide.
+    /// Returns a lower bound on the distance between the one-rings of two non-adjacent vertices, found by separating
+    /// planes; not positive if the planes found do not separate them.
     fn nearby_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(v, w);
         if let Some(edge) = common_edge(mesh, v, w) {

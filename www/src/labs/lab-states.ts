@@ -14,7 +14,7 @@ export class LabStates {
   readonly #signal: AbortSignal;
   /** State of the model beneath an error; 'loading' until there is one. */
   #model: 'loading' | 'running' | 'paused' | 'done' = 'loading';
-  /** Whether something else is being opened; the state of the present model is then ignored. */
+  /** Whether something else is being opened; the state of the present model is then not displayed. */
   #opening = false;
   /** Settles when the last queued change is complete. */
   #queue: Promise<unknown> = Promise.resolve();
@@ -66,7 +66,7 @@ export class LabStates {
 
   /**
    * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is
-   * called, the present model's state is ignored.
+   * called, the present model's state is recorded, but not displayed.
    */
   async open(text: string): Promise<void> {
     this.#opening = true;
@@ -105,8 +105,8 @@ export class LabStates {
   }
 
   /**
-   * Enters the model's new state. Returns false if it is ignored: during loading, all states but 'running'; while
-   * something else is being opened, all.
+   * Records the model's new state and makes it the lab's state. Returns false if the lab's state does not change: during
+   * loading unless the new state is 'running', and always while something else is being opened.
    */
   setModelState(state: 'running' | 'paused' | 'done'): boolean {
     this.#model = state;

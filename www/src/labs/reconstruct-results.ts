@@ -17,7 +17,7 @@ export class ReconstructResults {
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #history: History;
-  /** Whether the displayed surface is complete; previews must not replace it. */
+  /** Whether the newest surface, displayed or about to be, is complete; previews must not replace it. */
   #complete = false;
   /** The newest surface, until it is displayed at the next animation frame. */
   #surface: SurfaceEvent | undefined;

@@ -11,7 +11,10 @@ import type { SculptParts } from './sculpt-parts';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 
-/** Parameters for the user's own meshes: the base has fewer triangles than their detail needs. */
+/**
+ * Parameters for the user's own meshes: each edge of the base may be halved twice for the detail, since the base has
+ * fewer triangles than the detail needs.
+ */
 const OWN_PARAMS = { supersample: 2 };
 
 /** Opens meshes in the Sculpt lab, and builds models of them. */

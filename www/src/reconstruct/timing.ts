@@ -8,8 +8,8 @@ const RETIME_BELOW_MS = 2000;
 type TimingRequest = Requests['timing']['body'];
 
 /**
- * Measures the solve time for each size and kernel, and passes each result to `onTiming` when it is known; undefined if
- * the signal aborts.
+ * Measures the solve time for each size and kernel, and passes each result to `onTiming` when it is known. Returns all
+ * results; undefined if `signal` aborts.
  */
 export async function timeSolves(
   cloud: Cloud,

@@ -71,7 +71,7 @@ export class CloudOptionControls {
     this.#onChange({ ...this.#value });
   }
 
-  /** Whether there are cameras to show. */
+  /** Whether there are cameras to show; if not, the checkbox is hidden and cleared. */
   set hasCameras(has: boolean) {
     const box = this.#boxes.get('cameras');
     const label = box?.closest('label');

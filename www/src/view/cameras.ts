@@ -20,7 +20,7 @@ export class CameraMarks {
     this.#chosen.object.material.color.set(chosen);
   }
 
-  /** Shows the cameras as pyramids of height `depth`, world units. */
+  /** Replaces the cameras shown, none of them chosen, by pyramids of height `depth`, world units. */
   show(cameras: readonly PinholeCamera[], depth: number): void {
     this.#cameras = cameras;
     this.#depth = depth;

@@ -113,7 +113,7 @@ impl System {
     }
 
     /// Returns whether [`Self::revise`] is worthwhile: at most `MAX_CHANGES` of the constraints for which the matrix
-    /// was computed are gone, and at most as many are new.
+    /// was computed are gone, and at most `MAX_CHANGES` are new.
     pub fn can_revise(&self, constraints: &Constraints) -> bool {
         let known = PositionIndex::new(&constraints.centres);
         let own = self.base_centres();
