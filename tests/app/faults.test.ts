@@ -105,6 +105,9 @@ describe.each(LABS)('the %s lab', (lab) => {
     const states = await recordStates(page);
     await page.selectOption('.data select', quick);
     await expect.poll(states).toContain('done');
+    // That may have been the example before, while this one was being opened: the address says what is open.
+    await expect.poll(() => page.evaluate(() => location.hash)).toContain(`example=${quick}`);
+    await reach(page, 'done');
     expect(await banner().filter({ visible: true }).allTextContents()).toEqual([]);
     await page.locator('canvas[tabindex]').first().press('r');
     await expect.poll(() => iteration(page)).toBe(0);
