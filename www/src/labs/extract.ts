@@ -4,7 +4,7 @@ import type { VertexQuantity, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { History } from '../ui/history';
-import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { ViewOptions } from '../ui/view-options';
 import { ExtractOpening } from './extract-opening';
 import { ExtractParts, type PartEvents } from './extract-parts';
@@ -108,23 +108,9 @@ export class ExtractLab implements Lab {
   }
 
   #shortcuts(): Shortcut[] {
-    const redo = () => void this.#settings.travel('redo');
     const attract = () => this.#ui.attractors.add(this.#ui.stage.crosshair);
     return [
-      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
-      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
-      { key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract },
-      {
-        key: 'z',
-        ctrl: true,
-        shown: text('labs.keyUndo'),
-        text: text('labs.undo'),
-        act: () => void this.#settings.travel('undo'),
-      },
-      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
-      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      ...labShortcuts(this.#events(), [{ key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract }]),
       { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }

@@ -6,7 +6,7 @@ import type { ParamValues, PointQuantity, WorkerEvent } from '../reconstruct/pro
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
-import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { CloudViewOptions } from '../view/reconstruction';
 import { LabStates } from './lab-states';
 import type { Lab, OpenInLab } from './labs';
@@ -101,21 +101,8 @@ export class ReconstructLab implements Lab {
   }
 
   #shortcuts(): Shortcut[] {
-    const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#running.toggle() },
-      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#running.step(1) },
-      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#running.step(10) },
-      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
-      {
-        key: 'z',
-        ctrl: true,
-        shown: text('labs.keyUndo'),
-        text: text('labs.undo'),
-        act: () => void this.#settings.travel('undo'),
-      },
-      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
-      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      ...labShortcuts(this.#events()),
       {
         key: 'Escape',
         shown: text('labs.keyEscape'),

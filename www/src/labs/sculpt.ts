@@ -15,7 +15,7 @@ import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
-import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
 import { copyAddress, FILE_NOTE, showAddress } from './address';
 import { LabStates } from './lab-states';
@@ -123,22 +123,10 @@ export class SculptLab implements Lab {
   }
 
   #shortcuts(): Shortcut[] {
-    const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
-      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
-      { key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: () => this.#filming.addKey() },
-      {
-        key: 'z',
-        ctrl: true,
-        shown: text('labs.keyUndo'),
-        text: text('labs.undo'),
-        act: () => void this.#settings.travel('undo'),
-      },
-      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
-      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      ...labShortcuts(this.#events(), [
+        { key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: () => this.#filming.addKey() },
+      ]),
       {
         key: 'Escape',
         shown: text('labs.keyEscape'),

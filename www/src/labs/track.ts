@@ -8,7 +8,7 @@ import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, vie
 import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
-import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import { invert, sliceOrientations } from '../view/anatomy';
 import { LabStates } from './lab-states';
 import type { Handoff, Lab, OpenInLab } from './labs';
@@ -110,25 +110,17 @@ export class TrackLab implements Lab {
   }
 
   #shortcuts(): Shortcut[] {
-    const redo = () => void this.#settings.travel('redo');
     const { frames } = this.#ui;
     return [
-      { key: ' ', shown: text('labs.keySpace'), text: text('track.playOrPause'), act: () => this.#toggle() },
-      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
-      { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => frames.toggle() },
-      { key: ',', shown: ',', text: text('track.previousFrameKey'), act: () => frames.go(-1) },
-      { key: '.', shown: '.', text: text('track.nextFrameKey'), act: () => frames.go(1) },
-      {
-        key: 'z',
-        ctrl: true,
-        shown: text('labs.keyUndo'),
-        text: text('labs.undo'),
-        act: () => void this.#settings.travel('undo'),
-      },
-      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
-      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      ...labShortcuts(
+        this.#events(),
+        [
+          { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => frames.toggle() },
+          { key: ',', shown: ',', text: text('track.previousFrameKey'), act: () => frames.go(-1) },
+          { key: '.', shown: '.', text: text('track.nextFrameKey'), act: () => frames.go(1) },
+        ],
+        text('track.playOrPause'),
+      ),
       { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }

@@ -17,7 +17,12 @@ export type TextValues = Record<string, string | number>;
 
 const sections: Record<string, Record<string, string>> = catalogue;
 const FORMS = new Intl.PluralRules(LANGUAGE);
-const NUMBER = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
+const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
+
+/** Formats a number without decimals. */
+export function count(value: number): string {
+  return COUNT.format(value);
+}
 
 /**
  * Returns a text of the interface with its placeholders `{name}` replaced.
@@ -25,21 +30,17 @@ const NUMBER = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
  * Throws an Error if the value of a placeholder is missing.
  */
 export function text(key: TextKey, values: TextValues = {}): string {
-  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => {
-    const value = values[name];
-    if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
-    return String(value);
-  });
+  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => String(requiredValue(values, name, key)));
 }
 
 /**
  * Returns the form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
  * `{count}` is the number. The forms have the suffixes `_one`, `_other` and so on.
  */
-export function plural(key: PluralKey, count: number, values: TextValues = {}): string {
-  const form = `${key}_${FORMS.select(count)}`;
-  const known = (isKnown(form) ? form : `${key}_other`) as TextKey;
-  return text(known, { count: NUMBER.format(count), ...values });
+export function plural(key: PluralKey, number: number, values: TextValues = {}): string {
+  const form = `${key}_${FORMS.select(number)}`;
+  const known = (find(form) === undefined ? `${key}_other` : form) as TextKey;
+  return text(known, { count: count(number), ...values });
 }
 
 /**
@@ -53,19 +54,21 @@ export function textNodes(key: TextKey, values: Record<string, Node | string>): 
     .filter((part) => part !== '')
     .map((part) => {
       const name = /^\{(\w+)\}$/.exec(part)?.[1];
-      if (name === undefined) return part;
-      const value = values[name];
-      if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
-      return value;
+      return name === undefined ? part : requiredValue(values, name, key);
     });
 }
 
 function template(key: string): string {
-  const [section = '', name = ''] = key.split('.');
-  return sections[section]?.[name] ?? key;
+  return find(key) ?? key;
 }
 
-function isKnown(key: string): boolean {
+function find(key: string): string | undefined {
   const [section = '', name = ''] = key.split('.');
-  return sections[section]?.[name] !== undefined;
+  return sections[section]?.[name];
+}
+
+function requiredValue<Value>(values: Record<string, Value>, name: string, key: string): Value {
+  const value = values[name];
+  if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
+  return value;
 }

@@ -1,10 +1,6 @@
 import { LANGUAGE, text } from '../texts';
 
-const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
-
-export function count(value: number): string {
-  return COUNT.format(value);
-}
+export { count } from '../texts';
 
 /**
  * Formats a number with up to four significant digits; magnitudes below 10⁻³ and from 10⁷ on as three digits times a

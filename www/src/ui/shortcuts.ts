@@ -1,6 +1,7 @@
 import { DOCUMENTATION } from '../guides';
 import { text } from '../texts';
 import { h } from './dom';
+import type { TransportEvents } from './transport';
 
 export interface Shortcut {
   key: string;
@@ -17,6 +18,27 @@ const VIEW_KEYS: [string, string][] = [
   [text('controls.keyHomeName'), text('controls.keyHome')],
   [text('controls.keyTabName'), text('controls.keyTab')],
 ];
+
+/**
+ * Returns the shortcuts of every lab: those for the run, which `toggleText` describes for the space key, then `own` ones of
+ * the lab, then undo and redo.
+ */
+export function labShortcuts(
+  { onToggle, onStep, onReset, onUndo, onRedo }: TransportEvents,
+  own: Shortcut[] = [],
+  toggleText = text('labs.playOrPause'),
+): Shortcut[] {
+  return [
+    { key: ' ', shown: text('labs.keySpace'), text: toggleText, act: onToggle },
+    { key: 's', shown: 's', text: text('labs.oneStep'), act: () => onStep(1) },
+    { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => onStep(10) },
+    { key: 'r', shown: 'r', text: text('labs.resetKey'), act: onReset },
+    ...own,
+    { key: 'z', ctrl: true, shown: text('labs.keyUndo'), text: text('labs.undo'), act: onUndo },
+    { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: onRedo },
+    { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: onRedo },
+  ];
+}
 
 /**
  * Installs keyboard shortcuts and a dialog that lists them, opened by `?` or by a button, with links to further help;

@@ -3,24 +3,14 @@ import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, Volum
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
-import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
+import { slicePlane, toWorld } from './anatomy';
 import { AttractorMarks, UncoveredMarks } from './markers';
-import { AXIS_TOKENS, SlicePanel } from './panel';
-import { SlicePlane } from './planes';
+import { SlicePanel } from './panel';
 import { diverging, QUANTITIES, quantityTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
-import { VolumeBox } from './volume-box';
-
-/** The objects on screen that belong to one volume. */
-interface Scene {
-  volume: VolumeView;
-  inverse: Float64Array;
-  panels: SlicePanel[];
-  planes: SlicePlane[];
-  box: VolumeBox;
-}
+import { VolumeScene } from './volume-scene';
 
 /** The 3D view and the three slices of a volume in the Extract lab, synchronised by a common crosshair. */
 export class Stage {
@@ -39,7 +29,7 @@ export class Stage {
   onMoved: () => void = () => undefined;
   readonly #onPlanes: (planes: Plane[]) => void;
   #options: ViewOptions;
-  #scene: Scene | undefined;
+  #scene: VolumeScene | undefined;
   #attractors: Attractor[] = [];
   /** Voxel index where the three slices intersect. */
   #crosshair: Vec3 = [0, 0, 0];
@@ -69,27 +59,15 @@ export class Stage {
 
   setVolume(volume: VolumeView): void {
     this.#clear();
-    const inverse = invert(volume.affine);
-    const panels = sliceOrientations(volume).map(
-      (orientation) =>
+    this.#scene = new VolumeScene(
+      this.#viewport,
+      this.#slices,
+      volume,
+      (orientation, inverse) =>
         new SlicePanel(volume, orientation, inverse, {
           onIndex: (index) => this.#moveSlice(orientation.axis, index),
           onPoint: (index, pressed) => this.#point(index, pressed),
         }),
-    );
-    const planes = panels.map(
-      ({ orientation, picture }) =>
-        new SlicePlane(volume, orientation, picture, {
-          frame: token(AXIS_TOKENS[orientation.axis]),
-          section: token('--outline'),
-        }),
-    );
-    const box = new VolumeBox(volume, token('--muted'));
-    this.#scene = { volume, inverse, panels, planes, box };
-    for (const { object } of [...planes, box]) this.#viewport.add(object);
-    // Axial first, as in radiology.
-    this.#slices.append(
-      ...[...panels].sort((a, b) => a.orientation.name.localeCompare(b.orientation.name)).map((panel) => panel.element),
     );
     this.setOptions(this.#options);
     this.showAttractors(this.#attractors);
@@ -227,11 +205,7 @@ export class Stage {
   }
 
   #placeSlices(viewer: Vector3): void {
-    const { slices } = this.#options;
-    for (const plane of this.#scene?.planes ?? []) {
-      plane.object.visible = slices !== 'hidden';
-      if (slices !== 'hidden') plane.stand(slices, viewer);
-    }
+    this.#scene?.placeSlices(this.#options.slices, viewer);
   }
 
   #recolor(): void {
@@ -243,13 +217,7 @@ export class Stage {
   }
 
   #clear(): void {
-    const scene = this.#scene;
-    if (!scene) return;
-    for (const item of [...scene.planes, scene.box]) {
-      this.#viewport.remove(item.object);
-      item.dispose();
-    }
-    for (const panel of scene.panels) panel.dispose();
+    this.#scene?.dispose();
     this.#scene = undefined;
   }
 }

@@ -6,16 +6,15 @@ import { crossSection } from '../track/cross-section';
 import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
-import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
+import { slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
 import { Lines } from './lines';
-import { AXIS_TOKENS, SlicePanel } from './panel';
-import { SlicePlane } from './planes';
+import { SlicePanel } from './panel';
 import { RegionGrips, regionEdges } from './region';
 import { greysOf, pictureSize, projectSegments } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
-import { VolumeBox } from './volume-box';
+import { VolumeScene } from './volume-scene';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
 /** Content below the 3D view: the slices, or one of the paper's figures. */
@@ -31,14 +30,6 @@ export interface TrackViewOptions {
   region: boolean;
   slices: SlicePlacement;
   below: ContentBelow;
-}
-
-interface Scene {
-  volume: VolumeView;
-  inverse: Float64Array;
-  panels: SlicePanel[];
-  planes: SlicePlane[];
-  box: VolumeBox;
 }
 
 /** Diameter of a boundary vote, as a fraction of the voxel's shortest side. */
@@ -67,7 +58,7 @@ export class TrackView {
     (region) => this.onRegion(region),
   );
   #options: TrackViewOptions;
-  #scene: Scene | undefined;
+  #scene: VolumeScene | undefined;
   #shown: Surface | undefined;
   #votes: BoundaryVotes | undefined;
   #frame = 0;
@@ -92,8 +83,7 @@ export class TrackView {
   setVolume(volume: VolumeView, keep: boolean): void {
     const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
     this.#clear();
-    const inverse = invert(volume.affine);
-    const panels = sliceOrientations(volume).map((orientation) => {
+    this.#scene = new VolumeScene(this.#viewport, this.#slices, volume, (orientation, inverse) => {
       const panel: SlicePanel = new SlicePanel(volume, orientation, inverse, {
         onIndex: (index) => this.#moveSlice(orientation.axis, index),
         onPoint: (index) => this.#moveTo(index),
@@ -103,19 +93,6 @@ export class TrackView {
       panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
       return panel;
     });
-    const planes = panels.map(
-      ({ orientation, picture }) =>
-        new SlicePlane(volume, orientation, picture, {
-          frame: token(AXIS_TOKENS[orientation.axis]),
-          section: token('--outline'),
-        }),
-    );
-    const box = new VolumeBox(volume, token('--muted'));
-    this.#scene = { volume, inverse, panels, planes, box };
-    for (const { object } of [...planes, box]) this.#viewport.add(object);
-    this.#slices.append(
-      ...[...panels].sort((a, b) => a.orientation.name.localeCompare(b.orientation.name)).map((panel) => panel.element),
-    );
     this.#cloud.size = DISC * Math.min(...volume.spacing);
     if (!keep) this.#viewport.fitVolume(volume);
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
@@ -297,11 +274,7 @@ export class TrackView {
   }
 
   #placeSlices(viewer: Vector3): void {
-    const { slices } = this.#options;
-    for (const plane of this.#scene?.planes ?? []) {
-      plane.object.visible = slices !== 'hidden';
-      if (slices !== 'hidden') plane.stand(slices, viewer);
-    }
+    this.#scene?.placeSlices(this.#options.slices, viewer);
   }
 
   #recolor(): void {
@@ -311,13 +284,7 @@ export class TrackView {
   }
 
   #clear(): void {
-    const scene = this.#scene;
-    if (!scene) return;
-    for (const item of [...scene.planes, scene.box]) {
-      this.#viewport.remove(item.object);
-      item.dispose();
-    }
-    for (const panel of scene.panels) panel.dispose();
+    this.#scene?.dispose();
     this.#scene = undefined;
     this.#votes = undefined;
   }
