@@ -92,16 +92,16 @@ fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
         let mut embedding = embedding_of(mesh, bounds.max);
         let intersecting = embedding.intersecting_vertices(mesh);
         let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting);
-        let left_out = !conflicts.is_empty();
+        let has_left_out = !conflicts.is_empty();
         let near = if is_separated { intersecting } else { embedding.intersecting_vertices(mesh) };
         near.into_iter().for_each(|v| conflicts.add(session.anchor(v), mesh.position(v), target_edge));
+        if is_separated && conflicts.is_empty() {
+            return changes;
+        }
         if is_separated {
             let mut checked = session.with(conflicts.dilated(target_edge), embedding);
-            if left_out {
-                changes += rounds(mesh, bounds, &mut checked);
-            } else if !conflicts.is_empty() {
-                changes += last_round(mesh, bounds, &mut checked);
-            }
+            let remesh_again = if has_left_out { rounds } else { last_round };
+            changes += remesh_again(mesh, bounds, &mut checked);
             return changes;
         }
         mesh.clone_from(&surface);
