@@ -3,7 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { type App, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+import { type App, anotherPage, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
 import { countPixels } from './pixels';
 
 let app: App;
@@ -263,6 +263,30 @@ describe('the view', () => {
     const png = await view().screenshot();
     expect(await countPixels(app.page, png, (r, _g, b) => b > r + 50)).toBeGreaterThan(1000);
     expect(await countPixels(app.page, png, (_r, g, b) => g > b + 25)).toBeGreaterThan(1000);
+  });
+});
+
+describe('a finished run', () => {
+  test('shows its measures together with its state, however slowly the page draws', async () => {
+    const page = await anotherPage(app, () => {
+      const request = window.requestAnimationFrame.bind(window);
+      window.requestAnimationFrame = (callback) => window.setTimeout(() => request(callback), 200);
+    });
+    await page.goto(app.address + SMALL);
+    await reach(page, 'running');
+    const closed = page.evaluate(
+      () =>
+        new Promise((resolve) => {
+          const lab = document.querySelector<HTMLElement>('[data-state]');
+          const table = document.querySelector<HTMLElement>('[data-measures]');
+          if (!lab || !table) throw new Error('there is no lab');
+          new MutationObserver(() =>
+            resolve({ state: lab.dataset.state, ...JSON.parse(table.dataset.measures ?? '') }),
+          ).observe(lab, { attributeFilter: ['data-state'] });
+        }),
+    );
+    expect(await closed).toMatchObject({ state: 'done', closed: true, crossings: 0 });
+    await page.close();
   });
 });
 

@@ -19,8 +19,6 @@ export class SculptResults {
   readonly #follow: (frame: FrameEvent) => void;
   #frame: FrameEvent | undefined;
   #framePending = false;
-  /** Measures to be displayed after the frame they belong to. */
-  #measured: MeasuredEvent | undefined;
   #shownAt = 0;
   #more: Record<string, unknown> = {};
   /** Whether the undeformed meshes are displayed or were requested. */
@@ -47,7 +45,6 @@ export class SculptResults {
   clear(): void {
     this.#scene += 1;
     this.#frame = undefined;
-    this.#measured = undefined;
     this.#originals = false;
     this.#more = {};
     this.#ui.carrier.clear();
@@ -71,23 +68,21 @@ export class SculptResults {
     this.#framePending = true;
     this.#ui.view.change(() => {
       this.#framePending = false;
-      if (this.#frame) this.#show(this.#frame);
-      this.#frame = undefined;
-      this.#showMeasured();
-      this.#client.acknowledge();
+      this.#showPending();
     });
   }
 
-  /** Displays measures, after the frame they belong to. */
-  measured(measured: MeasuredEvent): void {
-    this.#measured = measured;
-    if (!this.#framePending) this.#showMeasured();
+  #showPending(): void {
+    const frame = this.#frame;
+    if (!frame) return;
+    this.#frame = undefined;
+    this.#show(frame);
+    this.#client.acknowledge(frame.serial);
   }
 
-  #showMeasured(): void {
-    if (!this.#measured) return;
-    const { measures, facts } = this.#measured;
-    this.#measured = undefined;
+  /** Displays measures, after the frame they belong to; the state that follows them thus finds both displayed. */
+  measured({ measures, facts }: MeasuredEvent): void {
+    this.#showPending();
     Object.assign(this.#more, facts);
     this.#ui.measures.showMeasures(measures);
     this.#ui.measures.showExtra(this.#more);

@@ -13,9 +13,9 @@ export class SculptClient extends Channel<Requests, WorkerEvent> {
     super(spawnSculpt, onEvent);
   }
 
-  /** Tells the worker that the frame it sent last is on the screen, so that it may send another. */
-  acknowledge(): void {
-    const message: ShownMessage = { kind: 'shown' };
+  /** Tells the worker that the frame with this serial number is on the screen. */
+  acknowledge(serial: number): void {
+    const message: ShownMessage = { kind: 'shown', serial };
     this.post(message);
   }
 

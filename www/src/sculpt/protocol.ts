@@ -172,9 +172,11 @@ export interface Requests {
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Tells the worker that the frame it sent last is on the screen; has no reply. */
+/** Tells the worker that a frame is on the screen; has no reply. */
 export interface ShownMessage {
   kind: 'shown';
+  /** The frame's `serial`. */
+  serial: number;
 }
 /** Sets the target pose of the ellipsoids: at once during a drag, else by a glide of several frames; has no reply. */
 export interface PoseMessage {
@@ -190,6 +192,8 @@ export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
 /** The model after a step, or after a change of the data requested with each frame. */
 export interface FrameEvent {
   event: 'frame';
+  /** Counts the frames, from 1; the page sends it back when the frame is on the screen. */
+  serial: number;
   result: Surface;
   /** The deformed base, unless the layout is only the result. */
   base?: Surface;

@@ -29,6 +29,7 @@ import type {
   Requests,
   SavedPose,
   Setup,
+  ShownMessage,
   ToWorker,
   WorkerEvent,
 } from './protocol';
@@ -58,8 +59,10 @@ class Session {
   #reports: StepReport[] = [];
   #last: StepReport | undefined;
   #durationMs = 0;
-  /** Whether the page has drawn the last frame it was sent. */
-  #shown = true;
+  /** Serial number of the last frame sent to the page. */
+  #sentSerial = 0;
+  /** Serial number of the last frame that the page has drawn. */
+  #shownSerial = 0;
   #run: Task | undefined;
   #recording: Task | undefined;
   /** Resumes a run that waits for the page or for a new pose. */
@@ -91,8 +94,8 @@ class Session {
     export: ({ format }) => this.#current().mesh.toBytes(format),
   };
 
-  shown(): void {
-    this.#shown = true;
+  shown({ serial }: ShownMessage): void {
+    this.#shownSerial = serial;
     this.#wake();
   }
 
@@ -154,7 +157,7 @@ class Session {
   #forget(): void {
     this.#reports = [];
     this.#last = undefined;
-    this.#shown = true;
+    this.#shownSerial = this.#sentSerial;
   }
 
   #current(): Model {
@@ -205,7 +208,7 @@ class Session {
       else {
         this.#next();
         this.#sendFrame();
-        await this.#until(() => this.#shown, signal);
+        await this.#until(() => this.#shownSerial === this.#sentSerial, signal);
       }
     }
   }
@@ -279,8 +282,10 @@ class Session {
     const { layout, quantity, textured } = this.#view;
     const values = quantity && valuesFor(model, quantity);
     const result = textured ? texturedSurfaceOf(model.mesh) : surfaceOf(model.mesh, values);
+    this.#sentSerial += 1;
     const frame: FrameEvent = {
       event: 'frame',
+      serial: this.#sentSerial,
       result,
       ...(layout !== 'result' && { base: surfaceOf(model.baseMesh, values) }),
       ...(layout === 'row' && { link: surfaceOf(model.linkMesh, values) }),
@@ -291,7 +296,6 @@ class Session {
       ...{ poseId: this.#poseId, frame: this.#path.frame, durationMs: this.#durationMs, preview: this.#preview.on },
     };
     this.#reports = [];
-    this.#shown = false;
     send(
       frame,
       [frame.result, frame.base, frame.link].flatMap((one) => (one ? transferOf(one) : [])),
@@ -352,7 +356,7 @@ starting.catch(() => undefined);
 const session = new Session();
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  if (data.kind === 'shown') session.shown();
+  if (data.kind === 'shown') session.shown(data);
   else if (data.kind === 'pose') session.pose(data);
   else void reply(session.handlers, data);
 };
