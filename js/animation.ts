@@ -12,11 +12,12 @@ import { RawAnimation } from './vesicle.js';
  * vertex and 12 a triangle, plus 8 bytes a vertex with texture coordinates and 12 with colours; all of it is in memory
  * twice at the end.
  *
- * @param frames - At least one. The live mesh of a model is encoded in its present state wherever it occurs: `clone()`
- *   it while the model runs.
- * @param options - `frameSeconds`: duration of each frame, 0.001 to 1000; default 0.1.
+ * @param frames - At least one. The live mesh of a model has only the present state of the model: add a `clone()` of it
+ *   for each frame.
+ * @param options - `frameSeconds`: duration of each frame in seconds, 0.001 to 1000; default 0.1.
  * @throws {@link VesicleError} `invalid-argument`: no frames, an entry that is no mesh or has no triangles, a duration
- *   out of range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`.
+ *   out of range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`: a mesh that was
+ *   freed.
  */
 export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {
   const { frameSeconds = 0.1 } = checkProperties('options', options, ['frameSeconds']);

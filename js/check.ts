@@ -14,7 +14,7 @@ function format(value: unknown): string {
   return String(value);
 }
 
-/** Inclusive bounds of a number; a missing one does not limit it. */
+/** Inclusive bounds of a numeric argument; a missing bound does not limit it. */
 interface Bounds {
   min?: number;
   max?: number;
@@ -86,7 +86,7 @@ export function typedArray<T extends { readonly length: number }>(
   throw invalid(parameter, `the length must be a multiple of ${stride}, got ${value.length}`);
 }
 
-/** Returns whether a typed array is detached or out of bounds. Its length is then 0, as if it were only empty. */
+/** Returns whether a typed array is detached or out of bounds; its length is then 0, like that of an empty array. */
 function isDetached(array: { readonly length: number }): boolean {
   try {
     if (array.length === 0 && ArrayBuffer.isView(array)) (array as unknown as Uint8Array).at(0);

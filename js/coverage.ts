@@ -3,46 +3,59 @@ import { checkListener, checkSignal } from './stepper.js';
 import type { Vec3 } from './volume.js';
 
 /**
- * Agreement between the surface of a {@link DeformableModel} and the iso-surface of its volume. The iso-surface is
- * extracted from the volume itself by marching cubes, closed at the border, without components and cavities that
- * enclose fewer voxels than `smallestPart`.
+ * Agreement between the surface of a {@link DeformableModel} and the iso-surface of its volume, as measured by
+ * {@link DeformableModel.coverage}. The iso-surface is extracted from the volume itself by marching cubes, closed at
+ * the border, without components and cavities that enclose fewer voxels than `smallestPart`.
  */
 export interface Coverage {
-  /** Fraction of the iso-surface's area within one voxel of the surface, 0..1; 1 if there is no iso-surface. */
+  /**
+   * Fraction of the area of the volume's iso-surface that is within one voxel of the model's surface, 0..1; 1 if there
+   * is no iso-surface.
+   */
   recall: number;
-  /** Fraction of the surface's area within one voxel of the iso-surface, 0..1; 1 if there is no surface. */
+  /**
+   * Fraction of the area of the model's surface that is within one voxel of the volume's iso-surface, 0..1; 1 if the
+   * model's surface is empty.
+   */
   precision: number;
   /**
-   * Connected regions of the iso-surface whose triangles are not completely within one voxel of the surface, largest
-   * first.
+   * Connected regions of the volume's iso-surface whose triangles are not completely within one voxel of the model's
+   * surface, largest first.
    */
   uncovered: UncoveredRegion[];
 }
 
 /**
- * A connected region of the iso-surface, made of the triangles that are at least in part farther than one voxel from
- * the surface.
+ * A connected region of a volume's iso-surface that the surface of a {@link DeformableModel} does not cover: each of
+ * its triangles is at least in part farther than one voxel from that surface.
  */
 export interface UncoveredRegion {
-  /** A point of the region near its middle, in world space. */
+  /** A point on the uncovered region near its middle, in world space, at which a view can mark the region. */
   position: Vec3;
-  /** Area of the region, world units squared. */
+  /** Area of the uncovered region, world units squared. */
   area: number;
-  /** 'matter': part of the object lies outside the surface; 'cavity': background lies inside it. */
+  /**
+   * Kind of error of the model's surface at the region: 'matter' if part of the object is outside the surface, 'cavity'
+   * if background is inside.
+   */
   kind: 'matter' | 'cavity';
 }
 
 /** Options of {@link DeformableModel.coverage}. */
 export interface CoverageOptions {
-  /** Aborts the measurement, which then rejects with `signal.reason`. */
+  /** Aborts the coverage measurement, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
   /**
-   * Called with the fraction of the work done, up to 1. If it throws, the measurement ends and rejects with that error.
+   * Called repeatedly with the fraction of the coverage measurement that is done, up to 1. If it throws, the
+   * measurement ends and rejects with that error.
    */
   onProgress?: (share: number) => void;
 }
 
-/** Validates the options of a coverage measurement; throws `invalid-argument`. */
+/**
+ * Returns the options of a coverage measurement once they are checked; throws `invalid-argument` for an unknown or
+ * wrong one.
+ */
 export function checkedCoverage(given: CoverageOptions | undefined): CoverageOptions {
   const options = checkProperties<CoverageOptions>('options', given, ['signal', 'onProgress']);
   checkSignal(options.signal);

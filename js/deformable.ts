@@ -19,27 +19,36 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {
-  /** Iso value, πI: intensity at the surface, in intensity units of the volume; default the middle of its range. */
+  /**
+   * Iso value, πI: intensity at the surface, in intensity units of the volume; default the middle of the volume's
+   * intensity range.
+   */
   iso?: number;
   /**
-   * Strength of the iso force, αI, which moves the surface along its normal to the iso-surface; negative where the
-   * object is brighter than `iso`.
+   * Strength of the iso force, αI, which moves the surface along its normal to the iso-surface; negative (default −1)
+   * for an object brighter than `iso`, positive for a darker one.
    */
   isoForce?: number;
   /** Strength of the gradient force's normal component, αg; positive values pull towards bright ridges of the image. */
   gradientNormal?: number;
   /**
-   * Strength of the gradient force's tangential component, βg; positive values pull vertices within the surface towards
+   * Strength of the gradient force's tangential component, βg; positive values pull vertices along the surface towards
    * bright ridges of the image.
    */
   gradientTangent?: number;
-  /** Length to which longer image gradients are clamped, in intensity ranges of the volume per voxel. */
+  /**
+   * Length to which longer image gradients are shortened in the gradient force, in intensity ranges of the volume per
+   * voxel.
+   */
   gradientBound?: number;
-  /** Resistance to bending, αc. */
+  /** Resistance of the surface to bending, αc: larger values give a smoother surface. */
   rigidity?: number;
-  /** Resistance to stretching, αe. */
+  /** Stiffness of the edges as springs, αe: small values even out the triangles, large ones shrink the surface. */
   stiffness?: number;
-  /** Rest length of the edge springs: zero, the mean edge length, or a length in world units. */
+  /**
+   * Rest length of the edges as springs: 'zero' (the default), 'mean' for the mean edge length, or a length in world
+   * units.
+   */
   restLength?: 'zero' | 'mean' | number;
   /** Mass of a vertex, m: heavier ones start and stop more slowly. */
   mass?: number;
@@ -47,17 +56,20 @@ export interface DeformableParams {
   damping?: number;
   /**
    * Integrator of the equation of motion: 'implicit' (the default) takes long steps, needs the fewest of them, and is
-   * stable for all parameters; 'euler' is the paper's, and stable for `rigidity` up to 0.4 and `damping` up to 1;
+   * stable for all parameters; 'euler' is that of the paper, and stable for `rigidity` up to 0.4 and `damping` up to 1;
    * 'runge-kutta' evaluates the forces four times a step, and is stable for `rigidity` up to 3.
    */
   integrator?: 'euler' | 'runge-kutta' | 'implicit';
-  /** Time step, Δt, of one iteration of 'euler' and 'runge-kutta'; an iteration of 'implicit' takes 16 at once. */
+  /** Time step, Δt, of one iteration of 'euler' and 'runge-kutta'; an iteration of 'implicit' covers 16 time steps. */
   timeStep?: number;
-  /** Largest displacement of a vertex in one iteration, as a fraction of δ. */
+  /**
+   * Largest displacement of a vertex in one iteration, as a fraction of the sampling distance
+   * {@link DeformableModel.delta}.
+   */
   maxMove?: number;
   /**
-   * Mean kinetic energy of the vertices along the normals, ε, with speeds in δ per unit of time, below which a level has
-   * converged.
+   * ε: a pyramid level converges only when the mean kinetic energy of the vertices along their normals, with speeds in
+   * sampling distances δ per unit of time, is below this.
    */
   energyTolerance?: number;
   /**
@@ -66,28 +78,32 @@ export interface DeformableParams {
    */
   topology?: 'adaptive' | 'fixed';
   /**
-   * Local adaptation of the surface to the image, 0..1; default 1. Any value above 0 keeps walls and gaps visible in
-   * the image, however thin, and limits the rigidity; edge lengths vary with the curvature in proportion to the
-   * value. At 0, or if `isoForce` is 0, sheets closer than the contact distance are joined, as in the paper.
+   * Local adaptation of the surface to the image, 0..1; default 1. Any value above 0 preserves walls and gaps that the
+   * image shows, however thin, and limits the rigidity; edge lengths vary with the curvature in proportion to the
+   * value. At 0, or if `isoForce` is 0, parts of the surface closer than the contact distance are joined, as in the
+   * paper.
    */
   adaptivity?: number;
   /**
-   * Whether components and cavities that the image of a level shows but the surface lacks are added to it: 'auto' (the
-   * default) in runs that start from the contour, 'on' in all, 'off' never. {@link DeformableModel.seed} adds them on
-   * demand.
+   * Whether components and cavities that the image of a pyramid level shows but the surface lacks are added to it:
+   * 'auto' (the default) in runs that start from the contour, 'on' in all runs, 'off' never.
+   * {@link DeformableModel.seed} adds them on demand.
    */
   seeding?: 'auto' | 'on' | 'off';
   /** Separate components and cavities that enclose fewer voxels than this are ignored as noise; default 64. */
   smallestPart?: number;
 }
 
-/** A spring that pulls the surface within `radius` of a point towards it. */
+/**
+ * A spring that pulls vertices within `radius` of a point towards that point; see
+ * {@link DeformableModel.setAttractors}.
+ */
 export interface Attractor {
-  /** Position in world space. */
+  /** Position towards which vertices are pulled, in world space. */
   point: Vec3;
-  /** Spring constant; negative values push the surface away. */
+  /** Spring constant of the attractor; negative values push the surface away. */
   strength: number;
-  /** Radius of influence, world units. */
+  /** Distance from `point` at which the force of the attractor has faded to 0, world units. */
   radius: number;
 }
 
@@ -102,7 +118,7 @@ export interface Attractor {
  *   the whole volume if nothing is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and
  *   for objects without a usable iso-surface.
  * - `{ bubbles }`: a grid of n × n × n spheres, which grow and merge.
- * - `{ seeds, radius }`: spheres around packed points in world space.
+ * - `{ seeds, radius }`: spheres of this radius, in world units, around packed points in world space.
  * - `{ marchingCubes }`: the iso-surface of the coarsest level at the given intensity.
  * - A closed mesh without self-intersections, in world space; it is copied.
  */
@@ -118,19 +134,19 @@ export type DeformableStart =
 export interface DeformableOptions {
   /** The volume that the model is fitted to; it may be freed once the model is made. */
   volume: Volume;
-  /** Frame of a 4D volume; default 0. */
+  /** Index of the frame of a 4D volume that the model is fitted to; default 0. */
   frame?: number;
   /** Initial surface; default 'contour'. */
   start?: DeformableStart;
   /**
-   * Number of pyramid levels above the volume itself. With 0 (the default) the surface works on the volume from the
-   * first iteration. The voxels of each level are √3 times larger than those of the next finer one; the surface starts
-   * on the coarsest level and is refined on each finer one.
+   * Number of pyramid levels above the volume itself. With 0 (the default) the surface is fitted to the volume itself
+   * from the first iteration. The voxels of each level are √3 times larger than those of the next finer one; the
+   * surface starts on the coarsest level and is refined on each finer one.
    */
   levels?: number;
   /** Target edge length at the finest level, world units; default from the voxel size. */
   edge?: number;
-  /** Parameters: any subset; the others have their defaults. */
+  /** Initial parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
 }
 
@@ -173,12 +189,15 @@ export class DeformableModel implements Stepper {
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface: the same live object from start to end, in world space. Freed with the model. */
+  /**
+   * The model's surface in world space: the same live {@link Mesh} from start to end. It shows the current state, and
+   * is freed with the model.
+   */
   get mesh(): Mesh {
     return this.#mesh;
   }
 
-  /** Current pyramid level; 0 = the volume itself. */
+  /** Current pyramid level: 0 is the volume itself, higher levels are coarser. */
   get level(): number {
     return this.#handle.use((raw) => raw.level());
   }
@@ -197,9 +216,9 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Replaces all attractors.
+   * Replaces all attractors of the model by the given ones; an empty array removes them.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the entry.
+   * @throws {@link VesicleError} `invalid-argument` naming the wrong attractor.
    */
   setAttractors(attractors: Attractor[]): void {
     const packed = denseCopy('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
@@ -219,7 +238,8 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Runs to the end, yielding to the event loop between slices. Parameters and attractors may be changed meanwhile.
+   * Runs to the end, yielding to the event loop between slices of work. Parameters and attractors may be changed
+   * meanwhile.
    *
    * @returns The last report.
    * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep`;
@@ -236,7 +256,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Finds components and cavities of the current level's image that the surface lacks and adds them, whatever the value
-   * of `seeding`; none if `topology` is 'fixed' or `isoForce` is 0. A finished model continues if any were added.
+   * of `seeding`; adds none if `topology` is 'fixed' or `isoForce` is 0. A finished model continues if any were added.
    *
    * @returns A report that counts them in `events.seeds`.
    * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress; `too-large`.
@@ -248,7 +268,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Measures how much of the volume's iso-surface the surface covers, both in their present state, and lists the
-   * regions it does not cover. Yields to the event loop between slices; the model may be stepped meanwhile.
+   * regions it does not cover. Yields to the event loop between slices of work; the model may be stepped meanwhile.
    *
    * @throws `signal.reason` when aborted; any error thrown by `onProgress`; {@link VesicleError} `invalid-argument`
    *   naming the option, `freed` when the model is freed meanwhile, `too-large`.
@@ -289,7 +309,10 @@ export class DeformableModel implements Stepper {
     return this.#handle.use((raw) => raw.speeds());
   }
 
-  /** Saves the whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
+  /**
+   * Saves the whole state, for {@link DeformableModel.restore} of a model made with the same volume, frame and number
+   * of levels.
+   */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
@@ -297,8 +320,8 @@ export class DeformableModel implements Stepper {
   /**
    * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays unchanged;
-   *   `invalid-argument` while a run is in progress.
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a model with the same volume, frame
+   *   and number of levels; the model then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

@@ -14,12 +14,13 @@ export type ErrorCode =
   | 'not-closed'
   /** A mesh with self-intersections, given as initial surface or base; an embedded one is needed. */
   | 'self-intersecting'
-  /** A linear system without a usable solution; the message names the likely cause. */
+  /** A linear system of an implicit surface without a usable solution; the message names the likely cause. */
   | 'singular-system'
   /** More memory needed than there is, or more vertices than are allowed; the message says how much. */
   | 'too-large'
   /**
-   * Work that `terminate()` of `vesicle/worker` ended. A run that its own signal aborts rejects with `signal.reason`.
+   * Work that was ended by `terminate()` of `vesicle/worker`. A run that is aborted by its own signal rejects with
+   * `signal.reason` instead.
    */
   | 'aborted'
   /** Use of an object after its `free()`, or after it was lost in a crash or with its worker. */
@@ -29,7 +30,7 @@ export type ErrorCode =
  * An error the library can foresee. `message` says what was wrong and what is accepted, `code` is the kind of failure.
  */
 export class VesicleError extends Error {
-  /** The kind of failure. */
+  /** The kind of failure, by which programs can distinguish errors. */
   readonly code: ErrorCode;
 
   constructor(code: ErrorCode, message: string) {

@@ -15,20 +15,29 @@ export interface ImplicitParams {
    * Gaussian exp(−r²/2σ²).
    */
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
-  /** First-order smoothness of the multi-order kernel, δ, per unit of length: larger values give a tighter surface. */
+  /**
+   * First-order smoothness of the multi-order kernel, δ, per unit of length of the normalised box (longest side 2):
+   * larger values give a tighter surface.
+   */
   delta?: number;
-  /** Third-order smoothness of the multi-order kernel, τ, a length: larger values give less detail. */
+  /**
+   * Third-order smoothness of the multi-order kernel, τ, a length in the normalised box (longest side 2): larger values
+   * give less detail.
+   */
   tau?: number;
-  /** Width of the Gaussian kernel, σ, a length. */
+  /** Width of the Gaussian kernel, σ, a length in the normalised box (longest side 2). */
   sigma?: number;
   /**
-   * Regularisation λ of surface constraints (points where f is to be 0): how much each may be missed; 0 interpolates.
-   * With more than 3,000 points it is multiplied by n/3,000.
+   * Regularisation λ of surface constraints (points where the implicit function f is to be 0): how much each may be
+   * missed; 0 interpolates. With n > 3,000 points it is multiplied by n/3,000.
    */
   lambdaSurface?: number;
-  /** Regularisation λ of exterior constraints (points where f is to be −1): how much each may be missed. */
+  /**
+   * Regularisation λ of exterior constraints (points where the implicit function f is to be −1): how much each may be
+   * missed.
+   */
   lambdaExterior?: number;
-  /** Relative residual of the linear system at which the solver stops. */
+  /** Relative residual at which the iterative solver of the linear system for f stops. */
   tolerance?: number;
   /**
    * Edge of a cell of the grid on which the surface is extracted, in the points' units; 0, the default, derives it from
@@ -36,8 +45,8 @@ export interface ImplicitParams {
    */
   cell?: number;
   /**
-   * The value at the extracted surface of f, the sum of radial basis functions: 0, or the mean of f over the surface
-   * constraints.
+   * Value of f, the sum of radial basis functions, at which the surface is extracted: 0, or the mean of f over the
+   * surface constraints.
    */
   level?: 'zero' | 'mean';
 }
@@ -49,9 +58,9 @@ export interface Camera {
    * the first pixel at (0, 0).
    */
   projection: ArrayLike<number>;
-  /** Width of the image, pixels. */
+  /** Width of the camera's image, pixels. */
   width: number;
-  /** Height of the image, pixels. */
+  /** Height of the camera's image, pixels. */
   height: number;
   /** Image for colouring the mesh, rgba8, row by row from the top; pixels with alpha 0 are ignored. */
   image?: Uint8ClampedArray;
@@ -61,55 +70,66 @@ export interface Camera {
 export interface ImplicitOptions {
   /** Packed xyz of noisy points near the closed surface: at least four, not in one plane. */
   points: Float32Array;
-  /** Packed outward normals of the points; of any length. */
+  /** Packed outward normals of the points; they need not have unit length. */
   normals?: Float32Array;
   /**
-   * Confidence of each point, above 0 and at most 1: its λ is divided by it, so that uncertain points constrain less.
+   * Confidence of each point, above 0 and at most 1: the regularisation λ of its constraint is divided by it, so that
+   * uncertain points constrain less.
    */
   confidence?: Float32Array;
   /** Packed rgb of each point, 0..1: colours the mesh if no camera image shows any of it. */
   colors?: Float32Array;
   /**
-   * Points known to be outside, packed. By default made towards the cameras, without cameras along the normals, given or
-   * estimated. Points on a sphere around all are always added.
+   * Packed points known to be outside the surface. By default they are made from the given points, by an offset towards
+   * the cameras, or without cameras along the normals, given or estimated. Points on a sphere around all points are
+   * always added.
    */
   exterior?: Float32Array;
-  /** The cameras from which the points were reconstructed. */
+  /**
+   * The cameras from which the points were reconstructed: exterior points are made towards them, and their images
+   * colour the mesh.
+   */
   cameras?: Camera[];
   /** Largest number of points used; more are reduced to a Poisson-disc subsample. 4 to 100,000, default 20,000. */
   maxPoints?: number;
   /** Removes outliers: keeps only the n largest connected clusters of points; default all. */
   keepComponents?: number;
-  /** Parameters: any subset; the others have their defaults. */
+  /** Initial parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
 }
 
-/** Manual edits of the points of an {@link ImplicitSurface}. */
+/** Manual edits of the points of an {@link ImplicitSurface}, for {@link ImplicitSurface.setEdits}. */
 export interface PointEdits {
-  /** Additional points near the surface, packed. */
+  /** Packed points near the surface that are used in addition to the original ones. */
   added?: Float32Array;
   /**
    * Points to leave out, by their zero-based index in the original points; others at the same positions are left out,
    * too.
    */
   removed?: Uint32Array;
-  /** Additional points known to be outside, packed. */
+  /** Packed points known to be outside the surface, used in addition to the other exterior points. */
   exterior?: Float32Array;
 }
 
-/** Distances of the points from a surface, in the points' units, and its curvature. */
+/**
+ * Distances of the points of an {@link ImplicitSurface} from its surface, and the curvature of that surface; returned
+ * by {@link ImplicitSurface.fitness}.
+ */
 export interface Fitness {
-  /** Mean distance of the points, with edits, from the surface. */
+  /** Mean distance of the points, as edited, from the surface, in the points' units. */
   mean: number;
-  /** Root mean square distance of the points from the surface. */
+  /** Root mean square distance of the points, as edited, from the surface, in the points' units. */
   rms: number;
-  /** Largest distance of a point from the surface. */
+  /** Largest distance of a point, as edited, from the surface, in the points' units. */
   max: number;
-  /** Mean of |H| over the vertices, per unit of length of the points. */
+  /** Mean of the absolute mean curvature |H| over the vertices of the surface, per unit of length of the points. */
   meanCurvature: number;
 }
 
-/** Results of an {@link ImplicitSurface} that are not part of the {@link StepReport}. */
+/**
+ * Results of an {@link ImplicitSurface} that are not part of the {@link StepReport}, as the WebAssembly module returns
+ * them.
+ */
 interface Statistics {
   cell: number;
   spacing: number;
@@ -124,7 +144,8 @@ const OPTIONS = [
 ];
 
 /**
- * Parses points from a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Colours are rgb, 0..1.
+ * Parses points from a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Returns packed arrays, as in
+ * {@link ImplicitOptions}; colours are rgb, 0..1.
  *
  * @throws {@link VesicleError} `bad-file` naming the format and the field or line.
  */
@@ -147,9 +168,9 @@ export function parsePoints(bytes: Uint8Array): {
  * functions.
  *
  * After Dinh, Turk and Slabaugh, "Reconstructing surfaces by volumetric regularization using radial basis functions".
- * The stages are the phases of the reports: subsample, constraints, solve, extract, colour; a step is a slice of some
- * ten milliseconds of one of them. The mesh is empty until the first surface is complete, and then stays until the next
- * one is.
+ * The stages, named by `phase` in the reports, are subsample, constraints, solve, extract and colour; a step is some
+ * ten milliseconds of work on one of them. The mesh is empty until the first surface is complete, and then stays until
+ * the next one is complete.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link ImplicitSurface.free}.
  */
@@ -172,7 +193,10 @@ export class ImplicitSurface implements Stepper {
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface: the same live object from start to end, in the points' units. Freed with the model. */
+  /**
+   * The model's surface in the points' units: the same live {@link Mesh} from start to end. It shows the last complete
+   * surface, and is freed with the model.
+   */
   get mesh(): Mesh {
     return this.#mesh;
   }
@@ -198,7 +222,7 @@ export class ImplicitSurface implements Stepper {
     return this.#statistics().spacing;
   }
 
-  /** Number of points left out as duplicates of others. */
+  /** Number of input points left out as duplicates of others. */
   get duplicates(): number {
     return this.#statistics().duplicates;
   }
@@ -225,7 +249,7 @@ export class ImplicitSurface implements Stepper {
    * @returns The last report.
    * @throws {@link VesicleError} `singular-system` naming the likely cause; `too-large`; `invalid-argument`, naming the
    *   parameter, where too few points are left, or `cell` does not suit them, and while a {@link ImplicitSurface.run}
-   *   is in progress. The last surface stays, and other parameters may be set.
+   *   is in progress. After an error the last surface stays, and other parameters may be set.
    */
   step(iterations = 1): StepReport {
     integer('iterations', iterations, { min: 1 });
@@ -234,7 +258,7 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Runs to the end, yielding to the event loop between slices. Parameters may be changed meanwhile.
+   * Runs to the end, yielding to the event loop between slices of work. Parameters may be changed meanwhile.
    *
    * @returns The last report.
    * @throws As {@link ImplicitSurface.step}; `signal.reason` when aborted, and the model stays usable; any error thrown
@@ -274,9 +298,10 @@ export class ImplicitSurface implements Stepper {
    * matrix and solution; more are solved from the start. If only a subsample is used, a removed point is not replaced
    * by another.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther than 1.5 times the longest
-   *   side of the points' bounding box from its centre along an axis, no such index, too few points left, all in one
-   *   plane, on the surface and outside at once; nothing has changed then.
+   * @throws {@link VesicleError} `invalid-argument` naming the list that is wrong: a number that is not finite, a point
+   *   farther than 1.5 times the longest side of the points' bounding box from its centre along an axis, an index that
+   *   no point has, too few points left, all points in one plane, or a point both on the surface and outside; nothing
+   *   has changed then.
    */
   setEdits(edits: PointEdits): void {
     const known = checkProperties('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
@@ -316,7 +341,7 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Measures distances of all points, with edits, from the surface, and its curvature.
+   * Measures distances of all points, with edits, from the surface, and the curvature of the surface.
    *
    * @throws {@link VesicleError} `invalid-argument` before there is a surface.
    */
@@ -325,8 +350,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Returns the new surface before it is complete: during extraction the part extracted so far, open where the
-   * extraction continues, and during colouring all of it; empty in other phases.
+   * Returns the new surface before it is complete, for display: during extraction the part extracted so far, open where
+   * the extraction continues, and during colouring all of it; empty in other phases.
    */
   preview(): Mesh {
     return wrapMesh(new Handle('Mesh', () => this.#handle.use((raw) => raw.preview())));
@@ -365,8 +390,8 @@ export class ImplicitSurface implements Stepper {
    * Restores a saved state, bit for bit. Takes as long as the choice of points and the phase in progress at the time of
    * saving took; for a state saved while colouring, as long as the extraction, too.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a surface, which then stays unchanged;
-   *   `invalid-argument` while a run is in progress.
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a surface with the same points and
+   *   options; the surface then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

@@ -15,20 +15,20 @@ import { call, Handle } from './runtime.js';
 import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
-/** Vertices and triangles of a mesh as packed arrays. */
+/** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
   /** Position of each vertex, packed xyz. */
   positions: Float32Array;
-  /** Unit outward normal of each vertex. */
+  /** Unit outward normal of each vertex, packed xyz. */
   normals: Float32Array;
   /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
   indices: Uint32Array;
   /**
-   * Texture coordinates of each vertex, if the mesh has them; at a seam those of one side: see
+   * Texture coordinates of each vertex, packed uv, if the mesh has them; at a seam those of one side: see
    * {@link Mesh.splitAtSeams}.
    */
   uvs?: Float32Array;
-  /** Colour of each vertex, rgb, 0..1, if the mesh has them. */
+  /** Colour of each vertex, packed rgb, 0..1, if the mesh has colours. */
   colors?: Float32Array;
 }
 
@@ -40,13 +40,16 @@ export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
  * downwards, 1 at the far edges, and the image repeats beyond, as in glTF: in three.js, with `flipY = false`.
  */
 export interface MeshTexture {
-  /** Format of the image file. */
+  /** Image format of `bytes`. */
   type: TextureType;
-  /** The image file. */
+  /** Content of the image file. */
   bytes: Uint8Array;
 }
 
-/** Measures of a mesh. Those of the enclosed solid are meaningful for a closed mesh only. */
+/**
+ * Measures of a mesh, as returned by {@link Mesh.info}. Volume, centroid and second moments, which are those of the
+ * enclosed solid, are meaningful for a closed mesh only.
+ */
 export interface MeshInfo {
   vertices: number;
   triangles: number;
@@ -59,7 +62,7 @@ export interface MeshInfo {
   area: number;
   /** Enclosed volume, world units cubed; positive if triangles are counter-clockwise seen from outside. */
   volume: number;
-  /** Centroid of the enclosed solid; that of the surface if the volume is negligible. */
+  /** Centroid of the enclosed solid, in the mesh's coordinates; that of the surface if the volume is negligible. */
   centroid: Vec3;
   /**
    * Second moments of the enclosed solid about its centroid c: ∫ (x − c)(x − c)ᵀ dV, row-major 3x3. Not the inertia
@@ -68,14 +71,17 @@ export interface MeshInfo {
   inertia: number[];
   /** Shortest, mean and longest length of an edge, world units. */
   edge: { min: number; mean: number; max: number };
-  /** Smallest angle of a triangle, degrees. */
+  /** Smallest angle in any triangle, degrees. */
   minAngleDegrees: number;
   bounds: { min: Vec3; max: Vec3 };
 }
 
 /** Result of {@link Mesh.check}; a valid mesh is closed, oriented and has all counts at 0. */
 export interface MeshReport {
-  /** Whether no edge has only one triangle; an edge with more than two is counted in `nonManifoldEdges`. */
+  /**
+   * Whether the mesh has no boundary: no edge with only one triangle. An edge with more than two is counted in
+   * `nonManifoldEdges`.
+   */
   closed: boolean;
   /** Whether all neighbouring triangles have the same orientation. */
   oriented: boolean;
@@ -94,15 +100,15 @@ export interface MeshReport {
 /** File formats that {@link Mesh.toBytes} writes. */
 export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
 
-/** Intersection of a ray and a mesh. */
+/** Intersection of a ray with a mesh, as returned by {@link Mesh.pick}. */
 export interface MeshHit {
-  /** Index of the triangle in {@link MeshArrays.indices}. */
+  /** Index of the triangle that the ray hits; its corners start at 3 × `triangle` in {@link MeshArrays.indices}. */
   triangle: number;
-  /** Barycentric coordinates of the point in its triangle; they sum to 1. */
+  /** Barycentric coordinates of `point` in the triangle, one for each corner in order; they sum to 1. */
   barycentric: Vec3;
-  /** The point of intersection. */
+  /** Point in which the ray intersects the mesh, in the mesh's coordinates. */
   point: Vec3;
-  /** Distance from the ray's origin, world units. */
+  /** Distance of `point` from the ray's origin, world units. */
   distance: number;
 }
 
@@ -116,17 +122,25 @@ export type CurvatureKind =
   /** Gaussian curvature, K = κ₁ κ₂. */
   | 'gaussian';
 
-/** Distances between two surfaces, world units. The summaries cover both directions and are symmetric. */
+/**
+ * Distances between two surfaces, as returned by {@link Mesh.distanceTo}, world units. All but `perVertex` cover both
+ * directions and are symmetric.
+ */
 export interface SurfaceDistance {
-  /** Distance from each vertex of the mesh to the closest point of the other surface; not negative. */
+  /**
+   * Distance from each vertex of the mesh on which {@link Mesh.distanceTo} was called to the closest point of the other
+   * surface; not negative.
+   */
   perVertex: Float32Array;
-  /** Mean distance: the mean of the two one-way means. */
+  /** Mean distance between the two surfaces: the mean of the mean distances in the two directions. */
   mean: number;
-  /** Root mean square distance: root of the mean of the two one-way mean squares. */
+  /**
+   * Root mean square distance between the two surfaces: the root of the mean of the mean squares in the two directions.
+   */
   rms: number;
-  /** 95th percentile: the larger of the two one-way percentiles. */
+  /** 95th percentile of the distances between the two surfaces: the larger of those in the two directions. */
   p95: number;
-  /** Hausdorff distance: the largest of all distances, in both directions. */
+  /** Hausdorff distance: the largest of all distances between the two surfaces, in both directions. */
   hausdorff: number;
 }
 
@@ -141,11 +155,14 @@ const TEXTURES: readonly TextureType[] = ['image/png', 'image/jpeg', 'image/webp
 
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
-/** Returns the handle of a mesh, for the other modules of the library; throws `invalid-argument` if it is no Mesh. */
+/**
+ * Returns the handle of the WebAssembly object behind a mesh, for the other modules of the library; throws
+ * `invalid-argument` if `mesh` is no {@link Mesh}.
+ */
 export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
 /**
- * Creates a mesh from a raw handle, for the other modules of the library. A live mesh belongs to its model, which frees
- * it.
+ * Creates a mesh from the handle of a WebAssembly object, for the other modules of the library. A live mesh belongs to
+ * its model, which frees it.
  */
 export let wrapMesh: (handle: Handle<RawMesh>, live?: boolean) => Mesh;
 
@@ -259,18 +276,25 @@ export class Mesh {
   }
 
   /**
-   * Counter that increases when the connectivity changes; that of an implicit surface, also when anything else does.
+   * Counter that increases when the connectivity changes, so that copies know whether they are out of date; for the
+   * mesh of an implicit surface, also when anything else changes.
    */
   get topologyVersion(): number {
     return this.#handle.use((raw) => raw.topologyVersion());
   }
 
-  /** Counter that increases when any vertex moves; that of an implicit surface, also when its colours change. */
+  /**
+   * Counter that increases when any vertex moves, so that copies know whether they are out of date; for the mesh of an
+   * implicit surface, also when its colours change.
+   */
   get geometryVersion(): number {
     return this.#handle.use((raw) => raw.geometryVersion());
   }
 
-  /** The texture of the mesh, as a copy, or undefined. Edits remove it together with the texture coordinates. */
+  /**
+   * Copy of the texture of the mesh; undefined if it has none. Edits of the mesh remove the texture together with the
+   * texture coordinates.
+   */
   get texture(): MeshTexture | undefined {
     const raw = this.#handle.use((mesh) => mesh.texture());
     if (!raw) return undefined;
@@ -289,8 +313,8 @@ export class Mesh {
   }
 
   /**
-   * Copies the mesh into the caller's arrays, which are replaced only when too small; returns the counts written. `uvs`
-   * and `colors` are set if the mesh has them, and deleted otherwise.
+   * Copies the mesh into the caller's arrays, which are replaced only when too small; returns the numbers of vertices
+   * and triangles written. `uvs` and `colors` are set if the mesh has them, and deleted otherwise.
    *
    * @throws {@link VesicleError} `invalid-argument` if `out` is no such object.
    */
@@ -333,7 +357,7 @@ export class Mesh {
   }
 
   /**
-   * Refines the mesh by one √3-subdivision pass: three triangles for each.
+   * Refines the mesh by one pass of √3 subdivision, which replaces each triangle by three.
    *
    * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first;
    *   `too-large`.
@@ -401,10 +425,10 @@ export class Mesh {
    * Computes the curvature at each vertex, in the order of {@link Mesh.arrays}. `mean` is positive on convex parts: 1/r
    * on a ball of radius r, -1/r on a cavity. `gaussian` is 1/r² on both and negative on a saddle.
    *
-   * Computed from the triangles around each vertex, and therefore noisy where they are: smooth the values for display
-   * if need be. Always finite; 0 on the boundary of an open mesh and at isolated vertices.
+   * Computed from the triangles around each vertex, and therefore as noisy as these: smooth the values for display if
+   * need be. Always finite; 0 on the boundary of an open mesh and at isolated vertices.
    *
-   * @throws {@link VesicleError} `invalid-argument`: neither of the two.
+   * @throws {@link VesicleError} `invalid-argument`: `kind` is neither 'mean' nor 'gaussian'.
    */
   curvature(kind: CurvatureKind): Float32Array {
     choice('kind', kind, CURVATURES);
@@ -442,7 +466,7 @@ export class Mesh {
 
   /**
    * Returns the first intersection of the ray from `origin` along `direction` with the surface, from either side, or
-   * undefined.
+   * undefined if the ray misses it.
    *
    * @param direction - Any length but 0.
    * @throws {@link VesicleError} `invalid-argument`.
@@ -521,7 +545,10 @@ function checkTexture(texture: MeshTexture | undefined): void {
   typedArray('texture.bytes', bytes, Uint8Array);
 }
 
-/** Copies a texture into the WebAssembly module. The call that the raw texture is passed to takes ownership of it. */
+/**
+ * Copies a texture into the WebAssembly module. The function of the module that receives the raw texture takes
+ * ownership of it.
+ */
 function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
   return texture && new RawTexture(texture.type, texture.bytes);
 }

@@ -10,7 +10,7 @@ import type { Vec3 } from './volume.js';
  * deformation.
  */
 export interface ControlEllipsoid {
-  /** The centre. */
+  /** Centre of the ellipsoid, in the mesh's units. */
   center: Vec3;
   /** Three orthogonal semi-axes as vectors. Detail rotates with them, so keep their order from call to call. */
   axes: [Vec3, Vec3, Vec3];
@@ -19,14 +19,17 @@ export interface ControlEllipsoid {
 /** Parameters of the multiresolution model; `paramSpecs('multires')` has their ranges, defaults and descriptions. */
 export interface MultiresParams {
   /**
-   * ε_min: shorter edges are collapsed, in the mesh's units; by default such that the base has some 10,000 triangles.
+   * ε_min: edges shorter than this are collapsed, in the mesh's units; by default such that the base has some 10,000
+   * triangles.
    */
   edgeMin?: number;
-  /** ε_max: longer edges are split; more than twice `edgeMin`. */
+  /** ε_max: edges longer than this are split, in the mesh's units; more than twice `edgeMin`. */
   edgeMax?: number;
-  /** Number of levels of the multi-level solver that are coarser than the target resolution. */
+  /** Largest number of levels of the multi-level solver that are coarser than the target resolution. */
   levels?: number;
-  /** q: factor by which edge bounds shrink from one level to the next finer one. */
+  /**
+   * q: factor, below 1, by which the edge bounds shrink from one level of the multi-level solver to the next finer one.
+   */
   refineFactor?: number;
   /**
    * Largest number of smoothing iterations, with the umbrella operator, per level of the multi-level solver; finer
@@ -62,11 +65,14 @@ export interface MultiresOptions {
   base?: Mesh;
   /** Initial control ellipsoids: at least one, of which one has to touch the base. */
   ellipsoids: ControlEllipsoid[];
-  /** Parameters: any subset; the others have their defaults. */
+  /** Initial parameters: any subset; the others have their defaults. */
   params?: MultiresParams;
 }
 
-/** Counts of a {@link MultiresolutionModel} that are not part of the {@link StepReport}. */
+/**
+ * Counts of a {@link MultiresolutionModel} that are not part of the {@link StepReport}, as the WebAssembly module
+ * returns them.
+ */
 interface Counts {
   bandCount: number;
   folded: number;
@@ -114,19 +120,22 @@ export class MultiresolutionModel implements Stepper {
     this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true));
   }
 
-  /** The surface with its detail, and with texture coordinates if `detail` has them: the same live object always. */
+  /**
+   * The surface with its detail, and with texture coordinates if `detail` has them: the same live {@link Mesh} from
+   * start to end, which shows the current state.
+   */
   get mesh(): Mesh {
     return this.#meshes[0] as Mesh;
   }
 
-  /** The deformed low-frequency surface without the detail; live. */
+  /** The deformed low-frequency surface without the detail, as a live mesh that shows the current state. */
   get baseMesh(): Mesh {
     return this.#meshes[1] as Mesh;
   }
 
   /**
-   * The map T: the vertices of {@link MultiresolutionModel.baseMesh} at their corresponding positions on the undeformed
-   * base; live. It may fold.
+   * The map T from the deformed to the undeformed base, as a live mesh: the vertices of
+   * {@link MultiresolutionModel.baseMesh} at their corresponding positions on the undeformed base. It may fold over.
    */
   get linkMesh(): Mesh {
     return this.#meshes[2] as Mesh;
@@ -138,14 +147,14 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Current ellipsoids, between their previous positions and their targets; a copy. Removed ones that are still
-   * shrinking come last.
+   * Copy of the current control ellipsoids, between their previous positions and their targets. Removed ones that are
+   * still shrinking come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
   }
 
-  /** Targets of the ellipsoids; a copy. */
+  /** Copy of the targets of the control ellipsoids, as set by {@link MultiresolutionModel.setEllipsoids}. */
   get targets(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.targets()));
   }
@@ -184,10 +193,10 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Sets new targets for the ellipsoids, by index; each step moves, rotates and resizes them by a limited amount, their
-   * centres by at most half of their shortest semi-axis (or of their target's, if longer). Additional ellipsoids grow
-   * from a fraction of their size, or out of the nearest existing one if they lie outside the surface; those omitted
-   * shrink and vanish.
+   * Sets new targets for the control ellipsoids, matched by index; each step moves, rotates and resizes them by a
+   * limited amount, their centres by at most half of their shortest semi-axis (or of their target's, if longer).
+   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside
+   * the surface; those omitted shrink and vanish.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid: none at all, axes that are not orthogonal or
    *   have no length, or tips too sharp for `edgeMax`; nothing has changed then.
@@ -237,7 +246,7 @@ export class MultiresolutionModel implements Stepper {
 
   /**
    * Solves a copy of the low-frequency surface for the current ellipsoids, and returns its mesh on each level of the
-   * solver, from coarse to fine.
+   * multi-level solver, from coarse to fine, to show how it works.
    */
   levelMeshes(): Mesh[] {
     const levels = this.#handle.use((raw) => raw.levelMeshes());
@@ -265,8 +274,8 @@ export class MultiresolutionModel implements Stepper {
   /**
    * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays unchanged;
-   *   `invalid-argument` while a run is in progress.
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a model made of the same meshes;
+   *   the model then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

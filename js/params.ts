@@ -6,22 +6,22 @@ import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingP
 export interface ParamSpec {
   /** Name of the property in the method's parameters. */
   name: string;
-  /** Short label of the control. */
+  /** Short label of a control for the parameter. */
   label: string;
-  /** Description in one sentence, for students. */
+  /** Description of the parameter in one sentence, for students. */
   help: string;
-  /** Symbol in the paper: 'αc', 'πI', 'δ', 'τ'. */
+  /** Symbol of the parameter in the paper of the method, such as 'αc' or 'πI'. */
   symbol?: string;
   type: 'number' | 'integer' | 'boolean' | 'choice';
   default: unknown;
   min?: number;
   max?: number;
-  /** Suggested step of a slider. */
+  /** Suggested step of a slider for the parameter. */
   step?: number;
-  /** How values are spread over a slider. */
+  /** How values of the parameter are spread over a slider. */
   scale?: 'linear' | 'log';
   unit?: string;
-  /** Accepted words, for type 'choice'; if `min` is set, numbers are accepted, too. */
+  /** Accepted words for a parameter of type 'choice'; if `min` is set, numbers are accepted, too. */
   choices?: string[];
 }
 

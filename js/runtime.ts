@@ -3,7 +3,10 @@ import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
 import { defaultModule } from './module.js';
 import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
-/** Sources of the WebAssembly module: its address, a response, its bytes, or the compiled module. */
+/**
+ * Source from which {@link init} loads the WebAssembly module: its address, a response, its bytes, or the compiled
+ * module.
+ */
 export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
 
 let starting: Promise<unknown> | undefined;
@@ -111,8 +114,8 @@ export class Handle<Raw extends { free(): void }> {
   }
 
   /**
-   * Calls `work` with the raw object and returns its result. Throws `freed` if the object was freed, or lost in a
-   * crash.
+   * Calls `work` with the owned WebAssembly object and returns its result. Throws `freed` if the object was freed, or
+   * lost in a crash.
    */
   use<T>(work: (raw: Raw) => T): T {
     const raw = this.#raw;

@@ -1,9 +1,9 @@
 import { checkProperties, integer, invalid, positive } from './check.js';
 import type { Mesh } from './mesh.js';
 
-/** State of a method after one step, or several together, and the events during them. */
+/** State of a model after one step, or several together, and the events during them. */
 export interface StepReport {
-  /** Number of iterations since the start. */
+  /** Number of iterations that the model has run since its start. */
   iteration: number;
   /** Whether the method has finished. */
   done: boolean;
@@ -14,7 +14,7 @@ export interface StepReport {
   /**
    * Convergence measure: mean kinetic energy (deformable model), relative residual of the linear system (implicit
    * surface), root mean square displacement in target edges (multiresolution model), or mean final correction of the
-   * newest frame, world units (tracker). May be NaN before there is one.
+   * newest frame, world units (tracker). May be NaN before the first value.
    */
   residual: number;
   /** Value below which `residual` counts as converged. */
@@ -38,7 +38,7 @@ export interface StepReport {
     vanished: number;
     seeds: number;
   };
-  /** Durations of the parts of the last step, milliseconds: forces, motion, normals, topology, and so on. */
+  /** Durations of the parts of the last step by name (forces, motion, normals, topology, and so on), milliseconds. */
   times: Record<string, number>;
 }
 
@@ -56,17 +56,17 @@ export interface RunOptions {
    * interrupted.
    */
   budgetMs?: number;
-  /** Called after every iteration. If it throws, the run ends and rejects with that error. */
+  /** Called with the report of every iteration. If it throws, the run ends and rejects with that error. */
   onStep?: (report: StepReport) => void;
 }
 
 /** Interface that the models of all four methods implement. */
 export interface Stepper {
-  /** The surface: the same live object from start to end. */
+  /** The model's surface: the same live {@link Mesh} from start to end, which shows the current state. */
   readonly mesh: Mesh;
   /** Runs up to `iterations` iterations, synchronous and deterministic; fewer if the method finishes earlier. */
   step(iterations?: number): StepReport;
-  /** Runs to the end, yielding to the event loop between slices. */
+  /** Runs the model to its end, yielding to the event loop between slices of work. */
   run(options?: RunOptions): Promise<StepReport>;
   /** Changes any subset of the parameters of the live model. All values are validated before any is set. */
   setParams(params: Record<string, unknown>): void;
@@ -74,9 +74,9 @@ export interface Stepper {
   readonly params: Record<string, unknown>;
   /** Saves the whole state. Bit-exact: restore(save()) then step() equals step(). */
   save(): Uint8Array;
-  /** Restores a saved state. */
+  /** Restores a state from {@link Stepper.save}. */
   restore(state: Uint8Array): void;
-  /** Frees the memory. */
+  /** Frees the memory of the model, which cannot be used afterwards. */
   free(): void;
 }
 
@@ -99,14 +99,14 @@ class EventLoopYield {
     });
   }
 
-  /** Closes the channel; an open one keeps Node from exiting. */
+  /** Closes the message channel; an open one keeps Node from exiting. */
   close(): void {
     this.#channel.port1.close();
   }
 }
 
 /**
- * Calls `work` until it returns a value, and resolves with that, yielding to the event loop after each slice of
+ * Calls `work` until it returns a value, and resolves with that value, yielding to the event loop after each slice of
  * `budgetMs` milliseconds. Rejects with any error of `work`, and with `signal.reason` when the signal aborts.
  */
 export async function runInSlices<T extends object>(
@@ -131,18 +131,20 @@ export async function runInSlices<T extends object>(
   }
 }
 
-/** Runs a model to its end in slices, and allows one run at a time. */
+/** Runs a model to its end in slices of work, and allows one run of the model at a time. */
 export class Runner {
   #running = false;
 
-  /** Throws `invalid-argument` during a run; guards methods that would interfere with it. */
+  /**
+   * Throws `invalid-argument` naming `what` during a run; called by methods of the model that would interfere with one.
+   */
   refuseWhileRunning(what: string): void {
     if (this.#running) throw invalid(what, 'not allowed during a run of this model: abort it, or wait for its end');
   }
 
   /**
-   * Steps until the model is done, the run is aborted, or `maxIterations` is reached; returns the last report. See
-   * {@link RunOptions}.
+   * Calls `step` until the model is done, the run is aborted, or `maxIterations` is reached; returns the last report.
+   * See {@link RunOptions}.
    */
   async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
     const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
@@ -164,7 +166,7 @@ export class Runner {
   }
 }
 
-/** Validates the options of a run; throws `invalid-argument`. */
+/** Returns the options of a run once they are checked; throws `invalid-argument` for an unknown or wrong one. */
 export function checkedRun(given: RunOptions | undefined): RunOptions {
   const run = checkProperties<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)

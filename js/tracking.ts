@@ -12,9 +12,11 @@ export interface TrackingParams {
    * than this for a boundary, intensity units; by default, or if 0, derived from the noise and the intensity range.
    */
   threshold?: number;
-  /** k: the window for clustering is 2k + 1 voxels wide along each axis. */
+  /** k: the window in which voxels are clustered into bright and dark ones is 2k + 1 voxels wide along each axis. */
   window?: number;
-  /** Number of frames before and after that a window covers; 0 treats each frame separately. */
+  /**
+   * Number of frames before and after its own that a window of clustered voxels covers; 0 treats each frame separately.
+   */
   windowFrames?: number;
   /**
    * Radius around a position beyond which boundary points have no weight θ in the plane fitted there, world units: 2h;
@@ -24,7 +26,8 @@ export interface TrackingParams {
   /** Time scale c: the distance that one frame counts as, world units; by default, or if 0, derived from the radius. */
   timeScale?: number;
   /**
-   * Damping β: each step of a projection is scaled by this factor relative to the one before, down to 0.2 of the first.
+   * Damping β: each step of the projection of a vertex onto the boundary is scaled by this factor relative to the one
+   * before, down to 0.2 of the first.
    */
   damping?: number;
   /** c_min: edges shorter than this are collapsed, in units of the first frame's mean edge. */
@@ -32,8 +35,8 @@ export interface TrackingParams {
   /** c_max: edges longer than this are split, in units of the first frame's mean edge; more than twice `edgeMin`. */
   edgeMax?: number;
   /**
-   * Whether each frame starts from a prediction by the surface's motion in the one before; else from the previous
-   * surface.
+   * Whether tracking in each frame starts from a prediction, by the surface's motion in the frame before; else it
+   * starts from the previous frame's surface.
    */
   prediction?: boolean;
   /**
@@ -56,43 +59,46 @@ export interface TrackingOptions {
   /** Region to process as in `box`, but given by its first and last voxel along x, y and z, both inclusive. */
   voxels?: { min: Vec3; max: Vec3 };
   /**
-   * Component to track: the largest of the first frame (the default), or the one that encloses a point in world space,
-   * or has the vertex nearest to it.
+   * Connected component of the surface to track: the largest in the first frame (the default), or the one that encloses
+   * a point in world space, or has the vertex nearest to it.
    */
   component?: 'largest' | Vec3;
   /**
-   * Initial surface in the first frame, closed and without self-intersections, in world space; instead of extracting
-   * it.
+   * Initial surface in the first frame, closed and without self-intersections, in world space; by default it is
+   * extracted from the image.
    */
   start?: Mesh;
-  /** Parameters: any subset; the others are derived from the volume. */
+  /** Initial parameters: any subset; the others have their defaults, some of which are derived from the volume. */
   params?: TrackingParams;
 }
 
-/** Statistics of one tracked frame. */
+/** Statistics of the surface in one tracked frame, as listed by {@link SurfaceTracker.statistics}. */
 export interface FrameStatistics {
-  /** Enclosed volume, world units cubed. */
+  /** Volume enclosed by the surface, world units cubed. */
   volume: number;
   /** Surface area, world units squared. */
   area: number;
   triangles: number;
-  /** Number of triangles that face away from the sum of their three neighbours. */
+  /** Number of triangles that stay folded: they face away from the sum of the normals of their three neighbours. */
   folded: number;
   /**
-   * Number of rejected projections, which found too few boundary points or only a plane nearly parallel to the frame,
-   * or moved too far; these vertices follow their neighbours.
+   * Number of rejected projections of vertices onto the boundary, which found too few boundary points or only a plane
+   * nearly parallel to the frame, or moved too far; these vertices follow their neighbours.
    */
   rejected: number;
   /** Number of vertex displacements reduced to avoid self-intersections. */
   heldMoves: number;
   /**
-   * Number of vertices without boundary points: collapsed where a narrow gap has closed, grown where one has opened,
-   * else smoothed.
+   * Number of vertices without boundary points nearby: collapsed where a narrow gap has closed, grown where one has
+   * opened, else smoothed.
    */
   withoutBoundary: number;
-  /** Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together. */
+  /**
+   * Mean number of projection steps per vertex, in the projections onto the boundary in space-time and in the frame
+   * together.
+   */
   steps: number;
-  /** Mean displacement of the vertices by the last projection, world units. */
+  /** Mean displacement of the vertices by the last projection onto the boundary, world units. */
   meanFinalCorrection: number;
 }
 
@@ -147,8 +153,8 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * The surface of the current frame: the same live object always. Before the first frame is done it is the start, or
-   * empty.
+   * The surface of the current frame: the same live {@link Mesh} from start to end. Before the first frame is done it
+   * is the initial surface given as `start`, or empty.
    */
   get mesh(): Mesh {
     return this.#mesh;
@@ -173,8 +179,8 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Cycle closure error of a cyclic sequence, when all frames are done: the mean distance between the last frame's
-   * surface, tracked on into the first frame, and the first frame's surface, world units.
+   * Cycle closure error of a cyclic sequence, undefined until all frames are done: the mean distance between the last
+   * frame's surface, tracked on into the first frame, and the first frame's surface, world units.
    */
   get cycleClosureError(): number | undefined {
     return this.#statistics().cycleClosureError;
@@ -203,9 +209,9 @@ export class SurfaceTracker implements Stepper {
    * synchronous and deterministic; fewer if the tracker finishes earlier.
    *
    * @returns The last report, with the events of all steps.
-   * @throws {@link VesicleError} `invalid-argument`: `threshold` where no boundary is found, with the largest
-   *   difference there is; `box` where no surface is in the first frame; while a {@link SurfaceTracker.run} is in
-   *   progress. `too-large`.
+   * @throws {@link VesicleError} `invalid-argument`: naming `threshold`, and the value that it must be below, if no
+   *   boundary is found; naming `box` if there is no surface in the first frame; while a {@link SurfaceTracker.run} is
+   *   in progress. `too-large`.
    */
   step(iterations = 1): StepReport {
     integer('iterations', iterations, { min: 1 });
@@ -214,7 +220,7 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Runs to the last frame, yielding to the event loop between slices of one or more steps.
+   * Tracks the surface to the last frame, yielding to the event loop between slices of one or more steps.
    *
    * @returns The last report.
    * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker stays usable; any error
@@ -244,7 +250,8 @@ export class SurfaceTracker implements Stepper {
    * and the weight w, the fraction of windows that separate the two voxels of a face. A face between a voxel in this
    * frame and the same voxel in the next has t half a frame later.
    *
-   * @param frame - Default the newest with a boundary; a frame whose boundary is not found yet has no points.
+   * @param frame - Index of the frame; default the newest with a boundary. A frame whose boundary is not found yet has
+   *   no points.
    * @throws {@link VesicleError} `invalid-argument`: no such frame.
    */
   boundary(frame?: number): Float32Array {
@@ -256,7 +263,7 @@ export class SurfaceTracker implements Stepper {
   /**
    * Returns a copy of the surface in a frame.
    *
-   * @throws {@link VesicleError} `invalid-argument`: no such frame, or it is not done.
+   * @throws {@link VesicleError} `invalid-argument`: no such frame, or one that is not tracked yet.
    */
   meshAt(frame: number): Mesh {
     const [frames, , done] = this.#counts();
@@ -277,7 +284,7 @@ export class SurfaceTracker implements Stepper {
    * Encodes the frames tracked so far as an animated glb: one node per frame, shown in turn, each for the frame time of
    * the volume or 0.1 s.
    *
-   * @throws {@link VesicleError} `invalid-argument` where none is done; `too-large`.
+   * @throws {@link VesicleError} `invalid-argument` if no frame is tracked yet; `too-large`.
    */
   toGlb(): Uint8Array {
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
@@ -295,8 +302,8 @@ export class SurfaceTracker implements Stepper {
   /**
    * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a tracker, which then stays unchanged;
-   *   `invalid-argument` while a run is in progress.
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a tracker with the same volume,
+   *   box, component and start; the tracker then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

@@ -16,7 +16,7 @@ import { RawFrames, RawVolume } from './vesicle.js';
 /** Three numbers: a point, a direction, or one number for each of x, y and z. */
 export type Vec3 = [number, number, number];
 
-/** The typed arrays that voxels may be stored in. Voxels keep this type. */
+/** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
 export type VoxelArray =
   | Uint8Array
   | Int8Array
@@ -32,7 +32,7 @@ export type Space = 'RAS' | 'LPS';
 
 /** Constructor options of a {@link Volume}. */
 export interface VolumeInit {
-  /** One value per voxel: x fastest, then y, z, t. Copied once. */
+  /** Stored value of each voxel: x fastest, then y, z, t. Copied once. */
   data: VoxelArray;
   /** Number of voxels along x, y, z, and the number of frames of a 4D volume. */
   dims: Vec3 | [number, number, number, number];
@@ -59,10 +59,11 @@ const ELEMENTS = [
 ];
 
 /**
- * Returns the handle of a volume, for the other modules of the library; throws `invalid-argument` if it is no Volume.
+ * Returns the handle of the WebAssembly object behind a volume, for the other modules of the library; throws
+ * `invalid-argument` if `volume` is no {@link Volume}.
  */
 export let volumeHandle: (parameter: string, volume: Volume) => Handle<RawVolume>;
-/** Creates a volume from the raw one that `make` returns, for the other modules of the library. */
+/** Creates a volume that owns the WebAssembly object returned by `make`, for the other modules of the library. */
 export let wrapVolume: (make: () => RawVolume) => Volume;
 
 /**
@@ -97,7 +98,7 @@ export class Volume {
    * or `.mhd` and data), detected from the bytes. NIfTI files may be gzipped as a whole, the voxels of NRRD and
    * MetaImage compressed inside the file.
    *
-   * @param options - `data`: the payload of a detached header.
+   * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
    */
   static parse(bytes: Uint8Array, options: { data?: Uint8Array } = {}): Volume {

@@ -47,11 +47,15 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
 /**
- * Abort reason of tasks that the page aborts, since the reason itself is not sent; the page rejects with that reason.
+ * Reason with which the worker aborts tasks on request of the page. The page does not send its own reason, and rejects
+ * with that.
  */
 const ABORTED = new VesicleError('aborted', 'the run was aborted');
 
-/** Handles the page's requests in order, also between the slices of a run in progress. */
+/**
+ * The worker's side of the connection: handles the page's requests in order, also between the slices of a run in
+ * progress.
+ */
 class Host {
   readonly #post: Post;
   readonly #objects = new Map<number, Entry>();
@@ -103,7 +107,8 @@ class Host {
   }
 
   /**
-   * Resolves the target of a call and the kind of its member; throws unless the name is in the tables of the protocol.
+   * Returns the object or class that a call addresses, and the kind of the member called; throws unless the tables of
+   * the protocol list the member.
    */
   #find(on: Call['on'], name: string): { target: Record<string, unknown>; kind: string } {
     if (on === undefined) return { target: LIBRARY, kind: lookUp(FUNCTIONS, name) };
@@ -124,7 +129,9 @@ class Host {
     throw new VesicleError('invalid-argument', `${part}: not an object`);
   }
 
-  /** Copies the mesh into the page's buffers, which were transferred with the request and are transferred back. */
+  /**
+   * Runs `Mesh.copyTo` on the page's arrays, whose buffers were transferred with the request and are transferred back.
+   */
   #copyTo({ on, args }: Call): unknown {
     const { target } = this.#find(on, 'copyTo');
     const [arrays] = this.#incoming(args) as [MeshArrays];

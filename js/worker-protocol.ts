@@ -5,7 +5,7 @@ import type { ErrorCode } from './index.js';
 import type { StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
-/** A reference to an object in the worker, or to one of its live meshes. */
+/** A reference in a message to an object in the worker, or to one of its live meshes. */
 export interface Reference {
   /** Id of the object: above 0 if assigned by the page, below 0 if assigned by the worker. */
   readonly vesicle: number;
@@ -18,7 +18,10 @@ export interface Reference {
 export type Task =
   | { type: 'init'; module: BufferSource | WebAssembly.Module | string | undefined }
   | { type: 'make'; as: Reference; args: unknown[] }
-  /** Call of the method or property `name` of an object or class, or of a free function if `on` is undefined. */
+  /**
+   * Call of the method or property `name` of an object or class, or of a free function if `on` is undefined; `reports`
+   * requests reports of its progress.
+   */
   | { type: 'call'; on: Reference | ClassName | undefined; name: string; args: unknown[]; reports?: boolean };
 
 /** A message from the page to the worker. */
@@ -36,7 +39,7 @@ export type Report = StepReport | number;
 /** Methods that the page can abort, with the name of the listener option that receives their reports. */
 export const ABORTABLE = { run: 'onStep', coverage: 'onProgress' } as const;
 
-/** A serialised error, from which the page creates an equal one. */
+/** An error of the worker, serialised so that the page can create an equal one. */
 export type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
   | { kind: 'crash'; message: string; cause: Error | undefined }
@@ -63,8 +66,8 @@ const STEPPER = {
 } as const;
 
 /**
- * Kind of each member that may be accessed, by class: method, value or live mesh. Compilation fails if a name is
- * missing or superfluous.
+ * Kind of each member of an object in the worker that the page may access, by class: method, value or live mesh.
+ * Compilation fails if a name is missing or superfluous.
  */
 export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype']> } = {
   Volume: {
@@ -162,7 +165,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
   },
 };
 
-/** Static methods that may be called, by class. */
+/** Static methods that the page may call in the worker, by class. */
 export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N], 'prototype'>> } = {
   Volume: { parse: 'method', fromFrames: 'method' },
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
@@ -172,7 +175,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   MultiresolutionModel: {},
 };
 
-/** Free functions that may be called. */
+/** Free functions that the page may call in the worker. */
 export const FUNCTIONS: Names<FunctionName> = {
   version: 'method',
   paramSpecs: 'method',
@@ -181,8 +184,8 @@ export const FUNCTIONS: Names<FunctionName> = {
 };
 
 /**
- * Returns the entry `name` of one of the tables of what may be accessed. Throws `invalid-argument` if it has no own
- * entry of that name.
+ * Returns the entry `name` of a table of the members that the page may access. Throws `invalid-argument` if the table
+ * has no own entry of that name.
  */
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
@@ -195,7 +198,7 @@ export function isReference(value: object): value is Reference {
   return Object.hasOwn(value, 'vesicle') && Object.hasOwn(value, 'class');
 }
 
-/** Whether an object is plain, i.e. an instance of no class. */
+/** Whether an object is plain: an instance of no class. */
 export function isPlain(value: object): boolean {
   const prototype: unknown = Object.getPrototypeOf(value);
   // Objects of other windows have another Object.prototype, but it, too, has no prototype.

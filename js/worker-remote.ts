@@ -26,7 +26,7 @@ const markedForTransfer = new WeakSet<object>();
  * as an argument. Afterwards it is empty here, as is every other array on the same buffer, and cannot be passed again.
  *
  * @returns The value itself.
- * @throws {@link VesicleError} `invalid-argument` if it is not an object.
+ * @throws {@link VesicleError} `invalid-argument` if `value` is not an object.
  */
 export function transfer<T extends object>(value: T): T {
   if (value === null || typeof value !== 'object') throw invalid('value', 'must be a typed array or an object');
@@ -43,7 +43,7 @@ class RemoteState {
     readonly session: Session | undefined,
     /** The error that kept the request for the object's creation from being posted; undefined if it was posted. */
     readonly failed?: unknown,
-    /** For a live mesh: its model, which must not be collected while the mesh is used. */
+    /** For a live mesh: its model, which must not be garbage-collected while the mesh is used. */
     readonly owner?: Remote,
   ) {}
 }
@@ -71,7 +71,7 @@ class Remote {
     if (!state.owner) finalizers.register(this, state, state);
   }
 
-  /** Returns the proxy of the live mesh in property `name`, the same object at every call. */
+  /** Returns the proxy of the live mesh in the model's property `name`, the same object at every call. */
   part(name: string): Remote {
     const { reference, session, failed } = this.#state;
     const made = () =>
@@ -94,8 +94,8 @@ class Remote {
 }
 
 /**
- * Returns the session of a usable object. Throws if the object's creation failed, if it was freed, or if its worker
- * ended.
+ * Returns the session, the connection to the worker, of a proxy. Throws if the proxy cannot be used: its object was not
+ * created or was freed, or its worker ended.
  */
 function sessionOf(remote: Remote): Session {
   const { failed, session, reference, owner } = stateOf(remote);
@@ -106,15 +106,18 @@ function sessionOf(remote: Remote): Session {
   throw new VesicleError('freed', `this ${reference.class} was lost when its worker ended; make a new one`);
 }
 
-/** Returns the reference of a usable object; throws as `sessionOf`. */
+/**
+ * Returns the reference of a proxy, for messages to the worker; throws, as `sessionOf` does, if the proxy cannot be
+ * used.
+ */
 function referenceOf(remote: Remote): Reference {
   sessionOf(remote);
   return stateOf(remote).reference;
 }
 
 /**
- * Prepares arguments for posting: references instead of proxies, copies of typed arrays unless marked by `transfer`,
- * and the buffers to transfer.
+ * Prepares the arguments of a call for posting to the worker: references instead of proxies, copies of typed arrays
+ * unless marked by `transfer`, and the buffers to transfer.
  */
 function serialize(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuffer[] } {
   const buffers = new Set<ArrayBuffer>();
@@ -141,15 +144,18 @@ function unsendable(path: string, value: object): VesicleError {
 }
 
 /**
- * Returns an array to be transferred with its buffer, or a copy if it is empty; throws `invalid-argument` for shared
- * memory.
+ * Returns a typed array that can be transferred with its buffer to the worker: `array` itself, or a copy if it is
+ * empty; throws `invalid-argument` for shared memory.
  */
 function transferable(path: string, array: ArrayBufferView): ArrayBufferView {
   if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'shared memory cannot be transferred');
   return array.byteLength > 0 ? array : copyOfView(path, array);
 }
 
-/** Copies a typed array, without the rest of its buffer; throws `invalid-argument` if it was already transferred. */
+/**
+ * Copies a typed array for posting, without the rest of its buffer; throws `invalid-argument` if it was already
+ * transferred.
+ */
 function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
   try {
     // Works for all typed arrays, and copies also where a subclass's slice returns a view.
@@ -159,7 +165,7 @@ function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
   }
 }
 
-/** Replaces the references in a result by proxies. */
+/** Converts a result from the worker for the page: references become proxies. */
 function deserialize(value: unknown, session: Session): unknown {
   return mapObjects('', value, (_, found) => {
     if (isReference(found)) return new classes[found.class](new RemoteState(found, session));
@@ -168,7 +174,8 @@ function deserialize(value: unknown, session: Session): unknown {
 }
 
 /**
- * Posts a call of `name` on an object, on a class, or of a free function, to the worker, and resolves with its result.
+ * Posts a call of `name` on an object, on a class, or of a free function (`on` is undefined) to the worker, and
+ * resolves with its result.
  */
 async function post(
   session: Session,
@@ -195,8 +202,8 @@ async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknow
 type Listener = (report: Report) => void;
 
 /**
- * Runs an abortable method in the worker. Signal and listener stay on the page: the signal posts an abort message, the
- * listener is called with the reports received.
+ * Calls an abortable method, `run` or `coverage`, in the worker. Signal and listener stay on the page: the signal posts
+ * an abort message, the listener is called with the reports received.
  */
 async function abortable(
   remote: Remote,
@@ -226,7 +233,9 @@ async function abortable(
   }
 }
 
-/** Calls a listener; if it throws, the task is aborted, though the worker may be some steps ahead. */
+/**
+ * Calls the page's listener with a report; if it throws, aborts the task, though the worker may be some steps ahead.
+ */
 function notify(listener: Listener, report: Report, stop: AbortController): void {
   if (stop.signal.aborted) return;
   try {
@@ -251,7 +260,10 @@ async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
   return counts;
 }
 
-/** Requests the creation of an object of a class; an error is kept and thrown by every later use of the object. */
+/**
+ * Requests the creation of an object in the worker; if the request fails, every later use of the object fails with the
+ * same error.
+ */
 function make(name: ClassName, args: readonly unknown[]): { state: RemoteState; created: Promise<unknown> } {
   try {
     const session = currentSession();
@@ -296,7 +308,10 @@ function memberOf(name: string, kind: string): PropertyDescriptor {
   return { value: asMethod(call) };
 }
 
-/** Returns a function to be used as method or getter, which calls `work` with its object and its arguments. */
+/**
+ * Returns a function to be used as a method or getter, which calls `work` with the object it is called on and its
+ * arguments.
+ */
 function asMethod<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remote, ...args: unknown[]) => T {
   return function (this: Remote, ...args) {
     return work(this, args);
@@ -331,10 +346,10 @@ const classes = Object.fromEntries(
   Object.keys(MEMBERS).map((name) => [name, remoteClass(name as ClassName)]),
 ) as Record<ClassName, Class>;
 
-/** Proxy classes for the classes of the library, by name. */
+/** Proxy classes for the classes of the library, by name: the classes that `vesicle/worker` exports. */
 export const remoteClasses = classes as unknown as { readonly [N in ClassName]: RemoteClass<N> };
 
-/** Returns the proxy of a free function of the library. */
+/** Returns an asynchronous function that calls the free function `name` of the library in the worker. */
 export function remoteFunction<N extends FunctionName>(name: N): RemoteFunction<N> {
   const call = async (...args: unknown[]) => post(currentSession(), undefined, name, args);
   return call as unknown as RemoteFunction<N>;

@@ -2,7 +2,7 @@
 import { VesicleCrash, VesicleError } from './error.js';
 import type { Failure, Reply, Report, Request, Task } from './worker-protocol.js';
 
-/** The part of the worker class of `node:worker_threads` that is used. */
+/** The methods of the class `Worker` of `node:worker_threads` that the library uses. */
 export interface NodeWorker {
   postMessage(message: unknown, transfer: ArrayBuffer[]): void;
   terminate(): unknown;
@@ -15,18 +15,20 @@ interface PendingRequest {
   resolve: (value: unknown) => void;
   reject: (error: unknown) => void;
   onReport: ((report: Report) => void) | undefined;
-  /** The proxy of the object of the call, kept from garbage collection until the answer arrives. */
+  /** Proxy of the object that the request calls, kept from garbage collection until the answer arrives. */
   target: unknown;
 }
 
-/** Options of a request: buffers to transfer, the object of the call, and the listener of reports. */
+/**
+ * Options of a request to the worker: buffers to transfer, the proxy of the called object, and the listener of reports.
+ */
 interface RequestOptions {
   transfer?: ArrayBuffer[];
   target?: unknown;
   onReport?: ((report: Report) => void) | undefined;
 }
 
-/** A pending answer and the id of its request. */
+/** The promise of an answer from the worker, and the id of its request. */
 interface PendingAnswer {
   id: number;
   answer: Promise<unknown>;
@@ -49,7 +51,7 @@ export class Session {
     );
   }
 
-  /** The error with which the worker ended; undefined while it is usable. */
+  /** The error with which the worker ended; undefined while the worker is usable. */
   get ended(): Error | undefined {
     return this.#end;
   }
@@ -60,7 +62,10 @@ export class Session {
     return this.#last;
   }
 
-  /** Posts a task. Throws if the worker has ended or an argument cannot be sent; other failures reject the answer. */
+  /**
+   * Posts a task to the worker. Throws if the worker has ended or an argument cannot be sent; other failures reject the
+   * answer.
+   */
   post(task: Task, { transfer = [], target, onReport }: RequestOptions = {}): PendingAnswer {
     if (this.#end) throw this.#end;
     const id = this.nextId();
@@ -71,7 +76,7 @@ export class Session {
     return { id, answer };
   }
 
-  /** Aborts the run or the measurement requested under `id`, whose promise then rejects. */
+  /** Aborts the run or the coverage measurement requested under `id`, whose promise then rejects. */
   abort(id: number): void {
     if (!this.#end) this.#send({ type: 'abort', id }, []);
   }
@@ -81,7 +86,7 @@ export class Session {
     if (!this.#end) this.#send({ type: 'free', object }, []);
   }
 
-  /** Terminates the worker: all pending requests reject with the reason, and later ones throw it. */
+  /** Terminates the worker: all pending requests reject with `reason`, and later ones throw it. */
   end(reason: Error): void {
     if (this.#end) return;
     this.#end = reason;

@@ -7,7 +7,10 @@ import { type NodeWorker, Session } from './worker-session.js';
 
 /** Options of {@link init} of `vesicle/worker`. */
 export interface WorkerInit {
-  /** The module, its bytes or its address, as in `vesicle`. By default the worker loads the `.wasm` beside itself. */
+  /**
+   * The compiled WebAssembly module, its bytes or its address, as in `vesicle`. By default the worker loads the `.wasm`
+   * beside itself.
+   */
   module_or_path?: InitInput | Promise<InitInput>;
   /**
    * A new worker that runs `vesicle/worker-host`, where this library cannot create one: for bundlers that do not
@@ -48,7 +51,7 @@ export function terminate(): void {
   session?.end(terminated());
 }
 
-/** Returns the session of the current worker; throws `invalid-argument` before {@link init}. */
+/** Returns the session, the connection to the current worker; throws `invalid-argument` before {@link init}. */
 export function currentSession(): Session {
   if (session) return session;
   throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
@@ -76,14 +79,17 @@ async function start(given: WorkerInit, own: number): Promise<void> {
   await started.post({ type: 'init', module }).answer;
 }
 
-/** Ends the session after a failed start; a later call of `init` tries again. */
+/** Ends the session with the worker after a failed start; a later call of `init` tries again. */
 function resetAfterFailure(error: unknown): void {
   starting = undefined;
   session?.end(error instanceof Error ? error : new Error(String(error)));
   session = undefined;
 }
 
-/** Converts the module source into a form that can be posted; relative addresses are resolved against the page. */
+/**
+ * Converts the source of the WebAssembly module into a form that can be posted to the worker; relative addresses are
+ * resolved against the page.
+ */
 async function sendable(source: InitInput | undefined): Promise<Extract<Task, { type: 'init' }>['module']> {
   if (source === undefined || source instanceof WebAssembly.Module) return source;
   if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return source;

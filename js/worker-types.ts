@@ -2,7 +2,7 @@
 // cannot diverge.
 import type * as vesicle from './index.js';
 
-/** The exports of `vesicle`. */
+/** The exports of `vesicle`, from which the types of `vesicle/worker` are derived. */
 export type Library = typeof vesicle;
 
 type Callable = (...args: never) => unknown;
@@ -24,22 +24,22 @@ export type FunctionName = Exclude<
   'default' | 'initSync'
 >;
 
-/** Any object of the library, as it exists in the worker. */
+/** Any volume, mesh or model of the library, as it exists in the worker. */
 export type LibraryObject = Library[ClassName]['prototype'];
 
-/** A `Volume` of the library, in the worker. */
+/** Proxy of a `Volume` in the worker; its methods and properties return promises. */
 export interface Volume extends Remote<vesicle.Volume> {}
-/** A `Mesh` of the library, in the worker. */
+/** Proxy of a `Mesh` in the worker; its methods and properties return promises. */
 export interface Mesh extends Remote<vesicle.Mesh> {}
-/** A `DeformableModel` of the library, in the worker. */
+/** Proxy of a `DeformableModel` in the worker; its methods and properties, except live meshes, return promises. */
 export interface DeformableModel extends Remote<vesicle.DeformableModel> {}
-/** An `ImplicitSurface` of the library, in the worker. */
+/** Proxy of an `ImplicitSurface` in the worker; its methods and properties, except live meshes, return promises. */
 export interface ImplicitSurface extends Remote<vesicle.ImplicitSurface> {}
-/** A `MultiresolutionModel` of the library, in the worker. */
+/** Proxy of a `MultiresolutionModel` in the worker; its methods and properties, except live meshes, return promises. */
 export interface MultiresolutionModel extends Remote<vesicle.MultiresolutionModel> {}
-/** A `SurfaceTracker` of the library, in the worker. */
+/** Proxy of a `SurfaceTracker` in the worker; its methods and properties, except live meshes, return promises. */
 export interface SurfaceTracker extends Remote<vesicle.SurfaceTracker> {}
-/** Interface that all four models in the worker implement. */
+/** Interface of the proxies of all four models in the worker. */
 export interface Stepper extends Remote<vesicle.Stepper> {}
 
 interface Remotes {
@@ -64,8 +64,8 @@ type SwapRemotes<T> = T extends LibraryObject
       : T;
 
 /**
- * The type T with remote objects in place of the library's. A type that contains none of them is T itself, so that it
- * keeps its name.
+ * The type T with the proxies of `vesicle/worker` in place of the library's volumes, meshes and models. A type that
+ * contains none of these is T itself, so that it keeps its name.
  */
 export type WithRemotes<T> = [T, SwapRemotes<T>] extends [SwapRemotes<T>, T] ? T : SwapRemotes<T>;
 
@@ -94,10 +94,10 @@ export type Remote<T> = {
   [Symbol.dispose](): void;
 };
 
-/** Proxy of a free function that runs in the worker. */
+/** Asynchronous form of a free function of the library, which runs in the worker. */
 export type RemoteFunction<N extends FunctionName> = Member<Library[N]>;
 
-/** Proxy of a class whose objects live in the worker. */
+/** Proxy of a class of the library whose objects live in the worker. */
 export type RemoteClass<N extends ClassName> = {
   readonly [K in keyof Library[N] as Exclude<K, 'prototype'>]: Member<Library[N][K]>;
 } & Constructor<Library[N]>;
@@ -107,11 +107,11 @@ type Constructor<C> = C extends new (
 ) => infer I
   ? {
       /**
-       * Returns an object at once, before it is created in the worker; if that fails, every promise of the object
-       * rejects.
+       * Returns a proxy at once, before its object is created in the worker; if the creation fails, every promise of
+       * the proxy rejects.
        */
       new (...args: Arguments<A>): WithRemotes<I>;
-      /** Resolves with an object once it is created in the worker; rejects if the creation fails. */
+      /** Resolves with a proxy once its object is created in the worker; rejects if the creation fails. */
       create(...args: Arguments<A>): Promise<WithRemotes<I>>;
     }
   : // For classes without a public constructor; only for `instanceof`.

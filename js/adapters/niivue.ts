@@ -12,7 +12,7 @@ import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxe
 
 export type { MeshSource } from './source.js';
 
-/** The properties used of a volume of NiiVue, `nv.volumes[i]`. */
+/** The properties of a NiiVue volume, such as `nv.volumes[0]`, that {@link volumeFromNiivue} reads. */
 export interface NiivueVolume {
   /** Voxels in the order of the file. */
   img?: unknown;
@@ -70,15 +70,15 @@ function secondsBetween(hdr: { pixDims: number[]; xyzt_units: number }, frames: 
   return frames > 1 && seconds > 0 && Number.isFinite(seconds) ? { frameSeconds: seconds } : {};
 }
 
-/** The methods used of a `Niivue`, called `NiiVueGPU` in 1.0. */
+/** The members of NiiVue's class `Niivue` (`NiiVueGPU` in 1.0) that {@link NiivueSurface} uses. */
 export interface Niivue {
   addMesh(mesh: object): unknown;
-  /** Removes a mesh, given by itself in 0.69 and by its index in `meshes` in 1.0. */
+  /** Removes a mesh from NiiVue, given by itself in 0.69 and by its index in `meshes` in 1.0. */
   removeMesh(mesh: object | number): unknown;
   readonly meshes: readonly object[];
 }
 
-/** Constructor of NiiVue's `NVMesh`, 0.69. */
+/** Constructor of the class `NVMesh` of NiiVue 0.69, which {@link NiivueSurface} needs there. */
 export type NVMeshClass = new (
   pts: Float32Array<ArrayBuffer>,
   tris: Uint32Array<ArrayBuffer>,
@@ -91,11 +91,11 @@ export type NVMeshClass = new (
 
 /** Options of {@link NiivueSurface}. */
 export interface NiivueSurfaceOptions {
-  /** NiiVue's class of this name; required by 0.69, not used by 1.0. */
+  /** The class `NVMesh` of NiiVue; required by NiiVue 0.69, not used by 1.0. */
   NVMesh?: NVMeshClass;
-  /** Name in NiiVue's list of meshes; default 'vesicle'. */
+  /** Name of the surface in NiiVue's list of meshes; default 'vesicle'. */
   name?: string;
-  /** Colour as rgba, 0..1; default a warm white. Vertex colours of the mesh replace its rgb. */
+  /** Colour of the surface as rgba, 0..1; default a warm white. Vertex colours of the mesh replace its rgb. */
   color?: readonly [number, number, number, number];
   /** World space of the mesh, which is that of its volume; default RAS, as in NiiVue. */
   space?: Space;
@@ -114,6 +114,8 @@ export class NiivueSurface {
   readonly #adapter: MeshAdapter;
 
   /**
+   * Creates a surface that NiiVue shows from the first update on.
+   *
    * @param nv - A NiiVue attached to its canvas.
    * @throws `VesicleError` `invalid-argument`: no NiiVue, one without a canvas, or 0.69 without `NVMesh`.
    */
@@ -129,13 +131,14 @@ export class NiivueSurface {
     else throw invalid('NVMesh', "NiiVue 0.69 needs its class: import { Niivue, NVMesh } from '@niivue/niivue'");
   }
 
-  /** The mesh in NiiVue's list, `nv.meshes`; undefined before the first update. */
+  /** The mesh in NiiVue's list `nv.meshes` that shows the surface; undefined before the first update. */
   get mesh(): object | undefined {
     return this.#adapter.mesh;
   }
 
   /**
-   * Updates NiiVue's mesh if the mesh has changed since the last call; draw to show it. Resolves with whether it has.
+   * Updates NiiVue's mesh if `mesh` has changed since the last call; draw to show it. Resolves with whether `mesh` had
+   * changed.
    *
    * The work is done synchronously and the promise resolves at once, except in 1.0 on the first call, and with WebGPU
    * possibly on each: there NiiVue uploads its volumes again, too.
@@ -169,8 +172,8 @@ interface MeshAdapter {
 }
 
 /**
- * Returns four bytes a vertex, rgba: rgb are the vertex colours if the mesh has them, else those of `color`; alpha is
- * always that of `color`.
+ * Returns the colours of the vertices for NiiVue, four bytes each, rgba: rgb are the vertex colours if the mesh has
+ * them, else those of `color`; alpha is always that of `color`.
  */
 function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array((positions.length / 3) * 4);
@@ -183,7 +186,7 @@ function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uin
   return bytes;
 }
 
-/** The properties used of an `NVMesh` of 0.69. */
+/** The properties of an `NVMesh` of NiiVue 0.69 that the adapter reads or sets. */
 interface Mesh069 {
   pts: Float32Array;
   tris: Uint32Array;
@@ -259,7 +262,7 @@ class Niivue069 implements MeshAdapter {
   }
 }
 
-/** Packs vertex records for 0.69, 20 bytes each: position, normal in signed bytes, colour. */
+/** Packs the vertex records of NiiVue 0.69's vertex buffer, 20 bytes each: position, normal in signed bytes, colour. */
 function vertexRecords069({ positions, normals }: SurfaceArrays, rgba: Uint8Array): ArrayBuffer {
   const vertices = positions.length / 3;
   const buffer = new ArrayBuffer(20 * vertices);
@@ -288,7 +291,7 @@ function furthest(positions: Float32Array): number {
   return Math.sqrt(most);
 }
 
-/** The properties used of a mesh of 1.0. */
+/** The properties of a mesh of NiiVue 1.0 that the adapter reads or sets. */
 interface Mesh10 {
   positions: Float32Array;
   indices: Uint32Array;
@@ -301,7 +304,7 @@ interface Mesh10 {
   perVertexColors: Uint32Array | null;
 }
 
-/** WebGL buffers of a mesh in the view of 1.0. */
+/** WebGL buffers of a mesh in the view of NiiVue 1.0. */
 interface Buffers10 {
   vao: WebGLVertexArrayObject | null;
   vertexBuffer: WebGLBuffer | null;
@@ -309,7 +312,7 @@ interface Buffers10 {
   indexCount: number;
 }
 
-/** The view of 1.0 with its private properties; some are missing with WebGPU. */
+/** The view of NiiVue 1.0 with its private properties; some are missing with WebGPU. */
 interface View10 {
   gl?: WebGL2RenderingContext | null;
   meshResources?: Map<object, Buffers10>;
@@ -346,8 +349,8 @@ class Niivue10 implements MeshAdapter {
   }
 
   /**
-   * Returns NiiVue's own WebGL buffers of `mesh`, which still has its previous arrays, if the size of the vertex buffer
-   * matches the record format of `vertexRecords10`; else undefined.
+   * Returns NiiVue's own WebGL buffers of `mesh`, which still has its previous arrays, for direct uploads, if the size
+   * of the vertex buffer matches the record format of `vertexRecords10`; else undefined.
    */
   #buffers(mesh: Mesh10): Buffers10 | undefined {
     const { gl, meshResources } = this.#view;
@@ -407,7 +410,7 @@ class Niivue10 implements MeshAdapter {
   }
 }
 
-/** Packs vertex records for 1.0, 28 bytes each: position, normal, colour. */
+/** Packs the vertex records of NiiVue 1.0's vertex buffer, 28 bytes each: position, normal, colour. */
 function vertexRecords10({ positions, normals }: SurfaceArrays, colors: Uint32Array): ArrayBuffer {
   const buffer = new ArrayBuffer(28 * colors.length);
   const [floats, words] = [new Float32Array(buffer), new Uint32Array(buffer)];

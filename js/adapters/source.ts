@@ -8,25 +8,25 @@ import type { Space, Vec3, VolumeInit, VoxelArray } from '../volume.js';
  * counters.
  */
 export interface MeshSource {
-  /** Counter that increases when the connectivity changes. */
+  /** Counter that increases when the connectivity changes, so that adapters know when to update the triangles. */
   readonly topologyVersion: number;
-  /** Counter that increases when any vertex moves. */
+  /** Counter that increases when any vertex moves, so that adapters know when to update the positions. */
   readonly geometryVersion: number;
   /** Returns the surface in its present state. */
   arrays(): MeshArrays;
   /**
-   * Copies the surface into the arrays of `out`, replacing those that are too small, and returns the counts written;
-   * used instead of `arrays` if present.
+   * Copies the surface into the arrays of `out`, replacing those that are too small, and returns the numbers of
+   * vertices and triangles written; used instead of `arrays` if present.
    */
   copyTo?(out: MeshArrays): { vertices: number; triangles: number };
 }
 
 /**
  * A surface ready to be shown, in the world space of the host (NiiVue, three.js or vtk.js). The arrays are valid until
- * the next read.
+ * the next {@link MeshReader.read}.
  */
 export interface SurfaceArrays extends MeshArrays {
-  /** Whether the connectivity has changed since the last read, or the mesh is another one. */
+  /** Whether the connectivity has changed since the last read, or no or another mesh was read then. */
   topology: boolean;
 }
 
@@ -68,7 +68,7 @@ export class MeshReader {
     return usedPart(this.#arrays, vertices, triangles);
   }
 
-  /** Forgets the mesh, so that the next read returns it in full. */
+  /** Forgets the mesh last read, so that the next read returns it in full. */
   clear(): void {
     this.#mesh = undefined;
   }
@@ -128,8 +128,8 @@ const ELEMENTS = [
 ];
 
 /**
- * Returns a host's voxels, one number each, as options of a `Volume`: `sizes` are the numbers along x, y and z, and the
- * number of frames follows from the length. Throws `invalid-argument` for other types and lengths.
+ * Returns a host's voxels, one number each, as options of a `Volume`: `sizes` are the numbers of voxels along x, y and
+ * z, and the number of frames follows from the length. Throws `invalid-argument` for other types and lengths.
  */
 export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit, 'data' | 'dims'> {
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
@@ -143,8 +143,8 @@ export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit
 }
 
 /**
- * Returns the column-major affine matrix from voxel index to world, given its columns and the position of the first
- * voxel.
+ * Returns the column-major affine matrix from voxel index to world, given its first three columns and the position of
+ * the first voxel.
  */
 export function affineOf(columns: readonly ArrayLike<number>[], origin: ArrayLike<number>): Float64Array {
   const column = (values: ArrayLike<number> | undefined, last: number) => [

@@ -12,17 +12,20 @@ import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxe
 
 export type { MeshSource } from './source.js';
 
-/** The properties used of a volume of three's `NRRDLoader`. */
+/** The properties of a volume of three's `NRRDLoader` that {@link volumeFromThree} reads. */
 export interface ThreeVolume {
   data: ArrayLike<number>;
   xLength: number;
   yLength: number;
   zLength: number;
-  /** Transform from index to world without the position of the first voxel; 3 x 3 where the volume was made by hand. */
+  /**
+   * Transform from voxel index to world without the position of the first voxel; 3 x 3 where the volume was made by
+   * hand.
+   */
   matrix: { elements: ArrayLike<number> };
 }
 
-/** The fields used of the file's header, as `NRRDLoader` parses them. */
+/** The fields of the header of an NRRD file, as parsed by `NRRDLoader`, that {@link volumeFromThree} reads. */
 interface Header {
   space?: string;
   vectors?: number[][];
@@ -96,14 +99,14 @@ function inSpace(name: string, vectors: number[][], origin: number[]): { affine:
   return { affine: affineOf(vectors.map(world), world(origin)), space };
 }
 
-/** The members used of a three.js `BufferAttribute`. */
+/** The members of a three.js `BufferAttribute` that the adapter uses. */
 interface Attribute {
   needsUpdate: boolean;
   clearUpdateRanges(): void;
   addUpdateRange(start: number, count: number): void;
 }
 
-/** The members used of a three.js `BufferGeometry`. */
+/** The members of a three.js `BufferGeometry` that the adapter uses. */
 interface Geometry {
   boundingSphere: object | null;
   boundingBox: object | null;
@@ -117,7 +120,7 @@ interface Vector {
   set(x: number, y: number, z: number): unknown;
 }
 
-/** The classes of three.js that are needed; the whole module, `THREE`, can be passed. */
+/** The classes of three.js that {@link ThreeSurface} needs; the whole module, `THREE`, can be passed. */
 export interface ThreeClasses {
   BufferGeometry: new () => Geometry;
   BufferAttribute: new (array: Float32Array | Uint32Array, itemSize: number) => Attribute;
@@ -125,12 +128,12 @@ export interface ThreeClasses {
   Box3: new () => { min: Vector; max: Vector };
 }
 
-/** An object with a geometry, usually a `Mesh` of three.js. */
+/** An object to which {@link ThreeSurface} gives its geometry, usually a `Mesh` of three.js. */
 export interface ThreeObject {
   geometry: Geometry;
 }
 
-/** Arrays of the mesh, each with its attribute name in three.js and its numbers per vertex. */
+/** Arrays of a mesh with values per vertex, each with its attribute name in three.js and its numbers per vertex. */
 const ATTRIBUTES = [
   ['positions', 'position', 3],
   ['normals', 'normal', 3],
@@ -138,7 +141,7 @@ const ATTRIBUTES = [
   ['colors', 'color', 3],
 ] as const;
 
-/** Capacity of new buffers as a multiple of their contents, so that they are seldom reallocated. */
+/** Capacity of new vertex and index buffers as a multiple of their contents, so that they are seldom reallocated. */
 const CAPACITY_FACTOR = 1.5;
 
 /**
@@ -161,6 +164,8 @@ export class ThreeSurface {
   #buffers: Buffers | undefined;
 
   /**
+   * Creates a surface whose geometry `object` receives at the first update.
+   *
    * @param three - The classes of three.js.
    * @param object - Receives the geometry; its previous geometry is not disposed of.
    * @param options - `space` of the mesh and `worldSpace` of the scene: if both are given and differ, the signs of x
@@ -178,8 +183,8 @@ export class ThreeSurface {
   }
 
   /**
-   * Updates the geometry if the mesh has changed since the last call; the next rendering uploads it. Returns whether it
-   * has.
+   * Updates the geometry if `mesh` has changed since the last call; the next rendering uploads it. Returns whether
+   * `mesh` had changed.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */
@@ -205,7 +210,10 @@ export class ThreeSurface {
   }
 }
 
-/** A geometry whose buffers have a larger capacity than their contents. */
+/**
+ * A three.js geometry whose buffers have a larger capacity than their contents, so that a growing mesh fits for a
+ * while.
+ */
 class Buffers {
   readonly geometry: Geometry;
   readonly #parts = new Map<keyof MeshArrays, { array: Float32Array | Uint32Array; attribute: Attribute }>();
@@ -232,7 +240,10 @@ class Buffers {
     this.#parts.set('indices', { array, attribute });
   }
 
-  /** Returns whether the buffers have the capacity for this surface, and exactly its set of attributes. */
+  /**
+   * Returns whether the buffers have the capacity for a surface, and exactly its set of attributes, so that they can be
+   * reused.
+   */
   fit(frame: MeshArrays): boolean {
     return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every((name) => {
       const [room, needed] = [this.#parts.get(name)?.array.length, frame[name]?.length];

@@ -11,7 +11,7 @@ import { affineOf, MeshReader, type MeshSource, type SurfaceArrays, voxels } fro
 
 export type { MeshSource } from './source.js';
 
-/** The methods used of a `vtkImageData`. */
+/** The methods of a `vtkImageData` of vtk.js that {@link volumeFromVtk} calls. */
 export interface VtkImage {
   getDimensions(): number[];
   getExtent(): number[];
@@ -19,13 +19,13 @@ export interface VtkImage {
   getPointData(): { getScalars(): { getData(): ArrayLike<number>; getNumberOfComponents(): number } | null };
 }
 
-/** The properties used of an itk-wasm `Image`. */
+/** The properties of an itk-wasm `Image` that {@link volumeFromItk} reads. */
 export interface ItkImage {
   imageType: { dimension: number; components: number; pixelType: string };
   size: ArrayLike<number>;
   spacing: ArrayLike<number>;
   origin: ArrayLike<number>;
-  /** Direction cosines, row-major. */
+  /** Direction cosines of the image axes, row-major, with one axis per column. */
   direction: ArrayLike<number | bigint>;
   data: unknown;
 }
@@ -88,7 +88,7 @@ interface DataArray {
   setData(values: Float32Array | Uint32Array, components?: number): void;
 }
 
-/** The methods used of a `vtkPolyData`. */
+/** The methods of a `vtkPolyData` of vtk.js that {@link VtkSurface} calls. */
 export interface VtkPolyData {
   getPoints(): DataArray;
   getPolys(): DataArray;
@@ -97,7 +97,7 @@ export interface VtkPolyData {
   delete(): void;
 }
 
-/** The classes of vtk.js that are needed: `{ vtkPolyData, vtkDataArray }`. */
+/** The classes of vtk.js that {@link VtkSurface} needs: `{ vtkPolyData, vtkDataArray }`. */
 export interface VtkClasses<P extends VtkPolyData> {
   vtkPolyData: { newInstance(): P };
   vtkDataArray: { newInstance(values: { name: string; numberOfComponents: number; values: Float32Array }): DataArray };
@@ -116,12 +116,14 @@ export interface VtkClasses<P extends VtkPolyData> {
  * normals.
  */
 export class VtkSurface<P extends VtkPolyData> {
-  /** Input of a `vtkMapper`; the same object from start to end. */
+  /** The surface as input of a `vtkMapper`; the same object from start to end. */
   readonly polyData: P;
   readonly #normals: DataArray;
   readonly #reader: MeshReader;
 
   /**
+   * Creates a surface that is empty before the first update.
+   *
    * @param vtk - The classes of vtk.js.
    * @param options - `space` of the mesh and `worldSpace` of the view: if both are given and differ, the signs of x and
    *   y are flipped.
@@ -142,8 +144,8 @@ export class VtkSurface<P extends VtkPolyData> {
   }
 
   /**
-   * Updates the poly data if the mesh has changed since the last call; the next rendering uploads it. Returns whether
-   * it has.
+   * Updates the poly data if `mesh` has changed since the last call; the next rendering uploads it. Returns whether
+   * `mesh` had changed.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */

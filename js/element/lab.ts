@@ -44,7 +44,7 @@ export class VesicleLab extends HTMLElement {
   #viewDirection: Vec3 = [0, -1, 0];
   #fitted = false;
 
-  /** The current state. */
+  /** Current state of the element, also in its attribute `data-state`. */
   get state(): LabState {
     return (this.dataset.state ?? 'loading') as LabState;
   }
@@ -70,7 +70,10 @@ export class VesicleLab extends HTMLElement {
     if (this.isConnected && this.#view !== undefined) void this.reset();
   }
 
-  /** Loads the file again and restarts the method with the current attributes; it then runs unless `paused` is set. */
+  /**
+   * Loads the file `src` again and restarts the method with the current attributes; it then runs unless `paused` is
+   * set.
+   */
   async reset(): Promise<void> {
     this.#close();
     const opening = ++this.#opening;
@@ -132,7 +135,7 @@ export class VesicleLab extends HTMLElement {
     if (this.state === 'running') this.#setState('paused', 'Paused.');
   }
 
-  /** Pauses and runs one step of the method; does nothing if it is done. */
+  /** Pauses and runs one step of the method; does nothing if the method is done. */
   async step(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'done') return;
@@ -144,7 +147,7 @@ export class VesicleLab extends HTMLElement {
     }
   }
 
-  /** Runs `steps` steps, dispatches the events, and shows the surface. */
+  /** Runs `steps` steps of the method, dispatches the element's events, and shows the surface. */
   async #runSteps(model: Stepper, steps: number): Promise<void> {
     const report = await model.step(steps);
     if (model !== this.#model) return;
@@ -186,7 +189,7 @@ export class VesicleLab extends HTMLElement {
   }
 }
 
-/** The elements in the shadow root: canvas, buttons and status line. */
+/** The elements in the shadow root of a `<vesicle-lab>`: canvas, buttons and status line. */
 class Parts {
   #canvas = canvas();
   readonly #play = document.createElement('button');
@@ -219,7 +222,7 @@ class Parts {
     root.append(this.#canvas, controls);
   }
 
-  /** Creates the view; without WebGL, shows a message instead and returns undefined. */
+  /** Creates the 3D view of the surface; without WebGL, shows a message instead and returns undefined. */
   makeView(): View | undefined {
     try {
       return new View(this.#canvas);

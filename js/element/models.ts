@@ -14,11 +14,11 @@ import {
   Volume,
 } from '../worker.js';
 
-/** Named initial surfaces of the deformable model. */
+/** Named initial surfaces of the deformable model that the attribute `start` accepts. */
 const STARTS = ['contour', 'enclosing'] as const;
 type StartName = (typeof STARTS)[number];
 
-/** The parsed attributes of the element and the bytes of its file. */
+/** The parsed attributes of a `<vesicle-lab>`, and the bytes of its file. */
 export interface Settings {
   bytes: Uint8Array;
   start: StartName;
@@ -27,7 +27,7 @@ export interface Settings {
   ellipsoids: ControlEllipsoid[];
 }
 
-/** A model, and in `from` the direction from the model to the initial position of the camera. */
+/** A model, and the direction `from` the model to the initial position of the camera. */
 export interface ModelWithView {
   model: Stepper;
   from: Vec3;
@@ -37,7 +37,8 @@ export interface ModelWithView {
 const FRONT: Vec3 = [-0.5, -1, 0.35];
 
 /**
- * Functions that create the model of each method from the settings; they free the volume or mesh that it was made from.
+ * Functions that create the model of each method from the settings of a `<vesicle-lab>`; they free the volume or mesh
+ * once the model is made of it.
  */
 export const MODELS = {
   deformable: ({ bytes, start, levels, params }: Settings): Promise<ModelWithView> =>
@@ -54,7 +55,7 @@ export const MODELS = {
   },
 };
 
-/** Creates a model from a volume file, with the camera in front of a patient, a little to their left. */
+/** Creates a model from a volume file, viewed with the camera in front of a patient, a little to their left. */
 function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<ModelWithView> {
   const made = async (volume: Volume): Promise<ModelWithView> => {
     const [model, space] = await Promise.all([make(volume), volume.space]);
@@ -83,7 +84,7 @@ export async function fetched(address: string): Promise<Uint8Array> {
 
 /**
  * Returns the initial surface that the attribute `start` names, `'contour'` if it is missing; throws `invalid-argument`
- * for others.
+ * for other names.
  */
 export function parseStart(name: string | null): StartName {
   const start = STARTS.find((one) => one === (name ?? 'contour'));

@@ -1,4 +1,4 @@
-/** Style sheet of the element; the page can override its colours, and style its parts. */
+/** Style sheet of the `<vesicle-lab>` element; the page can override its colours, and style its parts. */
 export const STYLE = `
   :host {
     display: grid;

@@ -6,10 +6,10 @@ import type { MeshArrays } from '../mesh.js';
 import type { Vec3 } from '../volume.js';
 
 const FIELD_OF_VIEW = 40;
-/** Upper bound of the device pixel ratio of the rendering. */
+/** Upper bound of the device pixel ratio at which a `<vesicle-lab>` renders its surface. */
 const MAX_PIXEL_RATIO = 2;
 
-/** Renders a surface with three.js whenever the surface or the camera has changed. */
+/** The 3D view of a `<vesicle-lab>`: renders a surface with three.js whenever the surface or the camera has changed. */
 export class View {
   readonly #renderer: THREE.WebGLRenderer;
   readonly #scene = new THREE.Scene();
@@ -26,7 +26,7 @@ export class View {
   #version = 0;
   #asked = 0;
 
-  /** Creates the view on a canvas; throws if WebGL is not available. */
+  /** Creates the view of a surface on a canvas; throws if WebGL is not available. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     const light = new THREE.DirectionalLight('#ffffff', 2.4);
@@ -43,7 +43,7 @@ export class View {
     this.#observer.observe(canvas);
   }
 
-  /** Updates the surface and requests a rendering. */
+  /** Shows a surface, given by its arrays, and requests a rendering. */
   show(arrays: MeshArrays): void {
     this.#version += 1;
     const source: MeshSource = { topologyVersion: this.#version, geometryVersion: this.#version, arrays: () => arrays };
@@ -51,7 +51,10 @@ export class View {
     this.#ask();
   }
 
-  /** Resets the flag of user interaction for a new surface, so that the camera is adjusted again. */
+  /**
+   * Prepares the view for a new surface: the camera may be adjusted automatically again, even if the user moved it
+   * before.
+   */
   begin(): void {
     this.#untouched = true;
   }

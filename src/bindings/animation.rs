@@ -6,7 +6,7 @@ use super::error::Failure;
 use super::mesh::RawMesh;
 use crate::io::AnimationWriter;
 
-/// Builder of an animated GLB that takes one frame at a time.
+/// The raw handle with which `animationGlb` builds an animated GLB file, one frame at a time.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawAnimation(AnimationWriter);
@@ -19,7 +19,7 @@ impl RawAnimation {
         RawAnimation::default()
     }
 
-    /// Appends a frame that shows the current state of a mesh.
+    /// Appends a frame that shows a mesh in its current state.
     pub fn add(&mut self, mesh: &RawMesh) -> Result<(), JsValue> {
         Ok(self.0.add(&mesh.triangles()).map_err(Failure::from)?)
     }

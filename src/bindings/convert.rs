@@ -83,8 +83,8 @@ pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
         .map_err(|error| Failure::invalid("result", &error.to_string()))
 }
 
-/// Returns a copy of `current` in which the properties of a JavaScript object replace those of the same names; used to
-/// set parameters.
+/// Returns a copy of `current` in which the properties of the JavaScript object `given` replace those of the same
+/// names; used to set parameters.
 ///
 /// Properties that are `undefined` are ignored.
 ///
@@ -111,12 +111,13 @@ pub fn with_overrides<T: Serialize + DeserializeOwned>(current: &T, given: &JsVa
     read("params", &all)
 }
 
-/// Returns a property of an object; undefined if it cannot be read.
+/// Returns a property of a JavaScript object; undefined if it cannot be read.
 fn property(object: &JsValue, name: &JsValue) -> JsValue {
     Reflect::get(object, name).unwrap_or(JsValue::UNDEFINED)
 }
 
-/// Deserialises an object; the error about a value of the wrong type names `parameter`.
+/// Deserialises a JavaScript object to a Rust value; a failure, as for a value of the wrong type, is reported as one of
+/// the argument `parameter`.
 fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Failure> {
     serde_wasm_bindgen::from_value(object.clone()).map_err(|error| {
         let problem = error.to_string().replace("f64", "a number");
@@ -124,7 +125,8 @@ fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Fai
     })
 }
 
-/// Returns the error about a parameter that does not exist, which lists those that do.
+/// Returns the failure about a parameter that does not exist; its message lists the names of `all`, the object of those
+/// that do.
 fn unknown(parameter: &str, all: &JsValue) -> Failure {
     let names = js_sys::Object::keys(all.unchecked_ref::<js_sys::Object>());
     let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();

@@ -17,56 +17,57 @@ use crate::methods::deformable::{
     Start, param_specs,
 };
 
-/// The start surface of a deformable model.
+/// The raw handle of a start surface, from which a deformable model begins.
 #[wasm_bindgen]
 pub struct RawStart(Start);
 
 #[wasm_bindgen]
 impl RawStart {
-    /// Returns the start from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level, without its
-    /// smallest parts; see [`Start::Contour`].
+    /// Returns the start `contour`: the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level, without
+    /// its smallest parts; see [`Start::Contour`].
     pub fn contour() -> RawStart {
         RawStart(Start::Contour)
     }
 
-    /// Returns the start from a rounded box around the voxels of the coarsest pyramid level that are brighter than π_I
-    /// (the parameter `iso`), or around the whole image; see [`Start::Enclosing`].
+    /// Returns the start `enclosing`: a rounded box around the voxels of the coarsest pyramid level that are brighter
+    /// than π_I (the parameter `iso`), or around the whole image; see [`Start::Enclosing`].
     pub fn enclosing() -> RawStart {
         RawStart(Start::Enclosing)
     }
 
-    /// Returns the start from a grid of `count` × `count` × `count` small spheres that fills the image.
+    /// Returns a start of `count` × `count` × `count` small spheres, in a grid that fills the image.
     pub fn bubbles(count: u32) -> RawStart {
         RawStart(Start::Bubbles(count))
     }
 
-    /// Returns the start from spheres of `radius`, in world units, at packed world points.
+    /// Returns a start of spheres of `radius`, in world units, around the points `seeds`, x, y and z of each in turn in
+    /// world space.
     pub fn seeds(seeds: &Float32Array, radius: f64) -> Result<RawStart, JsValue> {
         let points = points(seeds)?.into_iter().map(|seed| seed.as_dvec3()).collect();
         Ok(RawStart(Start::Seeds { points, radius }))
     }
 
-    /// Returns the start from the iso-surface of the coarsest pyramid level at intensity `iso`.
+    /// Returns a start from marching cubes: the iso-surface of the coarsest pyramid level at intensity `iso`.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(iso: f64) -> RawStart {
         RawStart(Start::MarchingCubes(iso))
     }
 
-    /// Returns the start from a copy of a mesh in world space, which must be closed and free of self-intersections.
+    /// Returns a start from a copy of a mesh in world space, which must be closed and free of self-intersections.
     pub fn mesh(mesh: &RawMesh) -> RawStart {
         RawStart(Start::Mesh(Rc::unwrap_or_clone(mesh.triangles())))
     }
 }
 
-/// Handle of a deformable model, which it shares with its live mesh.
+/// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
 
 #[wasm_bindgen]
 impl RawDeformable {
-    /// Creates a model of one frame of a volume, with a pyramid of `levels` levels. `edge` is the target edge length on
-    /// the finest level, in world units, derived from the volume if not given; properties of `params` replace the
-    /// defaults for that volume.
+    /// Creates a deformable model of one frame of a volume, with a pyramid of `levels` levels. `edge` is the target
+    /// edge length on the finest level, in world units, derived from the volume if not given; properties of `params`
+    /// replace the default parameters for that volume.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -88,8 +89,8 @@ impl RawDeformable {
         RawMesh(MeshKind::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
     }
 
-    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
-    /// all.
+    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step, with
+    /// the events of all these steps.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
         let mut report = model.step().map_err(Failure::from)?;
@@ -106,7 +107,7 @@ impl RawDeformable {
     }
 
     /// Adds the parts of the iso-surface at π_I of the current pyramid level that the model's surface lacks, unless its
-    /// topology is fixed; returns a report that counts them.
+    /// topology is fixed; returns a `StepReport` that counts them as `seeds`.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
         let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
@@ -120,12 +121,13 @@ impl RawDeformable {
         Ok(RawCoverageSurvey(Some(survey)))
     }
 
-    /// Returns all parameters.
+    /// Returns the current values of all parameters of the model, as a plain object.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Sets some parameters; all are validated together before any is changed.
+    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
+    /// together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
@@ -166,13 +168,13 @@ impl RawDeformable {
         self.0.borrow().speeds()
     }
 
-    /// Returns the complete state of the run, for `restore`.
+    /// Returns the state of the run as bytes, without the volume, from which `restore` continues it.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`, if this model has the same volume, frame and levels; the run then continues with
-    /// the same results, bit for bit.
+    /// Replaces the run by one that `save` returned, if this model has the same volume, frame and number of levels,
+    /// else fails; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -191,8 +193,8 @@ impl RawCoverageSurvey {
         self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
     }
 
-    /// Returns recall, precision and uncovered regions. All triangles must have been tested by `advance`; an error the
-    /// second time.
+    /// Returns the coverage: recall, precision and uncovered regions; to be called once, after `advance` has tested all
+    /// triangles. An error if it is called again.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
         let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "already finished"))?;
         Ok(to_js(&CoverageResult::from(survey.finish()))?)

@@ -22,7 +22,7 @@ impl Failure {
         Self { code, message: message.into() }
     }
 
-    /// Creates an `invalid-argument` failure; `parameter` is the name that the caller knows.
+    /// Creates an `invalid-argument` failure; `parameter` is the name of the argument in the TypeScript API.
     pub fn invalid(parameter: &str, problem: &str) -> Self {
         Self::new("invalid-argument", format!("{parameter}: {problem}"))
     }

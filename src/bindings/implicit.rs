@@ -17,18 +17,18 @@ use crate::methods::implicit::{
     Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, param_specs,
 };
 
-/// A point cloud read from a file.
+/// The raw handle of a point cloud that was read from a file.
 #[wasm_bindgen]
 pub struct RawPoints(PointCloud);
 
 #[wasm_bindgen]
 impl RawPoints {
-    /// Reads a point cloud from the bytes of a file.
+    /// Reads a point cloud from the bytes of a PLY, OBJ or text file.
     pub fn parse(file: &Uint8Array) -> Result<RawPoints, JsValue> {
         Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
     }
 
-    /// Returns the positions as packed xyz.
+    /// Returns the positions of the points as packed xyz.
     pub fn points(&self) -> Vec<f32> {
         packed(&self.0.points)
     }
@@ -44,14 +44,14 @@ impl RawPoints {
     }
 }
 
-/// A list of cameras, passed to an implicit surface.
+/// The raw handle of a list of cameras, whose images colour an implicit surface.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawCameras(Vec<Camera>);
 
 #[wasm_bindgen]
 impl RawCameras {
-    /// Creates an empty list.
+    /// Creates an empty list of cameras.
     #[wasm_bindgen(constructor)]
     pub fn new() -> RawCameras {
         Self::default()
@@ -74,7 +74,7 @@ impl RawCameras {
     }
 }
 
-/// Handle of an implicit surface, which it shares with its live mesh.
+/// The raw handle of the TypeScript class `ImplicitSurface`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
 
@@ -131,7 +131,7 @@ impl RawImplicit {
         Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
     }
 
-    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last.
+    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut surface = self.0.borrow_mut();
         let mut report = surface.step().map_err(Failure::from)?;
@@ -144,12 +144,13 @@ impl RawImplicit {
         Ok(to_js(&report)?)
     }
 
-    /// Returns all parameters.
+    /// Returns the current values of all parameters of the model, as a plain object.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Sets some parameters; all are validated together before any is changed.
+    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
+    /// together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut surface = self.0.borrow_mut();
@@ -158,8 +159,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Replaces all manual edits of the points: the positions of added points and of exterior points, x, y and z of
-    /// each in turn, and the indices of the input points to leave out.
+    /// Replaces all manual edits of the input points: the positions of added points and of exterior points (known to be
+    /// outside), x, y and z of each in turn, and the indices of the input points to leave out.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,
@@ -182,7 +183,7 @@ impl RawImplicit {
         self.0.borrow().edits().removed.clone()
     }
 
-    /// Returns the exterior points that were set manually, as packed xyz.
+    /// Returns the exterior points (known to be outside) that were set manually, as packed xyz.
     pub fn exterior(&self) -> Vec<f32> {
         packed(&self.0.borrow().edits().exterior)
     }
@@ -201,13 +202,14 @@ impl RawImplicit {
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
     }
 
-    /// Returns the positions of the surface constraints (`which` 0) or of the exterior constraints (1), as packed xyz.
+    /// Returns the positions of the constraints of the implicit function: the surface constraints (`which` 0) or the
+    /// exterior constraints (1), as packed xyz in world space.
     pub fn constraints(&self, which: usize) -> Vec<f32> {
         self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
     }
 
-    /// Returns how well the surface fits all points, with the manual edits, as a `Fitness` object: their distances from
-    /// it, and its mean curvature.
+    /// Returns how well the surface fits the input points, as edited manually, as a `Fitness` object: their distances
+    /// from the surface, and its mean curvature.
     pub fn fitness(&self) -> Result<JsValue, JsValue> {
         let fitness = self.0.borrow().fitness().map_err(Failure::from)?;
         Ok(to_js(&fitness)?)
@@ -222,7 +224,7 @@ impl RawImplicit {
         Ok(RawVolume(volume))
     }
 
-    /// Colours the vertices of the surface from the images of the cameras.
+    /// Colours the vertices of the surface from the images of `cameras`.
     pub fn colorize(&self, cameras: RawCameras) -> Result<(), JsValue> {
         self.0.borrow_mut().colorize(&cameras.0).map_err(Failure::from)?;
         Ok(())
@@ -242,13 +244,13 @@ impl RawImplicit {
         })?)
     }
 
-    /// Returns the complete state of the run, for `restore`.
+    /// Returns the state of the run as bytes, without the points and other options, from which `restore` continues it.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`, if this model was made of the same points and options, except parameters; the run
-    /// then continues with the same results, bit for bit.
+    /// Replaces the run by one that `save` returned, if this model was made of the same points and options, except
+    /// parameters, else fails; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

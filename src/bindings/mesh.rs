@@ -34,15 +34,15 @@ pub(super) enum MeshKind {
     Live(Rc<RefCell<dyn LiveSurface>>),
 }
 
-/// A model with a surface that a JavaScript `Mesh` can follow.
+/// A model whose current surface a JavaScript `Mesh` can show live.
 pub(super) trait LiveSurface {
     /// Returns a copy of the current surface.
     fn surface(&self) -> TriangleMesh;
-    /// Returns the numbers of vertices and triangles.
+    /// Returns the numbers of vertices and triangles of the current surface.
     fn counts(&self) -> [usize; 2];
     /// Returns the topology version, which increases when connectivity changes, and the geometry version, which
-    /// increases when a vertex moves. Those of an implicit surface are one number, which increases with every new
-    /// surface.
+    /// increases when a vertex moves or connectivity changes. Those of an implicit surface are one number, which
+    /// increases with every new surface.
     fn versions(&self) -> [u32; 2];
 }
 
@@ -74,7 +74,8 @@ impl LiveSurface for ImplicitSurface {
     }
 }
 
-/// A mesh of any kind: editable, a list of triangles, or live.
+/// The raw handle of the TypeScript class `Mesh`: an editable mesh, a list of triangles, or the live surface of a
+/// model.
 #[wasm_bindgen]
 pub struct RawMesh(pub(super) MeshKind);
 
@@ -109,7 +110,8 @@ impl RawMesh {
         Ok(RawMesh(triangle_list(mesh)))
     }
 
-    /// Reads a mesh from the bytes of a file, with a texture from a separate image if one is given.
+    /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
+    /// given.
     pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
         let file = bytes(file)?;
         let mesh = match texture {
@@ -119,14 +121,14 @@ impl RawMesh {
         Ok(RawMesh(triangle_list(mesh.map_err(Failure::from)?)))
     }
 
-    /// Returns the iso-surface of one frame of a volume, in world space.
+    /// Returns the iso-surface of one frame of a volume at intensity `iso`, in world space, as a list of triangles.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(volume: &RawVolume, iso: f64, frame: usize) -> Result<RawMesh, JsValue> {
         let mesh = marching_cubes_world(&volume.0, iso, frame).map_err(Failure::from)?;
         Ok(RawMesh(triangle_list(mesh)))
     }
 
-    /// Returns the number of vertices.
+    /// Returns the number of vertices of the mesh.
     #[wasm_bindgen(js_name = vertexCount)]
     pub fn vertex_count(&self) -> usize {
         match &self.0 {
@@ -136,7 +138,7 @@ impl RawMesh {
         }
     }
 
-    /// Returns the number of triangles.
+    /// Returns the number of triangles of the mesh.
     #[wasm_bindgen(js_name = triangleCount)]
     pub fn triangle_count(&self) -> usize {
         match &self.0 {
@@ -146,7 +148,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns a counter that increases when connectivity changes; 0 for a triangle list.
+    /// Returns a counter that increases when connectivity changes, so that copies can be recognised as out of date; 0
+    /// for a triangle list.
     #[wasm_bindgen(js_name = topologyVersion)]
     pub fn topology_version(&self) -> u32 {
         match &self.0 {
@@ -156,7 +159,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns a counter that increases when any vertex moves; 0 for a triangle list.
+    /// Returns a counter that increases when any vertex moves or connectivity changes, so that copies can be recognised
+    /// as out of date; 0 for a triangle list.
     #[wasm_bindgen(js_name = geometryVersion)]
     pub fn geometry_version(&self) -> u32 {
         match &self.0 {
@@ -166,8 +170,8 @@ impl RawMesh {
         }
     }
 
-    /// Returns a snapshot of the arrays, with vertex normals. A vertex on a texture seam, which has several texture
-    /// coordinates, has only one of them.
+    /// Returns a snapshot of positions, triangles, vertex normals and other attributes of the mesh. A vertex on a
+    /// texture seam, which has several texture coordinates, has only one of them.
     pub fn arrays(&self) -> RawArrays {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
@@ -177,19 +181,19 @@ impl RawMesh {
         RawArrays(mesh)
     }
 
-    /// Returns the measures of the mesh as a `MeshInfo`.
+    /// Returns the measures of the mesh, such as area, enclosed volume and edge lengths, as a `MeshInfo`.
     pub fn info(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(&Info::from(measure(&self.triangles())))?)
     }
 
     /// Checks the triangles of the mesh, independently of the code that edits it: whether it is closed and oriented,
-    /// and the numbers of its defects, as a `MeshReport`.
+    /// and the numbers of defects and self-intersections, as a `MeshReport`.
     pub fn check(&self) -> Result<JsValue, JsValue> {
         let report = report(&self.triangles()).map_err(Failure::from)?;
         Ok(to_js(&Report::from(report))?)
     }
 
-    /// Returns the texture, if the mesh has one.
+    /// Returns the texture, if the mesh has one; an editable mesh has none.
     pub fn texture(&self) -> Option<RawTexture> {
         let texture = match &self.0 {
             // Editable meshes have no texture.
@@ -277,7 +281,8 @@ impl RawMesh {
         Ok(to_f32(&geodesic_distances(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
 
-    /// Returns the distances to another surface, per vertex and in summary, as a `SurfaceDistance`.
+    /// Returns the distances between this mesh and the surface `other`, per vertex and in summary, as a
+    /// `SurfaceDistance`.
     #[wasm_bindgen(js_name = distanceTo)]
     pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
         let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
@@ -359,7 +364,7 @@ pub struct RawTexture(Arc<Texture>);
 
 #[wasm_bindgen]
 impl RawTexture {
-    /// Creates a texture from the bytes of an image file, which must be of the media type `kind`.
+    /// Creates a texture from the bytes of an image file; a failure if their media type is not `kind`.
     #[wasm_bindgen(constructor)]
     pub fn new(kind: &str, file: &Uint8Array) -> Result<RawTexture, JsValue> {
         let texture = Texture::new(bytes(file)?).map_err(Failure::from)?;
@@ -371,7 +376,7 @@ impl RawTexture {
         Ok(RawTexture(Arc::new(texture)))
     }
 
-    /// Returns the media type of the image.
+    /// Returns the media type of the image, such as `image/png`.
     pub fn kind(&self) -> String {
         self.0.kind().media_type().to_owned()
     }
@@ -384,39 +389,39 @@ impl RawTexture {
 
 #[wasm_bindgen]
 impl RawArrays {
-    /// Returns the number of vertices.
+    /// Returns the number of vertices of the snapshot.
     pub fn vertices(&self) -> usize {
         self.0.positions.len()
     }
 
-    /// Returns the number of triangles.
+    /// Returns the number of triangles of the snapshot.
     pub fn triangles(&self) -> usize {
         self.0.triangles.len()
     }
 
-    /// Copies the positions to `out`, as packed xyz.
+    /// Copies the positions of the vertices to the start of `out`, as packed xyz.
     pub fn positions(&self, out: &Float32Array) {
         copy_into(out, &packed(&self.0.positions));
     }
 
-    /// Copies the normals to `out`, as packed xyz.
+    /// Copies the normals of the vertices to the start of `out`, as packed xyz.
     pub fn normals(&self, out: &Float32Array) {
         copy_into(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
     }
 
-    /// Copies the triangles to `out`, three vertex indices each.
+    /// Copies the triangles to the start of `out`, as three vertex indices each.
     pub fn indices(&self, out: &Uint32Array) {
         let indices = self.0.triangles.as_flattened();
         out.subarray(0, indices.len() as u32).copy_from(indices);
     }
 
-    /// Returns the texture coordinates as u and v of each vertex in turn, if there are any.
+    /// Returns the texture coordinates as u and v of each vertex in turn, if the mesh has any.
     pub fn uvs(&self) -> Option<Vec<f32>> {
         let uvs = self.0.uvs.as_ref()?;
         Some(uvs.iter().flat_map(|uv| uv.to_array()).collect())
     }
 
-    /// Returns the colours as red, green and blue of each vertex in turn, if there are any.
+    /// Returns the colours as red, green and blue of each vertex in turn, in 0..1, if the mesh has any.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
     }
@@ -541,7 +546,7 @@ impl From<Measures> for Info {
     }
 }
 
-/// Returns the unit vector along a vector of any length; 0 for a zero vector.
+/// Returns the unit vector along a vector of any length, given as three numbers; 0 for a zero vector.
 fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     let given = point(values)?;
     let largest = given.abs().max_element();

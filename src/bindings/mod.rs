@@ -18,7 +18,7 @@ use wasm_bindgen::throw_val;
 
 use error::Failure;
 
-/// Installs the panic hook; runs once, when the module is instantiated.
+/// Installs a panic hook that throws the message of the panic as a failure; runs once, when the module is instantiated.
 #[wasm_bindgen(start)]
 pub fn start() {
     // A panic aborts the module. Thrown from here, its message reaches the caller, who learns that the instance is

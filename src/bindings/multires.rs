@@ -15,7 +15,8 @@ use crate::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
 };
 
-/// Handle of a multiresolution model, which it shares with its live meshes.
+/// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
+/// surfaces.
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
@@ -59,9 +60,9 @@ impl LiveSurface for LiveView {
 
 #[wasm_bindgen]
 impl RawMultires {
-    /// Creates a model of a detailed mesh, without which it has no detail, a base mesh, which is derived if not given,
-    /// and control ellipsoids of twelve numbers each: the centre and three semi-axis vectors. Properties of `params`
-    /// replace the defaults.
+    /// Creates a multiresolution model. `detail` is the surface with detail; without it the model has none. `base` is
+    /// the smooth surface M₀, derived if not given. `ellipsoids` are the control ellipsoids, twelve numbers each: the
+    /// centre and three semi-axis vectors. Properties of `params` replace the default parameters.
     #[wasm_bindgen(constructor)]
     pub fn new(
         detail: Option<TriangleCopy>,
@@ -90,16 +91,16 @@ impl RawMultires {
         RawMesh(MeshKind::Live(Rc::new(RefCell::new(LiveView { model: Rc::clone(&self.0), surface }))))
     }
 
-    /// Returns the solutions for the current ellipsoids on the levels of the multi-level solver, one mesh each, from
-    /// coarse to fine.
+    /// Returns the membrane as solved for the current ellipsoids on each level of the multi-level solver, one mesh
+    /// each, from coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
         levels.into_iter().map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh)))).collect()
     }
 
-    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
-    /// all.
+    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step, with
+    /// the events of all these steps.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
         let mut report = model.step().map_err(Failure::from)?;
@@ -114,8 +115,8 @@ impl RawMultires {
         Ok(to_js(&report)?)
     }
 
-    /// Sets the target ellipsoids, towards which the current ones move: twelve numbers each, the centre and three
-    /// semi-axis vectors.
+    /// Sets the target ellipsoids, towards which the model moves its current ellipsoids: twelve numbers each, the
+    /// centre and three semi-axis vectors.
     #[wasm_bindgen(js_name = setEllipsoids)]
     pub fn set_ellipsoids(&self, ellipsoids: &Float64Array) -> Result<(), JsValue> {
         self.0.borrow_mut().set_ellipsoids(&unpacked(ellipsoids)?).map_err(Failure::from)?;
@@ -134,7 +135,7 @@ impl RawMultires {
         packed(&self.0.borrow().targets())
     }
 
-    /// Returns for each vertex how much the map T from the deformed base to the undeformed one distorts areas (`which`
+    /// Returns for each vertex of the deformed base how much the map T to the undeformed base distorts areas (`which`
     /// 0: the area on the undeformed base divided by that on the deformed one) or angles (any other: the ratio of the
     /// largest to the smallest stretch); 1 without distortion.
     pub fn distortion(&self, which: u32) -> Vec<f32> {
@@ -143,12 +144,13 @@ impl RawMultires {
         values.into_iter().map(|value| value as f32).collect()
     }
 
-    /// Returns all parameters.
+    /// Returns the current values of all parameters of the model, as a plain object.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Sets some parameters; all are validated together before any is changed.
+    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
+    /// together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
@@ -157,9 +159,9 @@ impl RawMultires {
         Ok(())
     }
 
-    /// Returns further counts: surfaces in the decomposition, including the base; folded triangles of the map T; and,
-    /// in the last reconstruction of detail, vertices whose normal missed the finer surface, and vertices held back to
-    /// avoid self-intersections.
+    /// Returns further counts about the model: surfaces in the decomposition, including the base; folded triangles of
+    /// the map T; and, in the last reconstruction of detail, vertices whose normal missed the finer surface, and
+    /// vertices held back to avoid self-intersections.
     pub fn counts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
         let [unmatched_vertices, held_vertices] = model.detail_counts();
@@ -171,13 +173,14 @@ impl RawMultires {
         })?)
     }
 
-    /// Returns the complete state of the run, for `restore`.
+    /// Returns the state of the run as bytes, without the surfaces that the model was made of, from which `restore`
+    /// continues it.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`, if this model has the same surfaces, given or derived; the run then continues with
-    /// the same results, bit for bit.
+    /// Replaces the run by one that `save` returned, if this model has the same surfaces, given or derived, else fails;
+    /// the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -193,7 +196,7 @@ struct Counts {
     held_vertices: usize,
 }
 
-/// Converts arrays of twelve numbers per ellipsoid, the centre and three semi-axis vectors, to ellipsoids; an
+/// Converts an array of twelve numbers per ellipsoid, the centre and three semi-axis vectors, to ellipsoids; an
 /// incomplete last one is dropped.
 fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
     let numbers = doubles(packed)?;

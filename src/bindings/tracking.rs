@@ -18,11 +18,11 @@ use crate::methods::tracking::{
     Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
 };
 
-/// Handle of a surface tracker, which it shares with its live mesh.
+/// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
-/// The surface of a tracker's current frame, as the content of its live mesh.
+/// The surface of a tracker in its newest finished frame, as the content of a live mesh.
 struct CurrentFrame(Rc<RefCell<SurfaceTracker>>);
 
 impl LiveSurface for CurrentFrame {
@@ -43,11 +43,11 @@ impl LiveSurface for CurrentFrame {
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// Creates a tracker of a 4D volume. The region processed is a box given by two opposite `corners` in world space,
-    /// else by its first and last voxel, `voxels` (six numbers each), else the whole volume. The surface tracked is the
-    /// one that contains the point `nearest`, or has the vertex nearest to it; without that point, the one that
-    /// encloses the largest volume. `start` is the surface in the first frame, by default extracted from the image.
-    /// Properties of `params` replace the defaults.
+    /// Creates a tracker of a surface through the frames of a 4D volume. The region processed is a box given by two
+    /// opposite `corners` in world space, else by its first and last voxel, `voxels` (six numbers each), else the whole
+    /// volume. The surface tracked is the component that contains the point `nearest`, in world space, or has the
+    /// vertex nearest to it; without that point, the one that encloses the largest volume. `start` is the surface in
+    /// the first frame, by default extracted from the image. Properties of `params` replace the default parameters.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -86,8 +86,8 @@ impl RawTracker {
         tracker.meshes().get(frame).map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh.clone()))))
     }
 
-    /// Makes `iterations` steps, fewer if the tracker is done; returns the report of the last step, with the events of
-    /// all.
+    /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step,
+    /// with the events of all these steps.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut tracker = self.0.borrow_mut();
         let mut report = tracker.step().map_err(Failure::from)?;
@@ -102,30 +102,32 @@ impl RawTracker {
         Ok(to_js(&report)?)
     }
 
-    /// Returns the index of the frame that the live mesh shows.
+    /// Returns the index of the frame that the live mesh shows, the newest finished one; 0 before the first one is
+    /// finished.
     pub fn frame(&self) -> usize {
         self.0.borrow().frame()
     }
 
-    /// Returns three numbers of frames: all in the volume, those whose boundary is found, and those with a surface.
+    /// Returns three numbers of frames: all in the volume, those in which the image boundary has been found, and those
+    /// with a tracked surface.
     pub fn counts(&self) -> Vec<u32> {
         let tracker = self.0.borrow();
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
-    /// Returns the boundary points of a frame, five numbers each: x, y, z in world space, t in frames, and the weight.
-    /// Empty until they are found.
+    /// Returns the boundary points of the image found in a frame, five numbers each: x, y, z in world space, t in
+    /// frames, and the weight by boundary votes. Empty until the boundary of the frame is found.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
         self.0.borrow().boundary(frame).into_iter().flatten().collect()
     }
 
-    /// Returns the enclosed volumes of the finished frames, in world units cubed.
+    /// Returns the volume that the surface encloses in each finished frame, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
         self.0.borrow().volumes()
     }
 
-    /// Returns further results: the standard deviation of the image noise, in intensity; for a cyclic sequence, once it
-    /// is known, the cycle closure error in world units; and the statistics of each finished frame.
+    /// Returns further results of tracking: the standard deviation of the image noise, in intensity; for a cyclic
+    /// sequence, once it is known, the cycle closure error in world units; and the statistics of each finished frame.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
         let statistics = Statistics {
@@ -136,19 +138,20 @@ impl RawTracker {
         Ok(to_js(&statistics)?)
     }
 
-    /// Returns the finished frames as an animated GLB in which each lasts `frame_seconds`.
+    /// Returns the surfaces of the finished frames as the bytes of an animated GLB in which each lasts `frame_seconds`.
     #[wasm_bindgen(js_name = toGlb)]
     pub fn to_glb(&self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
         let tracker = self.0.borrow();
         Ok(write_animation(tracker.meshes(), frame_seconds).map_err(Failure::from)?)
     }
 
-    /// Returns all parameters.
+    /// Returns the current values of all parameters of the tracker, as a plain object.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Sets some parameters; all are validated together before any is changed.
+    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
+    /// together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut tracker = self.0.borrow_mut();
@@ -157,13 +160,13 @@ impl RawTracker {
         Ok(())
     }
 
-    /// Returns the complete state of the run, for `restore`.
+    /// Returns the state of the run as bytes, without the volume and other input, from which `restore` continues it.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Restores a state from `save`, if this tracker has the same volume, box, component and start; the run then
-    /// continues with the same results, bit for bit.
+    /// Replaces the run by one that `save` returned, if this tracker has the same volume, box, component and start,
+    /// else fails; the run then continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())

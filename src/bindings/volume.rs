@@ -12,11 +12,11 @@ use crate::io::{parse_volume, write_nifti};
 use crate::math::DAffine3;
 use crate::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
-/// A 3D or 4D volume.
+/// The raw handle of the TypeScript class `Volume`: a 3D or 4D volume.
 #[wasm_bindgen]
 pub struct RawVolume(pub(super) Volume);
 
-/// A list of volumes to be joined into one 4D volume.
+/// The raw handle of a list of volumes to be joined into one 4D volume.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawFrames(Vec<Volume>);
@@ -25,7 +25,8 @@ pub struct RawFrames(Vec<Volume>);
 impl RawVolume {
     /// Creates a volume from a typed array of stored values, x fastest. `dims` are the numbers of voxels along x, y and
     /// z and of frames; `affine` is the 4 × 4 matrix from voxel indices to world space, column by column; an intensity
-    /// is `slope` × value + `intercept`. Any `space` but `LPS` means RAS.
+    /// is `slope` × value + `intercept`; `frame_seconds` is the time between frames, 0 if it is not known. Any `space`
+    /// but `LPS` means RAS.
     #[wasm_bindgen(constructor)]
     pub fn new(
         data: &JsValue,
@@ -61,12 +62,12 @@ impl RawVolume {
         Ok(write_nifti(&self.0).map_err(Failure::from)?)
     }
 
-    /// Returns the numbers of voxels along x, y and z.
+    /// Returns the numbers of voxels of the volume along x, y and z.
     pub fn dims(&self) -> Vec<f64> {
         self.0.dims().map(|n| n as f64).to_vec()
     }
 
-    /// Returns the number of frames.
+    /// Returns the number of frames of the volume; 1 if it is 3D.
     pub fn frames(&self) -> usize {
         self.0.frames()
     }
@@ -117,13 +118,13 @@ impl RawVolume {
         Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
     }
 
-    /// Returns all intensities of one frame, x fastest.
+    /// Returns all intensities of one frame, in the order of the voxels, x fastest.
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.intensities(frame).map_err(Failure::from)?)
     }
 
-    /// Returns the volumes of a pyramid, one per level: the first is this one, each other has the dimensions of the one
-    /// before divided by `factor`.
+    /// Returns the volumes of an image pyramid, one per level: the first is this volume, and each other one has the
+    /// dimensions of the one before divided by `factor`.
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<RawVolume>, JsValue> {
         let levels = self.0.pyramid(levels, factor).map_err(Failure::from)?;
         Ok(levels.into_iter().map(RawVolume).collect())
@@ -154,7 +155,7 @@ impl RawVolume {
 
 #[wasm_bindgen]
 impl RawFrames {
-    /// Creates an empty list.
+    /// Creates an empty list of volumes.
     #[wasm_bindgen(constructor)]
     pub fn new() -> RawFrames {
         Self::default()
@@ -172,7 +173,7 @@ impl RawFrames {
     }
 }
 
-/// Copies a typed array of any supported kind, without changing its type.
+/// Copies a typed array of any element type that volumes support, without converting its values.
 fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     macro_rules! of {
         ($($array:ty => $voxels:ident),*) => {
@@ -186,7 +187,8 @@ fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     Err(Failure::invalid("data", "must be a typed array of numbers of at most 32 bits, or of 64-bit floats"))
 }
 
-/// Converts an array of four dimensions; an error if it has another length.
+/// Converts an array of the numbers of voxels along x, y and z and of frames; a failure if it does not have four
+/// elements.
 fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
     let dims: [u32; 4] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 or 4 integers"))?;
     Ok(dims.map(|n| n as usize))

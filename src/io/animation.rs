@@ -8,17 +8,17 @@ use crate::math::Vec3;
 use crate::mesh::{MeshError, TriangleMesh};
 use std::borrow::Borrow;
 
-/// Shortest duration of an animation frame, in seconds. Screens show no shorter frames, and after hours of animation,
-/// times closer together than this are equal in single precision.
+/// Shortest accepted duration of an animation frame, in seconds. Screens show no shorter frames, and after hours of
+/// animation, times closer together than this are equal in single precision.
 const MIN_FRAME_SECONDS: f64 = 1e-3;
 
-/// Longest duration of an animation frame, in seconds: with longer ones a player seems to stand still.
+/// Longest accepted duration of an animation frame, in seconds: with longer ones a player seems to stand still.
 const MAX_FRAME_SECONDS: f64 = 1e3;
 
 /// Returns the bytes of an animated GLB that shows the meshes in order, `frame_seconds` (0.001 to 1000) each. Every
 /// mesh is stored as by [`write_mesh`](super::write_mesh), with its texture, normals, texture coordinates and colours.
 ///
-/// A frame equal to the previous one is not stored again; nor is a texture equal to an earlier one.
+/// A mesh equal to the previous frame's is not stored again; nor is a texture equal to an earlier one.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] if there are no frames, if a mesh is not valid or has no triangles, or if the time is
@@ -37,7 +37,7 @@ pub fn write_animation<M: Borrow<TriangleMesh>>(
 #[derive(Default)]
 pub struct AnimationWriter {
     parts: DocumentBuilder,
-    /// For each mesh in the file, the index of the first frame that shows it.
+    /// For each mesh stored in the file, the index of the first animation frame that shows it.
     starts: Vec<usize>,
     frames: usize,
     last: Option<TriangleMesh>,
@@ -47,7 +47,7 @@ impl AnimationWriter {
     /// Appends a frame that shows `mesh`.
     ///
     /// # Errors
-    /// As [`write_animation`]; the frame is then not added.
+    /// As [`write_animation`]; after an error the frame is not added.
     pub fn add(&mut self, mesh: &TriangleMesh) -> Result<(), MeshError> {
         mesh.validate()?;
         if mesh.triangles.is_empty() {
@@ -90,9 +90,9 @@ impl AnimationWriter {
         self.parts.finish(&json_array_member("animations", &animation))
     }
 
-    /// Returns the animation track of mesh number `mesh`: the times in seconds at which its scale changes, and the
-    /// scales. The last mesh has a key at the end as well: without it the animation would end when its last frame
-    /// begins.
+    /// Returns the animation track that shows and hides mesh number `mesh`: the times in seconds at which its scale
+    /// changes, and the scales (1 shown, 0 hidden). The last mesh has a key at the end as well: without it the
+    /// animation would end when its last frame begins.
     fn track(&self, mesh: usize, frame_seconds: f64) -> (Vec<f32>, Vec<f32>) {
         let seconds = |frame: usize| (frame as f64 * frame_seconds) as f32;
         let next = self.starts.get(mesh + 1);
@@ -105,8 +105,8 @@ impl AnimationWriter {
     }
 }
 
-/// Returns the JSON of the node of mesh number `mesh`. Without animation, all nodes but the first have scale 0, so that
-/// a viewer that plays no animations shows only the first mesh.
+/// Returns the JSON of the glTF node of mesh number `mesh`. Without animation, all nodes but the first have scale 0, so
+/// that a viewer that plays no animations shows only the first mesh.
 fn node(mesh: usize) -> String {
     let scale = if mesh == 0 { "" } else { r#","scale":[0,0,0]"# };
     format!(r#"{{"mesh":{mesh}{scale}}}"#)

@@ -7,15 +7,16 @@ use crate::volume::Volume;
 const ANY: &str = "volume file";
 const ACCEPTED: &str =
     "NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
-/// Bytes inflated from the start of a gzipped file to detect its format.
+/// Number of bytes inflated from the start of a gzipped volume file to detect its format.
 const START: usize = 512;
 
 /// Reads a volume from a NIfTI file, which may be gzipped, or from an NRRD or MetaImage file; the format is detected
-/// from the bytes. `detached` is the content of the data file if the header in `bytes` refers to one (several data
-/// files are concatenated in order).
+/// from the bytes. `detached` is the content of the data file if the voxels are in a file separate from the header in
+/// `bytes` (several data files are concatenated in order).
 ///
 /// # Errors
-/// [`FormatError`] with the format and the field; the error about an unsupported format names it if it is recognised.
+/// [`FormatError`] with the format and the field; for an unsupported format, the error names the format if it is
+/// recognised.
 pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     if is_gzip(bytes) {
         let start = gunzip_start(ANY, bytes, START)?;
@@ -51,8 +52,8 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
     FormatError::unsupported(ANY, "signature", signature(bytes), ACCEPTED)
 }
 
-/// Returns the name of the unsupported format that the first bytes identify, for the error message; "an unknown
-/// signature" if there is none.
+/// Returns the name of the unsupported volume format that the first bytes of a file identify, for the error message;
+/// "an unknown signature" if they identify none.
 fn signature(bytes: &[u8]) -> &'static str {
     let at = |offset: usize, mark: &[u8]| bytes.get(offset..).is_some_and(|rest| rest.starts_with(mark));
     let line = |mark: &[u8]| bytes.trim_ascii_start().starts_with(mark);

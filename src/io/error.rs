@@ -8,7 +8,7 @@ pub enum FormatError {
     Invalid {
         /// Name of the file format.
         format: &'static str,
-        /// Header field or part of the file.
+        /// Header field or part of the file that has the value.
         field: String,
         /// The value found, and the values accepted.
         problem: String,
@@ -18,11 +18,11 @@ pub enum FormatError {
     Unsupported {
         /// Name of the file format.
         format: &'static str,
-        /// Header field or part of the file.
+        /// Header field or part of the file that uses the feature.
         field: String,
-        /// Feature that the file uses.
+        /// Unsupported feature that the file uses.
         found: String,
-        /// Alternatives that are supported.
+        /// Supported alternatives, for the user to choose from.
         accepted: &'static str,
     },
     /// The file ends too early.
@@ -30,11 +30,11 @@ pub enum FormatError {
     Truncated {
         /// Name of the file format.
         format: &'static str,
-        /// Header field or part of the file.
+        /// Header field or part of the file that is cut off.
         field: String,
         /// Number of bytes that the header calls for.
         needed: u64,
-        /// Number of bytes present.
+        /// Number of bytes present in the file.
         found: u64,
     },
     /// The content does not fit in memory, or exceeds a limit of the reader.
@@ -42,7 +42,7 @@ pub enum FormatError {
     TooLarge {
         /// Name of the file format.
         format: &'static str,
-        /// Header field or part of the file.
+        /// Header field or part of the file that is too large.
         field: String,
         /// Number of bytes that the content would need.
         needed: u64,
@@ -85,11 +85,11 @@ impl FormatError {
     }
 }
 
-/// Maximum number of characters of a file's content that an error message quotes.
+/// Maximum number of characters of a file's content that an error message quotes: a malformed file may have a field of
+/// any length.
 const MAX_QUOTED: usize = 200;
 
-/// Truncates text quoted in an error message to [`MAX_QUOTED`] characters: a malformed file may have a field of any
-/// length.
+/// Truncates text quoted in an error message to [`MAX_QUOTED`] characters.
 fn clipped(text: impl Into<String>) -> String {
     let mut text = text.into();
     if let Some((end, _)) = text.char_indices().nth(MAX_QUOTED) {

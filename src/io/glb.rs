@@ -1,4 +1,5 @@
-//! The container of GLB, binary glTF 2.0. Its JSON is read in `gltf` and written in `glb_writer`.
+//! Reader and writer of the container of GLB (binary glTF 2.0): a chunk of JSON, which `gltf` reads and `glb_writer`
+//! writes, and a chunk of binary data.
 
 use super::{FormatError, gltf};
 use crate::mesh::{MeshError, TriangleMesh};
@@ -9,11 +10,11 @@ const HEADER: usize = 12;
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BINARY: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// Largest JSON chunk that is parsed, in bytes: a parsed document takes some 16 times the memory of its text, and no
-/// mesh needs this much.
+/// Largest JSON chunk of a GLB file that is parsed, in bytes: a parsed document takes some 16 times the memory of its
+/// text, and no mesh needs this much.
 const JSON_LIMIT: usize = 1 << 26;
 
-/// Reads the triangles of a GLB file.
+/// Reads all triangles of a GLB file as one mesh, in world space.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let (json, binary) = chunks(bytes)?;
     if json.len() > JSON_LIMIT {
@@ -58,10 +59,10 @@ fn word(bytes: &[u8], at: usize, field: &str) -> Result<u32, FormatError> {
     found.map(u32::from_le_bytes).ok_or_else(|| FormatError::truncated(FORMAT, field, at + 4, bytes.len()))
 }
 
-/// Returns the bytes of a GLB with a JSON and a binary chunk, each padded to a multiple of four bytes.
+/// Returns the bytes of a GLB file with a JSON chunk and a binary chunk, each padded to a multiple of four bytes.
 ///
 /// # Errors
-/// [`MeshError::TooLarge`] if there is not enough memory for it, or its length does not fit in 32 bits.
+/// [`MeshError::TooLarge`] if there is not enough memory for the file, or its length does not fit in 32 bits.
 pub(super) fn container(json: String, mut binary: Vec<u8>) -> Result<Vec<u8>, MeshError> {
     let mut json = json.into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');

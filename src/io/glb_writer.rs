@@ -1,4 +1,4 @@
-//! Writer of GLB: meshes and images become ranges of one buffer, described by the JSON.
+//! Writer of GLB (binary glTF): meshes and images become ranges of one buffer, described by the JSON.
 
 use super::glb::container;
 use super::mesh_file::push_floats;
@@ -11,8 +11,8 @@ const VERTICES: Option<u32> = Some(34962);
 /// `target` of a glTF buffer view of vertex indices: WebGL's `ELEMENT_ARRAY_BUFFER`.
 const INDICES: Option<u32> = Some(34963);
 
-/// Returns a GLB of one node with one primitive: positions, normals (computed if the mesh has none), and the other
-/// attributes that the mesh has. Without triangles, the scene has one empty node.
+/// Returns the bytes of a GLB file of one mesh, as one node with one primitive: positions, normals (computed if the
+/// mesh has none), and the other attributes that the mesh has. Without triangles, the scene has one empty node.
 ///
 /// # Errors
 /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
@@ -81,21 +81,22 @@ impl DocumentBuilder {
         attributes
     }
 
-    /// Adds an accessor of the triangles' vertex indices and returns its index.
+    /// Adds a glTF accessor of the triangles' vertex indices and returns its index.
     fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let start = self.bytes.len();
         triangles.as_flattened().iter().for_each(|v| self.bytes.extend(v.to_le_bytes()));
         self.accessor(start, INDICES, [5125, 3 * triangles.len()], "SCALAR", "")
     }
 
-    /// Adds an accessor of texture coordinates and returns its index.
+    /// Adds a glTF accessor of texture coordinates and returns its index.
     fn coordinates(&mut self, uvs: &[Vec2]) -> usize {
         let start = self.bytes.len();
         uvs.iter().for_each(|uv| push_floats(&mut self.bytes, &uv.to_array()));
         self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
     }
 
-    /// Adds an accessor of 3D vectors and returns its index; `extra_json` is appended to its JSON.
+    /// Adds a glTF accessor of 3D vectors and returns its index; `target` is that of its buffer view, and `extra_json`
+    /// is appended to the accessor's JSON.
     pub(super) fn vectors(
         &mut self,
         vectors: impl ExactSizeIterator<Item = Vec3>,
@@ -107,7 +108,7 @@ impl DocumentBuilder {
         self.accessor(start, target, [5126, count], "VEC3", extra_json)
     }
 
-    /// Adds an accessor of ascending animation times in seconds and returns its index.
+    /// Adds a glTF accessor of ascending animation times in seconds and returns its index.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
         let start = self.bytes.len();
         push_floats(&mut self.bytes, times);
@@ -116,8 +117,8 @@ impl DocumentBuilder {
         self.accessor(start, None, [5126, times.len()], "SCALAR", &bounds)
     }
 
-    /// Adds a buffer view from byte `start` to the end of the buffer and an accessor of it; returns the accessor's
-    /// index.
+    /// Adds a glTF buffer view from byte `start` to the end of the buffer and an accessor that describes its elements;
+    /// returns the accessor's index.
     fn accessor(
         &mut self,
         start: usize,
@@ -133,7 +134,7 @@ impl DocumentBuilder {
         self.accessors.len() - 1
     }
 
-    /// Adds a buffer view from byte `start` to the end of the buffer and returns its index.
+    /// Adds a glTF buffer view from byte `start` to the end of the buffer and returns its index.
     fn view(&mut self, start: usize, target: Option<u32>) -> usize {
         let length = self.bytes.len() - start;
         let target = target.map_or(String::new(), |target| format!(r#","target":{target}"#));
@@ -141,7 +142,7 @@ impl DocumentBuilder {
         self.views.len() - 1
     }
 
-    /// Returns the index of the material with that texture. Material and image are added if no earlier mesh has an
+    /// Returns the index of the glTF material with this texture. Material and image are added if no earlier mesh has an
     /// equal texture, so that each image is stored once.
     fn material(&mut self, texture: &Arc<Texture>) -> Result<usize, MeshError> {
         if let Some(known) = self.textures.iter().position(|known| known == texture) {
@@ -159,16 +160,16 @@ impl DocumentBuilder {
         Ok(self.textures.len() - 1)
     }
 
-    /// Reserves memory for `additional` bytes of the buffer. Returns an error if there is not enough memory, or if the
-    /// buffer would exceed 4 GiB.
+    /// Reserves memory for `additional` bytes of the glTF buffer. Returns an error if there is not enough memory, or if
+    /// the buffer would exceed 4 GiB.
     fn reserve(&mut self, additional: usize) -> Result<(), MeshError> {
         let bytes = self.bytes.len() as u64 + additional as u64;
         let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(additional).is_ok();
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// Returns the bytes of the file, with all nodes as roots of one scene; `extra_json` is appended to the members of
-    /// the JSON.
+    /// Returns the bytes of the GLB file, with all nodes as roots of one scene; `extra_json` holds further members of
+    /// the JSON document, each preceded by a comma.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
@@ -192,8 +193,8 @@ impl DocumentBuilder {
         container(json + "}", std::mem::take(&mut self.bytes))
     }
 
-    /// Returns the JSON members for materials, textures, samplers and images, and for the extension for WebP images,
-    /// declared as required if there are any.
+    /// Returns the members of the glTF JSON for materials, textures, samplers and images, and the extension for WebP
+    /// images, declared as required if there are any.
     fn materials_json(&self) -> String {
         let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
         let (mut materials, mut textures) = (Vec::new(), Vec::new());

@@ -13,28 +13,28 @@ use glam::{DMat4, DQuat};
 use serde_json::Value;
 use std::sync::Arc;
 
-/// Maximum total number of triangle corners: nodes may repeat a mesh, so that a small file may stand for any number of
-/// triangles.
+/// Maximum total number of triangle corners that are read from a glTF document: nodes may repeat a mesh, so that a
+/// small file may stand for any number of triangles.
 const CORNER_LIMIT: u64 = 3 << 23;
 
 /// Accepted alternative named in the errors about compressed data and about required extensions that are not supported.
 const UNCOMPRESSED: &str = "files without compression (save the mesh without it)";
 
-/// Minimum number of corners counted for a primitive, so that empty primitives repeated by many nodes also reach
-/// [`CORNER_LIMIT`].
+/// Minimum number of corners that a primitive counts towards [`CORNER_LIMIT`], so that empty primitives repeated by
+/// many nodes also reach the limit.
 const PRIMITIVE_COST: u64 = 64;
 
-/// Returns whether a file that requires the extension can be read: those of materials and textures, and that of
-/// quantised vertex attributes.
+/// Returns whether a file that requires this glTF extension can be read: true for extensions of materials and textures,
+/// and for quantised vertex attributes.
 fn is_supported_extension(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
         || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
             .contains(&extension)
 }
 
-/// Returns all triangles of the default scene, transformed to world space by their nodes. Normals, texture coordinates
-/// and colours are read if every triangle primitive has them; with texture coordinates, so is the first base colour
-/// texture, if its image is in the file.
+/// Returns all triangles of the default scene of a glTF document as one mesh, transformed to world space by their
+/// nodes. Normals, texture coordinates and colours are read if every triangle primitive has them. If texture
+/// coordinates are, the first base colour texture is read, too, provided that its image is in the file.
 pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, FormatError> {
     let document = Document { root, binary };
     document.check_extensions()?;
@@ -74,14 +74,14 @@ fn concatenated<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
     Some(a)
 }
 
-/// A glTF document: its JSON and the binary chunk of the container.
+/// A glTF document: its JSON (`root`) and the binary chunk of the GLB container.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'a> {
     root: &'a Value,
     binary: &'a [u8],
 }
 
-/// A primitive and its transform to world space.
+/// A triangle primitive of the scene, with its transform to world space by its node.
 struct Part<'a> {
     to_world: DAffine3,
     primitive: Primitive<'a>,
@@ -136,8 +136,8 @@ impl<'a> Document<'a> {
         Ok(parts)
     }
 
-    /// Returns the root nodes of the default scene; without a default, of the first scene; without scenes, of the
-    /// document.
+    /// Returns the indices of the root nodes of the default scene; without a default, of the first scene; without
+    /// scenes, of the document.
     fn roots(&self) -> Result<Vec<u64>, FormatError> {
         if self.root["scenes"].as_array().is_some_and(|scenes| !scenes.is_empty()) {
             let scene = unsigned(self.root, "scene")?.unwrap_or(0);
@@ -154,7 +154,7 @@ impl<'a> Document<'a> {
         Ok((0..).zip(is_child).filter_map(|(n, is)| (!is).then_some(n)).collect())
     }
 
-    /// Returns the primitives of the node's mesh; none if it has no mesh.
+    /// Returns the primitives of the mesh of a node; none if the node has no mesh.
     fn primitives(&self, node: &Value) -> Result<&'a [Value], FormatError> {
         let Some(mesh) = unsigned(node, "mesh")? else { return Ok(&[]) };
         Ok(self.entry("meshes", mesh)?["primitives"].as_array().map_or(&[][..], Vec::as_slice))
@@ -234,20 +234,21 @@ impl<'a> Document<'a> {
     }
 }
 
-/// Returns the known extension by which a primitive or buffer view is compressed; `None` if there is none. A file may
-/// hold the same data uncompressed as well, for readers without the extension.
+/// Returns the name of the extension by which a primitive or buffer view is compressed; `None` if it has none of the
+/// known ones. A file may hold the same data uncompressed as well, for readers without the extension.
 fn compression(value: &Value) -> Option<&'static str> {
     let known = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
     known.into_iter().find(|name| !value["extensions"][name].is_null())
 }
 
-/// The bytes of a buffer view, and the number of bytes from one element to the next if the file gives it.
+/// The bytes of a glTF buffer view, and the number of bytes from one element to the next (`stride`) if the file gives
+/// it.
 pub(super) struct View<'a> {
     pub(super) bytes: &'a [u8],
     stride: Option<u64>,
 }
 
-/// How consecutive vertices of a primitive form triangles: as a list, a strip or a fan.
+/// How consecutive vertices of a glTF primitive form triangles: as a list, a strip or a fan.
 #[derive(Clone, Copy)]
 enum Mode {
     List,
@@ -255,8 +256,8 @@ enum Mode {
     Fan,
 }
 
-/// A triangle primitive of a glTF mesh, with its accessors. Their byte ranges have been checked, but not the vertex
-/// indices.
+/// A triangle primitive of a glTF mesh, with its accessors. The accessors' byte ranges have been checked, but not the
+/// vertex indices.
 struct Primitive<'a> {
     document: Document<'a>,
     attributes: &'a Value,
@@ -264,12 +265,12 @@ struct Primitive<'a> {
     positions: Accessor<'a>,
     indices: Option<Accessor<'a>>,
     base_color: Option<BaseColor<'a>>,
-    /// Upper bound on the number of triangle corners and on the number of vertices.
+    /// Upper bound on the numbers of triangle corners and of vertices, counted towards [`CORNER_LIMIT`].
     corners: u64,
 }
 
 impl<'a> Primitive<'a> {
-    /// Reads a primitive of a mesh; `None` for points and lines.
+    /// Reads a primitive of a glTF mesh; `None` if it consists of points or lines.
     fn new(document: &Document<'a>, value: &'a Value) -> Result<Option<Self>, FormatError> {
         let mode = match unsigned(value, "mode")?.unwrap_or(4) {
             4 => Mode::List,
@@ -304,8 +305,8 @@ impl<'a> Primitive<'a> {
         })
     }
 
-    /// Returns the texture coordinates for the base colour texture, with its texture transform applied; those of the
-    /// first set if the primitive has no such texture; `None` if that set is missing.
+    /// Returns the texture coordinates for the primitive's base colour texture, with its texture transform applied;
+    /// those of set 0 if the primitive has no such texture. `None` if the primitive lacks the set.
     fn uvs(&self) -> Result<Option<Vec<Vec2>>, FormatError> {
         let set = self.base_color.as_ref().map_or(0, |base| base.set);
         let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
@@ -316,7 +317,8 @@ impl<'a> Primitive<'a> {
         }))
     }
 
-    /// Returns a vertex attribute, if the primitive has it; it must have one element per position.
+    /// Returns the accessor of the vertex attribute `name`, if the primitive has it; an error unless it has one element
+    /// per position, of a number of components in `widths`.
     fn attribute(&self, name: &str, widths: &[usize]) -> Result<Option<Accessor<'a>>, FormatError> {
         let Some(index) = unsigned(self.attributes, name)? else { return Ok(None) };
         let accessor = self.document.accessor(index, widths)?;
@@ -327,7 +329,7 @@ impl<'a> Primitive<'a> {
         Ok(Some(accessor))
     }
 
-    /// Returns the triangles as vertex indices, with strips and fans expanded.
+    /// Returns the triangles of the primitive as vertex indices, with strips and fans expanded.
     fn triangles(&self) -> Result<Vec<[u32; 3]>, FormatError> {
         let vertices = self.positions.count;
         let order: Vec<u32> = match &self.indices {
@@ -348,7 +350,7 @@ impl<'a> Primitive<'a> {
     }
 }
 
-/// Returns an error if a primitive has only compressed data, for which there is no decoder.
+/// Returns an error if a glTF primitive has only compressed data, which this reader cannot decode.
 fn check_compression(document: &Document, primitive: &Value) -> Result<(), FormatError> {
     let Some(name) = compression(primitive) else { return Ok(()) };
     let attributes = &primitive["attributes"];
@@ -359,7 +361,7 @@ fn check_compression(document: &Document, primitive: &Value) -> Result<(), Forma
     Ok(())
 }
 
-/// Type of one component of an accessor's elements.
+/// Number type of the components of a glTF accessor's elements.
 #[derive(Clone, Copy)]
 enum Component {
     I8,
@@ -399,7 +401,7 @@ impl Component {
         }
     }
 
-    /// Returns the stored value that represents 1 in normalised data.
+    /// Returns the stored number of this type that represents 1 in normalised data.
     fn normalization_scale(self) -> f64 {
         match self {
             Self::I8 => 127.0,
@@ -412,7 +414,7 @@ impl Component {
     }
 }
 
-/// Elements of an accessor, whose byte range has been checked.
+/// The elements of a glTF accessor, such as positions or indices; their byte range has been checked.
 struct Accessor<'a> {
     bytes: &'a [u8],
     count: usize,
@@ -423,7 +425,7 @@ struct Accessor<'a> {
 }
 
 impl Accessor<'_> {
-    /// Returns component `k` of element `i`, scaled to −1..1 or 0..1 if the accessor is marked as normalised.
+    /// Returns component `k` of element `i`, scaled to −1..1 or 0..1 if the file marks the accessor as normalised.
     fn number(&self, i: usize, k: usize) -> f64 {
         debug_assert!(i < self.count && k < self.width);
         let at = i * self.stride + k * self.component.size();
@@ -444,7 +446,7 @@ impl Accessor<'_> {
     }
 }
 
-/// Returns the number of components of an accessor's elements; an error unless it is one of `widths`.
+/// Returns the number of components of the elements of a glTF accessor; an error unless it is one of `widths`.
 fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usize, FormatError> {
     let name = accessor["type"].as_str().unwrap_or("nothing");
     let width = match name {
@@ -462,7 +464,8 @@ fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usiz
     Err(FormatError::invalid(FORMAT, format!("{field}.type"), problem))
 }
 
-/// Returns the local transform of a node, from its matrix or from scale, rotation and translation.
+/// Returns the transform of a glTF node relative to its parent, from its matrix or from scale, rotation and
+/// translation.
 fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     let field = |name: &str| format!("nodes[{index}].{name}");
     if let Some(m) = numbers::<16>(&node["matrix"], || field("matrix"))? {
@@ -483,7 +486,7 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     ))
 }
 
-/// Reads an array of `N` numbers; `None` if it is missing.
+/// Reads a JSON array of `N` numbers; `None` if it is missing. `field` gives its name for the error message.
 pub(super) fn numbers<const N: usize>(
     value: &Value,
     field: impl Fn() -> String,
@@ -498,7 +501,7 @@ pub(super) fn numbers<const N: usize>(
         .ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("must be an array of {N} numbers")))
 }
 
-/// Reads a member that is a non-negative integer; `None` if it is missing.
+/// Reads the member `key` of a JSON object, which must be a non-negative integer; `None` if it is missing.
 pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
     let value = &object[key];
     if value.is_null() {
@@ -510,7 +513,7 @@ pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatE
         .ok_or_else(|| FormatError::invalid(FORMAT, key, "must be a non-negative integer"))
 }
 
-/// Reads a member that is a non-negative integer; an error if it is missing.
+/// Reads the member `key` of a JSON object, which must be a non-negative integer; an error if it is missing.
 pub(super) fn required(object: &Value, key: &str, field: &str) -> Result<u64, FormatError> {
     unsigned(object, key)?.ok_or_else(|| FormatError::invalid(FORMAT, format!("{field}.{key}"), "is missing"))
 }

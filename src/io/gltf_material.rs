@@ -7,10 +7,10 @@ use crate::math::Vec2;
 use crate::mesh::Texture;
 use serde_json::Value;
 
-/// The base colour texture of a primitive's material.
+/// The base colour texture of a glTF primitive's material.
 pub(super) struct BaseColor<'a> {
     texture: &'a Value,
-    /// Index of the set of texture coordinates that it uses.
+    /// Number of the set of texture coordinates that the texture uses: n of `TEXCOORD_n`.
     pub(super) set: u64,
     transform: Option<TextureTransform>,
 }
@@ -24,7 +24,7 @@ struct TextureTransform {
 }
 
 impl<'a> BaseColor<'a> {
-    /// Returns the base colour texture of a primitive; `None` if it has none.
+    /// Returns the base colour texture of a glTF primitive; `None` if the primitive has none.
     ///
     /// # Errors
     /// An index that is out of range or no integer, or a texture transform whose scale or offset is not two numbers.
@@ -47,7 +47,7 @@ impl<'a> BaseColor<'a> {
         self.transform.as_ref().map_or(uv, |transform| transform.of(uv))
     }
 
-    /// Returns the image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
+    /// Returns the texture's image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
     ///
     /// # Errors
     /// An index or range out of bounds, a buffer view outside the binary chunk or compressed, or a data URI that cannot
@@ -79,9 +79,9 @@ impl TextureTransform {
         })
     }
 
-    /// Applies the transform to the texture coordinates of a vertex. The direction of rotation is that of the
-    /// extension's first example, three.js and the Khronos viewer; the matrix in the draft of the extension rotates in
-    /// the opposite direction.
+    /// Applies the texture transform to the texture coordinates of a vertex. The direction of rotation is that of the
+    /// first example of `KHR_texture_transform`, of three.js and of the Khronos viewer; the matrix in the draft of the
+    /// extension rotates in the opposite direction.
     fn of(&self, uv: Vec2) -> Vec2 {
         let [u, v] = [f64::from(uv.x) * self.scale[0], f64::from(uv.y) * self.scale[1]];
         let [cosine, sine] = self.rotation;

@@ -14,7 +14,7 @@ pub(super) fn is_gzip(bytes: &[u8]) -> bool {
 }
 
 /// Returns the content of a gzip stream of one or more members, with their checksums verified; zeros may follow the
-/// last.
+/// last member. `format` names the file format in error messages.
 ///
 /// # Errors
 /// A truncated or corrupt stream, a wrong checksum, content of more than `limit` bytes, which is not inflated any
@@ -75,12 +75,12 @@ struct Inflated {
     full: bool,
 }
 
-/// Initial size of the output buffer, in bytes. It is doubled as needed, so that a small file costs little whatever
-/// size its header claims.
+/// Initial size of the buffer for inflated data, in bytes. The buffer is doubled as needed, so that a small file costs
+/// little whatever size its header claims.
 const INITIAL_CAPACITY: usize = 1 << 16;
 
-/// Appends the content of one deflate stream, in a zlib container if `zlib`, to `out`, which becomes at most one byte
-/// longer than `limit`.
+/// Inflates one deflate stream, in a zlib container if `zlib`, and appends its content to `out`, which becomes at most
+/// one byte longer than `limit`.
 fn inflate(
     format: &'static str,
     input: &[u8],

@@ -22,7 +22,7 @@ pub enum MeshFormat {
 }
 
 impl MeshFormat {
-    /// All formats.
+    /// All formats in which meshes can be written.
     pub const ALL: [Self; 6] = [Self::Glb, Self::Ply, Self::Stl, Self::Obj, Self::Vtp, Self::Mz3];
 
     /// Returns the usual file extension of the format, without the dot.
@@ -85,8 +85,8 @@ pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<Triang
     Ok(mesh)
 }
 
-/// Reads a mesh, checks it, and returns it with equal vertices merged, with the name of its format. An error if no
-/// triangle with three distinct corners is left.
+/// Reads a mesh file, checks the mesh and merges vertices of equal position; returns the name of the format and the
+/// mesh. An error if no triangle with three distinct corners is left.
 fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     let (format, mesh) = parse(bytes)?;
     mesh.validate().map_err(|error| match error {
@@ -104,7 +104,7 @@ fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatErro
     Ok((format, welded))
 }
 
-/// Reads a mesh in the format that its first bytes indicate, with the name of the format.
+/// Reads a mesh file in the format that its first bytes indicate; returns the name of the format and the mesh.
 fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     if bytes.starts_with(b"glTF") {
         return Ok(("GLB", glb::parse(bytes)?));
@@ -124,12 +124,13 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     Err(unsupported_format(bytes))
 }
 
-/// Returns whether the first 4096 bytes contain no control characters other than whitespace.
+/// Returns whether the bytes look like text: whether the first 4096 contain no control characters other than
+/// whitespace.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     !bytes.iter().take(4096).any(|&b| b < b' ' && !b.is_ascii_whitespace() && b != 0x0b)
 }
 
-/// Returns the error for bytes in no accepted format, which names the format if it is recognised.
+/// Returns the error for the bytes of a file in no accepted mesh format; it names the format if it is recognised.
 fn unsupported_format(bytes: &[u8]) -> FormatError {
     const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
     let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);
@@ -189,7 +190,7 @@ pub(super) fn color_bytes(color: crate::math::Vec3) -> [u8; 3] {
     color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// Appends the numbers as little-endian 32-bit floats.
+/// Appends numbers to the bytes of a file as little-endian 32-bit floats.
 pub(super) fn push_floats(out: &mut Vec<u8>, values: &[f32]) {
     values.iter().for_each(|x| out.extend(x.to_le_bytes()));
 }

@@ -1,4 +1,4 @@
-//! Reader of MetaImage: .mha with the voxels inside, .mhd with the voxels as detached payload.
+//! Reader of MetaImage: .mha with the voxels in the same file, .mhd with the voxels in a data file of their own.
 //!
 //! World space is LPS, in the unit that `DistanceUnits` names. Each row of `TransformMatrix` is the direction of one
 //! axis, as in ITK. `CenterOfRotation` and `AnatomicalOrientation` are only descriptive and ignored. The format gives
@@ -23,10 +23,10 @@ pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
         .any(|key| start.strip_prefix(*key).is_some_and(|rest| rest.trim_ascii_start().starts_with(b"=")))
 }
 
-/// Reads a MetaImage volume; `detached` is the payload if the header refers to a data file.
+/// Reads a MetaImage volume; `detached` is the content of the data file, if the header refers to one.
 ///
 /// # Errors
-/// [`FormatError`] naming the header field.
+/// [`FormatError`] that names the header field at fault.
 pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     let mut lines = Lines::new(bytes);
     let fields = Fields::read(&mut lines)?;
@@ -42,13 +42,13 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source)
 }
 
-/// The header's `key = value` lines, up to and including the one that names the data file.
+/// The `key = value` lines of a MetaImage header, up to and including the one that names the data file.
 struct Fields {
     pairs: Vec<(String, String)>,
 }
 
 impl Fields {
-    /// Reads the lines of the header.
+    /// Reads the `key = value` lines of the header, up to and including the one that names the data file.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
         let mut pairs: Vec<(String, String)> = Vec::new();
         while let Some(line) = lines.next_line() {
@@ -77,7 +77,7 @@ impl Fields {
         Some(Field { format: FORMAT, name: key, text })
     }
 
-    /// Returns the first field that exists under any of several synonymous keys.
+    /// Returns the field under the first of several synonymous keys that the header has, if any.
     fn any(&self, keys: &[&'static str]) -> Option<Field<'_>> {
         keys.iter().find_map(|key| self.get(key))
     }
@@ -87,7 +87,8 @@ impl Fields {
         self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
     }
 
-    /// Returns the value of a True or False field; false if it is missing.
+    /// Returns the value of the True or False field under any of several synonymous keys; false if the header has none
+    /// of them.
     fn flag(&self, keys: &[&'static str]) -> Result<bool, FormatError> {
         let Some(field) = self.any(keys) else { return Ok(false) };
         match field.text.to_ascii_lowercase().as_str() {
@@ -103,14 +104,14 @@ impl Fields {
     }
 }
 
-/// A header that has been checked for consistency.
+/// The content of a MetaImage header, checked for consistency.
 struct Header {
     scalar: Scalar,
     dims: [usize; 4],
     big: bool,
     text: bool,
     compressed: bool,
-    /// Bytes of the data file before the voxels; `None` (-1 in the file) if the voxels are the last bytes.
+    /// Number of bytes in the data file before the voxels; `None` (-1 in the file) if the voxels are its last bytes.
     skip: Option<usize>,
     slope: f64,
     intercept: f64,
@@ -119,7 +120,7 @@ struct Header {
 }
 
 impl Header {
-    /// Reads and checks all fields of the header.
+    /// Converts all fields of the header and checks them for consistency.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         check_object(fields)?;
         let rank = rank(fields)?;
@@ -140,7 +141,8 @@ impl Header {
         })
     }
 
-    /// Returns the volume, with its voxels read from `source`.
+    /// Returns the volume that the header describes, with its voxels read from `source`: the bytes after the header, or
+    /// the data file.
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let volume = Volume::new(VolumeInit {
             voxels: self.voxels(source)?,
@@ -154,7 +156,8 @@ impl Header {
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
-    /// Returns the voxels in `source`, which are inflated if compressed, and parsed if written as text.
+    /// Reads the voxels from `source` (the bytes after the header, or the data file): inflates them if compressed, and
+    /// parses them if written as text.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         if self.compressed {
@@ -172,7 +175,8 @@ impl Header {
         decode(DATA, payload(DATA, source, size)?, self.scalar, self.big)
     }
 
-    /// Returns the bytes of `source` after the first `HeaderSize` ones; if that is -1, the last `size` bytes.
+    /// Returns the bytes of `source` after the number of bytes that the header says to skip (`HeaderSize`); if that is
+    /// -1, the last `size` bytes.
     fn after_skip<'a>(&self, source: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.skip.unwrap_or_else(|| source.len().saturating_sub(size));
         source.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "HeaderSize", skip, source.len()))
@@ -190,7 +194,7 @@ fn check_object(fields: &Fields) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Returns the number of axes, 1 to 4.
+/// Returns the number of axes of the image; an error unless it is 1 to 4.
 fn rank(fields: &Fields) -> Result<usize, FormatError> {
     match fields.need("NDims")?.integer(1)? {
         n @ 1..=4 => Ok(n as usize),
@@ -198,7 +202,7 @@ fn rank(fields: &Fields) -> Result<usize, FormatError> {
     }
 }
 
-/// Returns the number type that `ElementType` names.
+/// Returns the number type of the voxels, which the field `ElementType` names.
 fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     Ok(match field.text {
         "MET_CHAR" => Scalar::I8,
@@ -242,8 +246,8 @@ fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
 }
 
-/// Returns the directions of the axes, which are the rows of the matrix; the world axes without a matrix, and in place
-/// of axes that the file does not have.
+/// Returns the directions of the image's axes, which are the rows of `TransformMatrix`; the world axes if the header
+/// has no matrix, and in place of axes that the image does not have.
 fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
     let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };

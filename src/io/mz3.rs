@@ -7,8 +7,8 @@ const HAS_FACES: u16 = 1;
 const HAS_VERTICES: u16 = 2;
 const HAS_COLORS: u16 = 4;
 
-/// Returns the bytes of an MZ3 file. Layout, little-endian: "MZ", flags for what the file holds, counts of faces and
-/// vertices, number of bytes to skip (0); faces, vertices, then colours (rgba) if the mesh has them.
+/// Returns the bytes of an MZ3 file of the mesh. Layout, little-endian: "MZ", flags for what the file holds, counts of
+/// faces and vertices, number of bytes to skip (0); faces, vertices, then colours (rgba) if the mesh has them.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let colors = if mesh.colors.is_some() { HAS_COLORS } else { 0 };
     let mut out = Vec::with_capacity(16 + 12 * mesh.triangles.len() + 16 * mesh.positions.len());

@@ -1,10 +1,10 @@
-//! Reader and writer of NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with its .img as detached
-//! payload).
+//! Reader and writer of NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with the voxels in an .img of
+//! their own).
 //!
-//! World space is RAS. The affine is the sform if its code is positive, else the qform if its code is, else the voxel
-//! sizes with the first voxel at the origin (methods 3, 2 and 1 of the standard). Lengths stay in the file's unit,
-//! given by [`Volume::unit`]. A slope of 0 or NaN means that stored numbers are intensities. The time between frames is
-//! `pixdim[4]` in the file's time unit, or in seconds if it names none.
+//! World space is RAS. The affine is the sform if its code is positive, else the qform if its code is positive, else
+//! the voxel sizes with the first voxel at the origin (methods 3, 2 and 1 of the standard). Lengths stay in the file's
+//! unit, given by [`Volume::unit`]. A slope of 0 or NaN means that stored numbers are intensities. The time between
+//! frames is `pixdim[4]` in the file's time unit, or in seconds if it names none.
 
 use super::FormatError;
 use super::gzip::{gunzip, gunzip_start, is_gzip};
@@ -14,12 +14,12 @@ use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "NIfTI";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
-/// Size of a NIfTI-1 header in bytes, which is also the first number in the file.
+/// Size of a NIfTI-1 header in bytes, which is also the first number in the header and identifies the version.
 const SIZE_1: usize = 348;
-/// Size of a NIfTI-2 header in bytes, which is also the first number in the file.
+/// Size of a NIfTI-2 header in bytes, which is also the first number in the header and identifies the version.
 const SIZE_2: usize = 540;
-/// Size in bytes of the larger header with the extension flag after it: the part of a file that is read or inflated to
-/// parse its header.
+/// Size in bytes of the larger NIfTI header with the extension flag after it: the part of a file that is read or
+/// inflated to parse its header.
 const HEADER_ROOM: usize = SIZE_2 + 4;
 
 /// Returns whether the bytes start like a NIfTI header of either version and byte order.
@@ -39,10 +39,10 @@ fn version(four: [u8; 4]) -> Option<(u8, bool)> {
     little.or_else(|| known(u32::from_be_bytes(four)).map(|v| (v, true)))
 }
 
-/// Reads a NIfTI volume; `detached` is the .img file of a pair. Either may be gzipped.
+/// Reads a NIfTI volume; `detached` is the .img file of a pair. Either file may be gzipped.
 ///
 /// # Errors
-/// [`FormatError`] naming the header field.
+/// [`FormatError`] that names the header field at fault.
 pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     let start = if is_gzip(bytes) {
         gunzip_start(FORMAT, bytes, HEADER_ROOM)?
@@ -72,15 +72,15 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source, offset, size)
 }
 
-/// The bytes of a header and their byte order.
+/// The bytes of a NIfTI header and their byte order.
 struct Bytes<'a> {
     bytes: &'a [u8],
     big: bool,
 }
 
 impl Bytes<'_> {
-    /// Returns the N bytes at `offset` in little-endian order. The header's length has been checked, so none is
-    /// missing.
+    /// Returns the `N` bytes of a number at `offset`, in little-endian order. The header's length has been checked, so
+    /// none is missing.
     fn at<const N: usize>(&self, offset: usize) -> [u8; N] {
         let mut out = [0; N];
         if let Some(part) = self.bytes.get(offset..offset + N) {
@@ -108,7 +108,7 @@ impl Bytes<'_> {
     }
 }
 
-/// The header fields of either version that are used, as stored.
+/// The fields of a NIfTI-1 or NIfTI-2 header that the reader uses, as stored.
 struct Fields {
     version: u8,
     big: bool,
@@ -129,7 +129,7 @@ struct Fields {
 }
 
 impl Fields {
-    /// Reads the fields of a header of either version.
+    /// Reads the fields of a NIfTI-1 or NIfTI-2 header from the first bytes of a file.
     fn read(bytes: &[u8]) -> Result<Self, FormatError> {
         let cut = |needed| FormatError::truncated(FORMAT, "header", needed, bytes.len());
         let four = *bytes.first_chunk().ok_or_else(|| cut(SIZE_1))?;
@@ -190,7 +190,7 @@ impl Fields {
         }
     }
 
-    /// Returns whether the voxels are in a separate file.
+    /// Returns whether the voxels are in a file separate from the header; an error if the magic bytes are unknown.
     fn is_pair(&self) -> Result<bool, FormatError> {
         match (&self.magic, self.version) {
             (b"n+1\0", 1) | (b"n+2\0", 2) => Ok(false),
@@ -212,8 +212,8 @@ impl Fields {
         }
     }
 
-    /// Returns the number of voxels along x, y and z, and the number of frames; an error if a higher axis has more than
-    /// one entry.
+    /// Returns the number of voxels along x, y and z, and the number of frames; an error if an axis after the fourth
+    /// has more than one entry.
     fn dims(&self) -> Result<[usize; 4], FormatError> {
         let rank = self.dim[0];
         if !(1..=7).contains(&rank) {
@@ -236,7 +236,7 @@ impl Fields {
         Ok(dims)
     }
 
-    /// Returns the number type of the voxels.
+    /// Returns the number type of the voxels; an error if it is not supported or contradicts the stated number of bits.
     fn scalar(&self) -> Result<Scalar, FormatError> {
         let scalar = match self.datatype {
             2 => Scalar::U8,
@@ -258,8 +258,8 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, "bitpix", problem))
     }
 
-    /// Returns the offset of the voxels from the start of their file, in bytes; in a single file, a stored 0 means the
-    /// end of the header.
+    /// Returns the offset of the voxels from the start of their file, in bytes. In a single file (not a `pair`), a
+    /// stored 0 means the end of the header.
     fn offset(&self, pair: bool) -> Result<usize, FormatError> {
         let least = if self.version == 1 { 352 } else { 544 };
         let stated = self.vox_offset;
@@ -312,8 +312,8 @@ impl Fields {
         Ok(DAffine3::from_mat3_translation(matrix, column(3)))
     }
 
-    /// Returns the affine that the file stores as a quaternion (qform): scaling by the voxel sizes, rotation by (a, b,
-    /// c, d) with a ≥ 0, then translation. A negative `pixdim[0]` flips z.
+    /// Returns the affine that the file stores as a quaternion (qform): scaling by the voxel sizes, rotation by the
+    /// quaternion (a, b, c, d) with a ≥ 0, then translation. A negative `pixdim[0]` flips z.
     fn qform(&self) -> Result<DAffine3, FormatError> {
         let finite = |field: &str, values: [f64; 3]| {
             if values.iter().all(|v| v.is_finite()) {
@@ -351,7 +351,7 @@ impl Fields {
     }
 
     /// Returns the seconds between frames; 0 if there is only one frame, `pixdim[4]` is not positive, or the fourth
-    /// axis is not time. Without a unit of time, it is taken as seconds.
+    /// axis is not time. Without a unit of time, `pixdim[4]` is in seconds.
     fn frame_seconds(&self, frames: usize) -> Result<f64, FormatError> {
         let step = self.pixdim[4];
         if frames < 2 {
@@ -380,14 +380,14 @@ impl Fields {
     }
 }
 
-/// Largest accepted offset of the voxels in bytes. A NIfTI-1 header stores it as `f32`, which cannot represent every
-/// larger integer, and no header extension is as long.
+/// Largest accepted offset of the voxels from the start of their file, in bytes. A NIfTI-1 header stores the offset as
+/// `f32`, which cannot represent every larger integer, and no header extension is as long.
 const MAX_OFFSET: f64 = 16_777_216.0;
-/// Tolerance by which the squared length of a quaternion's vector part may exceed 1 through rounding in `f32`; longer
-/// ones are rejected.
+/// Tolerance by which the squared length of the stored part (b, c, d) of a unit quaternion may exceed 1 through
+/// rounding in `f32`; longer ones are rejected.
 const QUATERNION_TOLERANCE: f64 = 1e-5;
 
-/// Returns the error about a datatype that is not supported, with its name.
+/// Returns the error about a NIfTI datatype that is not supported, with the name of the type.
 fn unsupported_datatype(code: i64) -> FormatError {
     let name = match code {
         1 => "binary",
@@ -407,7 +407,7 @@ fn unsupported_datatype(code: i64) -> FormatError {
     )
 }
 
-/// A header that has been checked for consistency.
+/// The content of a NIfTI header, checked for consistency.
 struct Header {
     pair: bool,
     big: bool,
@@ -422,7 +422,7 @@ struct Header {
 }
 
 impl Header {
-    /// Checks the fields and converts them.
+    /// Checks the header fields for consistency and converts them.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         let pair = fields.is_pair()?;
         let dims = fields.dims()?;
@@ -441,7 +441,8 @@ impl Header {
         })
     }
 
-    /// Returns the volume, whose voxels are the `size` bytes of `source` from `offset`.
+    /// Returns the volume that the header describes, with its voxels decoded from the `size` bytes of `source` from
+    /// `offset`.
     fn volume(&self, source: &[u8], offset: usize, size: usize) -> Result<Volume, FormatError> {
         let Some(rest) = source.get(offset..) else {
             return Err(FormatError::truncated(
@@ -468,8 +469,8 @@ impl Header {
 /// Returns the volume as an uncompressed little-endian NIfTI file: voxels as stored, world space converted to RAS, and
 /// the affine as sform.
 ///
-/// The file is NIfTI-1, which stores the affine in `f32`, or NIfTI-2 if a dimension or the number of frames exceeds
-/// 32,767.
+/// The file is NIfTI-1, which stores the affine, slope and intercept in `f32`, or NIfTI-2 if a dimension or the number
+/// of frames exceeds 32,767.
 ///
 /// # Errors
 /// [`FormatError::TooLarge`] if there is not enough memory for the file.
@@ -500,7 +501,7 @@ fn datatype(voxels: &Voxels) -> (i16, usize) {
     }
 }
 
-/// Appends the voxels as little-endian bytes.
+/// Appends the voxels to the bytes of a NIfTI file, as little-endian numbers.
 fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     match voxels {
         Voxels::U8(values) => out.extend_from_slice(values),
@@ -514,14 +515,14 @@ fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     }
 }
 
-/// Writes bytes at offset `at` of a header; nothing if they do not fit.
+/// Writes bytes into a NIfTI header at offset `at`; nothing if they do not fit.
 fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
     if let Some(target) = out.get_mut(at..at + N) {
         target.copy_from_slice(&bytes);
     }
 }
 
-/// Writes the header of a NIfTI-1 file.
+/// Writes a NIfTI-1 header for the volume to the empty `out`; `code` and `size` are the voxels' [`datatype`].
 fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
     out.resize(352, 0);
     put(out, 0, (SIZE_1 as i32).to_le_bytes());
@@ -544,7 +545,7 @@ fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, siz
     put(out, 344, *b"n+1\0");
 }
 
-/// Writes the header of a NIfTI-2 file.
+/// Writes a NIfTI-2 header for the volume to the empty `out`; `code` and `size` are the voxels' [`datatype`].
 fn header_2(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
     out.resize(544, 0);
     put(out, 0, (SIZE_2 as i32).to_le_bytes());
@@ -586,7 +587,8 @@ fn units_field(volume: &Volume) -> u8 {
     }
 }
 
-/// Returns the upper three rows of the affine from voxel indices to RAS, row-major.
+/// Returns the upper three rows of the affine map from voxel indices to RAS world space, row-major, for the header's
+/// sform.
 fn rows_in_ras(volume: &Volume) -> [f64; 12] {
     let a = volume.affine();
     let sign = if volume.space() == Space::Lps { [-1.0, -1.0, 1.0] } else { [1.0; 3] };

@@ -15,7 +15,7 @@ pub(super) fn is_obj(bytes: &[u8]) -> bool {
     is_text(bytes) && numbered_lines(bytes).any(|(_, line)| words(line).next() == Some(b"v"))
 }
 
-/// Splits a line at whitespace.
+/// Splits a line of an OBJ file at whitespace.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
@@ -26,14 +26,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(read(bytes)?.into_mesh())
 }
 
-/// Reads the vertices of an OBJ file as points; the file needs no faces. Normals are read if every face corner refers
-/// to one, and averaged per vertex. If no corner does and there are as many normals as vertices, they belong to the
-/// vertices in order.
+/// Reads the vertices of an OBJ file as points; the file needs no faces. If every face corner refers to a normal,
+/// normals are read and averaged per vertex. If no corner does and there are as many normals as vertices, the normals
+/// belong to the vertices in order.
 pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     Ok(read(bytes)?.into_points())
 }
 
-/// Reads all lines of the file.
+/// Reads all lines of an OBJ file; a backslash at the end of a line joins the next one to it.
 fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     let mut reader = Reader::default();
     let mut continued = Vec::new();
@@ -55,7 +55,7 @@ fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     Ok(reader)
 }
 
-/// The corner of a face: zero-based indices of its position, texture coordinates and normal in the file.
+/// A corner of a face: zero-based indices, in the order of the file, of its position, texture coordinates and normal.
 #[derive(Clone, Copy)]
 struct Corner {
     position: u32,
@@ -74,7 +74,8 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads one line up to a comment; unknown keywords are ignored.
+    /// Reads one line of the file, up to a comment; lines with unknown keywords are ignored. `number` is the line
+    /// number, for error messages.
     fn line(&mut self, line: &[u8], number: usize) -> Result<(), FormatError> {
         let mut words = words(line).take_while(|word| !word.starts_with(b"#"));
         match words.next() {
@@ -90,8 +91,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Adds a vertex: a position, and a colour if three more numbers follow. A fourth number alone, or before the
-    /// colour, is a weight.
+    /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. A fourth
+    /// number alone, or before the colour, is a weight, which is ignored.
     fn vertex(&mut self, numbers: &[f32]) {
         self.positions.push(Vec3::from_slice(numbers));
         match numbers {
@@ -159,7 +160,7 @@ impl Reader {
         }
     }
 
-    /// Returns the value of `read` at each corner of the triangles; `None` if it is missing at any.
+    /// Returns the value of `read` at each corner of all triangles; `None` if it is missing at any corner.
     fn per_corner<T>(&self, read: impl Fn(&Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
         self.corners.iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
     }
@@ -170,7 +171,8 @@ fn face_size(line: usize, corners: usize) -> FormatError {
     FormatError::invalid(FORMAT, format!("line {line}"), problem)
 }
 
-/// Converts an index that counts from 1, or backwards from −1, to a zero-based one.
+/// Converts an OBJ index, which counts from 1, or backwards from −1 at the last of the `count` entries read so far, to
+/// a zero-based one.
 fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, FormatError> {
     let number = std::str::from_utf8(digits).ok().and_then(|text| text.parse::<i64>().ok());
     let resolved = number.and_then(|n| if n < 0 { n.checked_add(count as i64) } else { n.checked_sub(1) });
@@ -183,7 +185,7 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     })
 }
 
-/// Parses numbers; an error if one is not a number, or there are fewer than `min_count`.
+/// Parses the words of a line as numbers; an error if one is not a number, or there are fewer than `min_count`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
@@ -200,7 +202,7 @@ fn numbers<'a>(
     })
 }
 
-/// Returns the text of an OBJ file, with numbers in the shortest form that reads back exactly.
+/// Returns the text of an OBJ file of the mesh, with numbers in the shortest form that reads back exactly.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut text = String::from("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
@@ -230,7 +232,8 @@ fn line(text: &mut String, keyword: &str, numbers: &[f32]) {
     text.push('\n');
 }
 
-/// Appends a corner of a face, with its texture coordinates and normal if the mesh has them.
+/// Appends one corner of a face to the text of an OBJ file, with its texture coordinates and normal if the mesh has
+/// them. `corner` counts the corners of all faces.
 fn face_corner(text: &mut String, mesh: &TriangleMesh, corner: usize, vertex: u32) {
     let v = vertex as usize + 1;
     let vt = if mesh.corner_uvs.is_some() { Some(corner + 1) } else { mesh.uvs.as_ref().map(|_| v) };

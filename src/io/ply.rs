@@ -13,12 +13,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     read(bytes, Reader::faces)
 }
 
-/// Reads the vertices of a PLY file with their attributes; faces are skipped, whatever they hold.
+/// Reads the vertices of a PLY file with their attributes, for point clouds; faces are skipped, whatever they hold.
 pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     read(bytes, |_, element, body| skip_element(element, body))
 }
 
-/// Reads all elements of a file; `faces` reads or skips its faces.
+/// Reads all elements of a PLY file; `faces` reads or skips the faces.
 fn read(
     bytes: &[u8],
     faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
@@ -44,7 +44,7 @@ enum Encoding {
     BigEndian,
 }
 
-/// Number type of a property.
+/// Number type of a PLY property.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NumberType {
     I8,
@@ -94,7 +94,7 @@ impl NumberType {
         }
     }
 
-    /// Decodes a number from the first bytes, in little-endian order.
+    /// Decodes a number of this type from the first bytes of `b`, in little-endian order.
     fn decode(self, b: [u8; 8]) -> f64 {
         let [b0, b1, b2, b3, ..] = b;
         match self {
@@ -110,15 +110,15 @@ impl NumberType {
     }
 }
 
-/// A property of an element, as declared in the header.
+/// A property of a PLY element (such as x of vertices), as declared in the header.
 struct Property {
     name: String,
     kind: NumberType,
-    /// Number type of the length of a list; `None` for a single value.
+    /// Number type of the length that precedes the values of a list; `None` if the property is a single value.
     length: Option<NumberType>,
 }
 
-/// An element, such as vertices or faces, as declared in the header.
+/// A PLY element (a kind of record, such as vertices or faces), as declared in the header.
 struct Element {
     name: String,
     count: usize,
@@ -126,8 +126,8 @@ struct Element {
 }
 
 impl Element {
-    /// Returns an error if the rest of the file is too short for the element's count; called before memory is allocated
-    /// for it.
+    /// Returns an error if the rest of the file is too short for the number of records that the header declares; called
+    /// before memory is allocated for them.
     fn check_size(&self, body: &Body) -> Result<(), FormatError> {
         let smallest = |p: &Property| {
             if body.encoding == Encoding::Text { 1 } else { p.length.unwrap_or(p.kind).size() }
@@ -141,12 +141,13 @@ impl Element {
         Err(FormatError::Truncated { format: FORMAT, field: format!("element {}", self.name), needed, found })
     }
 
-    /// Returns the index of the first property with any of the names.
+    /// Returns the index of the element's first property that has any of the names, if there is one.
     fn index_of(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|p| names.contains(&p.name.as_str()))
     }
 
-    /// Returns the indices of the properties in the first set of names that is complete.
+    /// Returns the indices of the properties in the first set of names of which the element has all; `None` if there is
+    /// none.
     fn indices_of<const N: usize>(&self, sets: &[[&str; N]]) -> Option<[usize; N]> {
         sets.iter().find_map(|names| {
             let found: Vec<usize> = names.iter().filter_map(|name| self.index_of(&[name])).collect();
@@ -191,7 +192,7 @@ impl Header {
     }
 }
 
-/// Takes a line of the header, without its line ending, from the front of `rest`.
+/// Takes a line of the PLY header, without its line ending, from the front of `rest`.
 fn take_line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, FormatError> {
     let invalid = |problem| FormatError::invalid(FORMAT, "header", problem);
     let end =
@@ -258,14 +259,14 @@ fn clipped(text: &str) -> String {
     text.chars().take(60).collect()
 }
 
-/// The part of a file after the header that has not been read yet.
+/// The part of a PLY file after the header that has not been read yet.
 struct Body<'a> {
     encoding: Encoding,
     bytes: &'a [u8],
 }
 
 impl Body<'_> {
-    /// Reads the next number.
+    /// Reads the next number, of type `kind` in a binary file; `field` is its name in error messages.
     fn number(&mut self, kind: NumberType, field: &str) -> Result<f64, FormatError> {
         if self.encoding == Encoding::Text {
             return self.text_number(field);
@@ -297,7 +298,7 @@ impl Body<'_> {
         })
     }
 
-    /// Reads all values of a property into `values`.
+    /// Reads the value or list of one property of the next record into `values`.
     fn property(&mut self, property: &Property, values: &mut Vec<f64>) -> Result<(), FormatError> {
         values.clear();
         let Some(length) = property.length else {
@@ -317,7 +318,7 @@ impl Body<'_> {
     }
 }
 
-/// Skips all values of an element.
+/// Reads past all records of an element whose values are not needed.
 fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     let mut values = Vec::new();
     // An element without properties has no bytes, whatever its count.
@@ -328,7 +329,7 @@ fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// The mesh read so far.
+/// The mesh read so far from a PLY file.
 #[derive(Default)]
 struct Reader {
     mesh: TriangleMesh,
@@ -367,7 +368,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the faces as triangles, with the texture coordinates at their corners if there are any.
+    /// Reads the faces as triangles, with the texture coordinates at their corners if the file has them.
     fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
             return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));
@@ -408,7 +409,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Returns the mesh; texture coordinates per corner are kept if every face has them.
+    /// Returns the mesh that was read; texture coordinates per corner are kept if every face has them.
     fn finish(mut self) -> Result<TriangleMesh, FormatError> {
         let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
         self.mesh.corner_uvs = per_corner.then_some(self.corner_uvs);
@@ -416,7 +417,7 @@ impl Reader {
     }
 }
 
-/// Returns the bytes of a binary little-endian PLY file, with colours in 8 bits.
+/// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = header(mesh).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {

@@ -8,14 +8,15 @@ use std::borrow::Cow;
 use std::iter::Peekable;
 
 pub(super) const FORMAT: &str = "point text";
-/// Name in error messages of the format with lines `p x y z`, that of the data sets of Hoppe's surface reconstruction.
+/// Name, in error messages, of the text format with lines `p x y z`, which the data sets of Hoppe's surface
+/// reconstruction use.
 pub(super) const KEYWORD_FORMAT: &str = "PTS";
 
-/// Maximum number of columns; real files have some dozens. Without a limit, a file of nothing but commas would take
-/// forty times its size in memory.
+/// Maximum number of columns in a text file of points; real files have some dozens. Without a limit, a file of nothing
+/// but commas would take forty times its size in memory.
 const MAX_COLUMNS: usize = 1000;
 
-/// A line without surrounding whitespace, with its number in the file.
+/// A line of a text file without surrounding whitespace, and its number in the file.
 struct Line<'a> {
     number: usize,
     text: Cow<'a, str>,
@@ -47,29 +48,30 @@ impl Line<'_> {
     }
 }
 
-/// Returns the lines that are neither empty nor comments. Invalid UTF-8 is replaced: in comments it does not matter,
-/// and elsewhere it is not a number.
+/// Returns the lines of a file that are neither empty nor comments. Invalid UTF-8 is replaced: in comments it does not
+/// matter, and elsewhere it is an error, since it is not a number.
 fn content(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     lines(bytes).filter(|line| !line.text.is_empty() && comment(&line.text).is_none())
 }
 
-/// Returns all lines, without surrounding whitespace.
+/// Returns all lines of a file, without surrounding whitespace.
 fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     numbered_lines(bytes)
         .map(|(number, raw)| Line { number, text: String::from_utf8_lossy(raw.trim_ascii()) })
 }
 
-/// Returns the text of a comment; `None` if the line is not one.
+/// Returns the text of a comment line after its mark; `None` if the line is not a comment.
 fn comment(line: &str) -> Option<&str> {
     ["#", "//", "%"].iter().find_map(|separator| line.strip_prefix(separator))
 }
 
-/// Returns the separator of the line's cells; `None` for whitespace.
+/// Returns the character that separates the cells of a line, semicolon before comma; `None` for whitespace.
 fn separator(line: &str) -> Option<char> {
     [';', ','].into_iter().find(|&separator| line.contains(separator))
 }
 
-/// Returns the cells of a line without surrounding whitespace and quotes, at most [`MAX_COLUMNS`] + 1 of them.
+/// Returns the cells of a line without surrounding whitespace and quotes, at most [`MAX_COLUMNS`] + 1 of them, so that
+/// too many are noticed.
 fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
     let mut quoted = false;
     let ends = |c: char| {
@@ -86,7 +88,7 @@ fn unquoted(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
 }
 
-/// Reads points in columns, as described at [`parse_points`](super::parse_points).
+/// Reads points from columns of text, as described at [`parse_points`](super::parse_points).
 pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut lines = content(bytes).peekable();
     let count_line = lines.next_if(|line| announced(line).is_some());
@@ -120,8 +122,9 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     Err(line.invalid(FORMAT, &problem))
 }
 
-/// Takes the next line unless it consists of numbers, and returns the columns that it names. If it names no columns, it
-/// is skipped after an announced count (`counted`), and an error otherwise.
+/// Takes the next line of the file unless it consists of numbers, and returns the columns that it names. A line that
+/// names no columns is skipped if the line before it announced the number of points (`counted`), and an error
+/// otherwise.
 fn take_column_names<'a>(
     lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
     counted: bool,
@@ -135,27 +138,27 @@ fn take_column_names<'a>(
     Ok(named)
 }
 
-/// Returns the columns named by a comment at the start of the file. Of several comments that name `count` columns, the
-/// last one before the content is used.
+/// Returns the columns named by a comment at the start of the file. Of several comments that name `count` columns (the
+/// number in the first line of numbers), the last one is used.
 fn named_in_comment(bytes: &[u8], count: usize) -> Option<Columns> {
     let before = lines(bytes).take_while(|line| line.text.is_empty() || comment(&line.text).is_some());
     let named = before.filter_map(|line| Columns::named(comment(&line.text)?));
     named.filter(|columns| columns.count == count).last()
 }
 
-/// The meaning of the columns.
+/// The meaning of the columns in a text file of points.
 struct Columns {
     /// Number of columns in the file.
     count: usize,
-    /// Indices of the columns that are read, those of the position first.
+    /// Indices of the columns of the file that are read, those of the position first.
     read: Vec<usize>,
-    /// Which of the columns that are read hold normals and colours; `None` in a file without column names, whose values
-    /// decide it.
+    /// Which of the columns that are read hold normals and colours; `None` in a file without column names, in which
+    /// their values decide it.
     extras: Option<Extras>,
 }
 
-/// Index of the first column of normals and of colours, counted among the columns that are read; `None` if there are
-/// none.
+/// Index of the first column of normals and of colours, counted among the columns that are read; `None` if the file has
+/// no normals or no colours.
 struct Extras {
     normals: Option<usize>,
     colors: Option<usize>,
@@ -184,7 +187,8 @@ impl Columns {
         Some(Self { count: names.len(), read, extras: Some(extras) })
     }
 
-    /// Returns the columns of a file that does not name them; an error unless there are 3, 4, 6, 7 or 9.
+    /// Returns the columns of a file without column names; an error unless there are 3, 4, 6, 7 or 9. `first` is its
+    /// first line of numbers.
     fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
         if ![3, 4, 6, 7, 9].contains(&count) {
             let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
@@ -194,8 +198,8 @@ impl Columns {
     }
 }
 
-/// Returns the columns of x, y and z under the names that napari gives: `axis-0`, `axis-1` and so on for z, y and x,
-/// after time if there are four; `None` for any other number of them.
+/// Returns the indices of the columns of x, y and z under the names that napari gives: `axis-0`, `axis-1` and so on for
+/// z, y and x, after time if there are four; `None` for any other number of such names.
 fn napari_axes(names: &[String]) -> Option<Vec<usize>> {
     let column_of_axis = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
     let all: Vec<usize> = (0..5).map_while(column_of_axis).collect();
@@ -209,7 +213,7 @@ fn columns(count: usize) -> String {
     if count == 1 { "1 column".into() } else { format!("{count} columns") }
 }
 
-/// The numbers in the columns that are read, line by line.
+/// The numbers of a text file of points in the columns that are read, line by line.
 struct Table {
     columns: Columns,
     numbers: Vec<f32>,
@@ -226,7 +230,8 @@ impl Table {
         Ok(table)
     }
 
-    /// Adds the numbers of a line.
+    /// Appends the numbers of a line in the columns that are read; an error if the line has too few or too many
+    /// columns.
     fn push(&mut self, line: &Line, separator: Option<char>) -> Result<(), FormatError> {
         let cells = cells(&line.text, separator);
         if cells.len() != self.columns.count {
@@ -245,7 +250,7 @@ impl Table {
         self.numbers.chunks_exact(self.columns.read.len())
     }
 
-    /// Returns the three numbers from column `at`, for every line.
+    /// Returns the vector in three columns from `at`, counted among those that are read, for every line.
     fn vectors(&self, at: usize) -> impl Iterator<Item = Vec3> + Clone {
         self.rows().map(move |row| Vec3::from_slice(&row[at..]))
     }
@@ -278,12 +283,14 @@ impl Table {
         Err(FormatError::invalid(FORMAT, format!("columns 4 to {}", self.columns.count), problem))
     }
 
-    /// Returns whether all vectors from column `at` have unit length within 1 %.
+    /// Returns whether the vectors in three columns from `at` (counted among those that are read) have unit length
+    /// within 1 % in all lines.
     fn are_normals(&self, at: usize) -> bool {
         self.vectors(at).all(|v| (v.length() - 1.0).abs() <= 0.01)
     }
 
-    /// Returns whether all triples from column `at` can be colours: all numbers in 0..1, or all integers in 0..255.
+    /// Returns whether the triples in three columns from `at` (counted among those that are read) can be colours in all
+    /// lines: all numbers in 0..1, or all integers in 0..255.
     fn are_colors(&self, at: usize) -> bool {
         full_channel(self.vectors(at)).is_some()
     }
@@ -297,7 +304,8 @@ pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     })
 }
 
-/// Reads points with a keyword (`p`). Colours (`d`, `s`) and gloss (`g`), which apply to all that follows, are ignored.
+/// Reads points from lines `p x y z`. Colours (`d`, `s`) and gloss (`g`), which apply to all points that follow, are
+/// ignored.
 pub(super) fn parse_keyword_lines(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut points = Vec::new();
     for line in content(bytes) {

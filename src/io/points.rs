@@ -29,9 +29,9 @@ pub struct PointCloud {
 /// number of points, and the line after it may be a comment without a mark.
 ///
 /// Columns may be named in the first line or in a comment before it: `x`, `y`, `z`, and, in complete sets, `nx`, `ny`,
-/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; case and quotes do not matter. Instead of the first set, `axis-0`
-/// to `axis-2` are z, y, x, and `axis-0` to `axis-3` are time, z, y, x. All other columns are ignored: a file with a
-/// column of times gives the points of all times.
+/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; case and quotes do not matter. Instead of `x`, `y` and `z`,
+/// `axis-0` to `axis-2` are z, y, x, and `axis-0` to `axis-3` are time, z, y, x. All other columns are ignored: a file
+/// with a column of times gives the points of all times.
 ///
 /// Without names, the number of columns determines their meaning:
 ///
@@ -55,7 +55,7 @@ pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     validated(format, cloud)
 }
 
-/// Reads points in the format that the bytes indicate, with the name of the format.
+/// Reads points from a file in the format that its bytes indicate; returns the name of the format and the points.
 fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
         return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
@@ -99,7 +99,8 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
     PointCloud { points: mesh.positions, normals: mesh.normals, colors: mesh.colors }
 }
 
-/// Checks a cloud, and returns it with its colours scaled to 0..1.
+/// Returns a point cloud with its colours scaled to 0..1, after checking that it has points, finite numbers, and a
+/// normal and colour for each point if for any.
 fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
@@ -116,14 +117,15 @@ fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, Form
     Ok(PointCloud { colors, ..cloud })
 }
 
-/// Returns an error if a vector is not finite.
+/// Returns an error if one of the vectors, which belong to the points in order, is not finite; `field` names them.
 fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(), FormatError> {
     let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
     let problem = format!("point {i} (zero-based) has {}; numbers must be finite", vectors[i]);
     Err(FormatError::invalid(format, field, problem))
 }
 
-/// Returns an error unless there is one vector per point.
+/// Returns an error unless `found`, an array of normals or colours named `field`, has one vector for each of `count`
+/// points.
 fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) -> Result<(), FormatError> {
     if found.len() == count {
         return Ok(());
@@ -132,7 +134,7 @@ fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) 
     Err(FormatError::invalid(format, field, problem))
 }
 
-/// Returns the colours scaled to 0..1.
+/// Returns the colours scaled to 0..1, from that range or from 0..255; an error if they are out of range.
 fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, FormatError> {
     let full = full_channel(colors.iter().copied()).ok_or_else(|| {
         let problem = "out of range; all must be in 0..1, or integers in 0..255";
@@ -157,7 +159,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Three points, two of them with equal positions.
+    /// Returns three points with normals and colours, two of them with equal positions.
     fn sample_cloud() -> PointCloud {
         let p = Vec3::new(0.1, -2.5, 1e10);
         PointCloud {
@@ -198,7 +200,7 @@ mod tests {
         format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&sample_cloud(), full), "77 ", " ")).into_bytes()
     }
 
-    /// A binary PLY with doubles and 16-bit colours.
+    /// Returns a binary PLY file of the sample points, with doubles and 16-bit colours.
     fn ply_binary(little: bool) -> Vec<u8> {
         let encoding = if little { "binary_little_endian" } else { "binary_big_endian" };
         let mut out = ply_header(encoding, "double", "ushort", ["r", "g", "b"]).into_bytes();
@@ -230,7 +232,7 @@ mod tests {
         format!("{head}{}", text(&rows(&sample_cloud(), full), "", between)).into_bytes()
     }
 
-    /// One file of each kind, all with the same points.
+    /// Returns one file of each supported kind of point cloud, all with the same points.
     fn files() -> Vec<(&'static str, Vec<u8>)> {
         vec![
             ("PLY text", ply_text("uchar", 255.0)),
@@ -332,8 +334,8 @@ mod tests {
         assert!(error.starts_with("point file: format: STL"), "{error}");
     }
 
-    /// Asserts that a cloud, if the bytes are read without an error, has points, one entry per point in each array,
-    /// finite numbers, and colours in 0..1.
+    /// Asserts that the point cloud in a file, if the bytes are read without an error, has points, one entry per point
+    /// in each array, finite numbers, and colours in 0..1.
     fn assert_sound(bytes: &[u8], context: &str) {
         let Ok(cloud) = parse_points(bytes) else { return };
         let count = cloud.points.len();

@@ -1,9 +1,9 @@
-//! Conversion of a file's raw numbers to voxels.
+//! Conversion of the numbers in a volume file, binary or text, to voxels.
 
 use super::FormatError;
 use crate::volume::{VolumeError, Voxels};
 
-/// Type of the numbers in a file.
+/// Number type of the voxels in a volume file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     U8,
@@ -18,10 +18,12 @@ pub(super) enum Scalar {
     F64,
 }
 
-/// Maximum number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
+/// Maximum number of bytes that the voxel data of a file may have beyond the size given by the header: writers pad the
+/// end of files.
 pub(super) const MAX_PADDING: usize = 512;
 
-/// Largest integer up to which `f64` represents every integer.
+/// Largest integer up to which `f64` represents every integer; 64-bit voxels, which are converted to `f64`, must not
+/// exceed it.
 const MAX_EXACT: u64 = 1 << 53;
 
 /// Names of the file format and of the header field that voxels belong to, for error messages.
@@ -32,7 +34,7 @@ pub(super) struct FieldName {
 }
 
 impl Scalar {
-    /// Returns the size of one number in bytes.
+    /// Returns the size of a number of this type in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Scalar::U8 | Scalar::I8 => 1,
@@ -43,7 +45,7 @@ impl Scalar {
     }
 }
 
-/// Returns the size of the voxels in the file, uncompressed and binary, in bytes.
+/// Returns the number of bytes that the voxels of a file take when uncompressed and binary.
 ///
 /// # Errors
 /// A dimension of 0, or a size that cannot be addressed.
@@ -63,7 +65,7 @@ pub(super) fn payload_size(name: FieldName, dims: [usize; 4], scalar: Scalar) ->
     Err(FormatError::too_large(name.format, name.field, needed))
 }
 
-/// Returns the first `needed` bytes, which hold the voxels.
+/// Returns the first `needed` of the bytes of voxel data, those that hold the voxels.
 ///
 /// # Errors
 /// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it: header and payload then do not match.
@@ -79,6 +81,7 @@ pub(super) fn payload(name: FieldName, bytes: &[u8], needed: usize) -> Result<&[
 }
 
 /// Decodes the voxels in `bytes`, whose length is a multiple of the size of a number. 64-bit integers become `f64`.
+/// `big` means big-endian.
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
@@ -136,7 +139,7 @@ fn numbers<const N: usize, T>(
     Ok(out)
 }
 
-/// Returns an error if the absolute value of an integer exceeds [`MAX_EXACT`].
+/// Returns an error if a 64-bit integer in `bytes`, whose absolute value `size` returns, exceeds [`MAX_EXACT`].
 fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
     match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
         None => Ok(()),
@@ -147,11 +150,11 @@ fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> 
     }
 }
 
-/// Parses `count` numbers written as text, separated by whitespace or commas. All become `f64`, after a check that they
-/// are in the range of the stated type.
+/// Parses `count` voxels written as text, separated by whitespace or commas. All become `f64`, after a check that they
+/// are in the range of the type `scalar`.
 ///
 /// # Errors
-/// Too few or too many numbers, a word that is not a number, a number that the type does not have, or not enough
+/// Too few or too many numbers, a word that is not a number, a number that `scalar` cannot represent, or not enough
 /// memory.
 pub(super) fn decode_text(
     name: FieldName,
@@ -196,8 +199,8 @@ fn text_number(name: FieldName, word: &[u8], scalar: Scalar) -> Result<f64, Form
     })
 }
 
-/// Returns whether a value is accepted as a number of the type: for integers, one within their range (at most ±2⁵³ for
-/// 64 bits); for floats, any.
+/// Returns whether a value written as text is accepted as a number of the type that the header states: for integers,
+/// one within the range of the type (at most ±2⁵³ for 64 bits); for floats, any.
 fn can_represent(scalar: Scalar, v: f64) -> bool {
     let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
     match scalar {
@@ -213,7 +216,7 @@ fn can_represent(scalar: Scalar, v: f64) -> bool {
     }
 }
 
-/// Converts an error of [`crate::volume::Volume`] to one of the file being read.
+/// Converts an error of [`crate::volume::Volume::new`] to an error about the file being read.
 pub(super) fn volume_error(format: &'static str, error: VolumeError) -> FormatError {
     match error {
         VolumeError::InvalidArgument { parameter, problem } => {

@@ -7,18 +7,20 @@ use crate::mesh::TriangleMesh;
 
 const FORMAT: &str = "STL";
 
-/// Size of the header of a binary file in bytes, including the number of triangles.
+/// Size of the header of a binary STL file in bytes, including the number of triangles.
 pub(super) const HEADER: usize = 84;
 
-/// Size of a triangle in bytes: normal, three corners, two unused bytes.
+/// Size of a triangle in a binary STL file, in bytes: normal, three corners, two unused bytes.
 const RECORD: usize = 50;
 
-/// Returns whether the length of the file matches its number of triangles; binary STL has no other signature.
+/// Returns whether the bytes are a binary STL file: whether their length matches the number of triangles in the header,
+/// since binary STL has no signature.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
     triangle_count(bytes).is_some_and(|count| HEADER as u64 + count * RECORD as u64 == bytes.len() as u64)
 }
 
-/// Returns the number of triangles that the header states.
+/// Returns the number of triangles that the header of a binary STL file states; `None` if the file is shorter than a
+/// header.
 fn triangle_count(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..HEADER)?;
     Some(u64::from(u32::from_le_bytes(count.try_into().ok()?)))
@@ -49,13 +51,14 @@ fn point(bytes: &[u8]) -> Vec3 {
     Vec3::new(number(0), number(1), number(2))
 }
 
-/// Returns the triangles whose corners follow each other, three by three.
+/// Returns a mesh in which each three consecutive positions are the corners of a triangle, as in STL, which shares no
+/// vertices.
 fn from_corners(positions: Vec<Vec3>) -> TriangleMesh {
     let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     TriangleMesh { positions, triangles, ..Default::default() }
 }
 
-/// Returns whether the bytes are text that starts with the word `solid`.
+/// Returns whether the bytes look like a text STL file: text that starts with the word `solid`.
 pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
     let bytes = bytes.trim_ascii_start();
     let starts = bytes.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
@@ -83,7 +86,7 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(from_corners(corners))
 }
 
-/// Parses the coordinates of a vertex line.
+/// Parses the three coordinates on a `vertex` line of a text STL file; `line` is its number, for the error message.
 fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<Vec3, FormatError> {
     let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f32>().ok());
     let mut next = || numbers.next().flatten();
@@ -93,7 +96,8 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
     }
 }
 
-/// Returns the bytes of a binary STL file, with the unit normals of the triangles, 0 for one without area.
+/// Returns the bytes of a binary STL file of the mesh, with the unit normals of the triangles, 0 for a triangle without
+/// area.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.

@@ -19,10 +19,10 @@ pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8]
     (1..).zip(lines)
 }
 
-/// Maximum length of a header in bytes; real ones have a few kilobytes.
+/// Maximum length of the text header of a volume file, in bytes; real ones have a few kilobytes.
 const MAX_HEADER: usize = 1 << 20;
 
-/// Iterator over the lines of a header, which gives access to the bytes after it.
+/// Iterator over the lines of a volume file's text header, which then gives access to the bytes after it.
 pub(super) struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -43,7 +43,7 @@ impl<'a> Lines<'a> {
         Some(String::from_utf8_lossy(&rest[..length]).trim_end_matches('\r').to_owned())
     }
 
-    /// Returns the bytes after the lines read so far.
+    /// Returns the bytes after the header lines read so far, where the voxels start.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or(&[])
     }
@@ -64,7 +64,7 @@ impl Field<'_> {
         FormatError::invalid(self.format, self.name, format!("'{shown}': {problem}"))
     }
 
-    /// Parses `count` numbers separated by whitespace; NaN and infinities are accepted.
+    /// Parses the field as `count` numbers separated by whitespace; NaN and infinities are accepted.
     ///
     /// # Errors
     /// A word that is not a number; a number of words other than `count`.
@@ -76,7 +76,7 @@ impl Field<'_> {
             .ok_or_else(|| self.invalid(&format!("must be {count} numbers")))
     }
 
-    /// Parses `count` finite numbers separated by whitespace.
+    /// Parses the field as `count` finite numbers separated by whitespace.
     ///
     /// # Errors
     /// As [`numbers`](Self::numbers), and numbers that are not finite.
@@ -85,7 +85,7 @@ impl Field<'_> {
         if values.iter().all(|v| v.is_finite()) { Ok(values) } else { Err(self.invalid("must be finite")) }
     }
 
-    /// Parses `count` positive integers separated by whitespace.
+    /// Parses the field as `count` positive integers separated by whitespace.
     ///
     /// # Errors
     /// A number of words other than `count`, a 0, a word that is not an integer, or a size that cannot be addressed.
@@ -99,7 +99,7 @@ impl Field<'_> {
         counted.map_err(|_| FormatError::too_large(self.format, self.name, needed))
     }
 
-    /// Parses a single integer of at least `least`.
+    /// Parses the field as a single integer of at least `least`.
     ///
     /// # Errors
     /// Any other text.
@@ -108,8 +108,8 @@ impl Field<'_> {
         value.ok_or_else(|| self.invalid(&format!("must be an integer of at least {least}")))
     }
 
-    /// Parses a single non-negative integer as an offset; one that cannot be addressed becomes the largest `usize`,
-    /// past the end of any file.
+    /// Parses the field as a single non-negative integer, an offset into a file; one that cannot be addressed becomes
+    /// the largest `usize`, past the end of any file.
     ///
     /// # Errors
     /// Any other text.

@@ -5,8 +5,8 @@ use super::mesh_file::{color_bytes, push_floats};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 
-/// Returns the text of a VTP file with points and triangles; normals, texture coordinates and colours are point data,
-/// for which vertices on texture seams are duplicated.
+/// Returns the text of a VTP file of the mesh with points and triangles; normals, texture coordinates and colours are
+/// point data, for which vertices on texture seams are duplicated.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {
@@ -33,7 +33,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     xml.into_bytes()
 }
 
-/// Returns the XML of the vertex attributes.
+/// Returns the VTP element `PointData`, with the vertex attributes that the mesh has.
 fn point_data(mesh: &TriangleMesh) -> String {
     let mut active = String::new();
     let mut arrays = String::new();
@@ -54,14 +54,14 @@ fn point_data(mesh: &TriangleMesh) -> String {
     format!("<PointData{active}>\n{arrays}</PointData>\n")
 }
 
-/// Returns the XML of an array of vectors.
+/// Returns the VTP element of an array of 3D vectors.
 fn vectors(name: &str, values: &[Vec3]) -> String {
     let mut bytes = Vec::with_capacity(12 * values.len());
     values.iter().for_each(|v| push_floats(&mut bytes, &v.to_array()));
     data_array("Float32", name, 3, bytes)
 }
 
-/// Returns the XML of an array, whose length in bytes precedes its data inside the base64.
+/// Returns the VTP element of a data array; the length of the array in bytes precedes its data inside the base64.
 fn data_array(kind: &str, name: &str, components: usize, bytes: Vec<u8>) -> String {
     let mut block = (bytes.len() as u32).to_le_bytes().to_vec();
     block.extend(bytes);

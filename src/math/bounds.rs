@@ -4,7 +4,7 @@ use super::order::{combined_rank, rank_f32};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
 
-/// An axis-aligned box; its faces belong to it.
+/// An axis-aligned bounding box; its faces belong to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Corner with the smallest coordinates.
@@ -117,8 +117,8 @@ impl Bounds {
     }
 }
 
-/// Relative tolerance of [`Bounds::ray_entry`] and [`Bounds::line_entry`]: each product is within two ulps, and with
-/// less a ray could pass between two boxes that share a face.
+/// Relative tolerance of [`Bounds::ray_entry`] and [`Bounds::line_entry`]: each computed distance of a face is within
+/// two ulps, and with less tolerance a ray could pass between two boxes that share a face.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A ray prepared for tests against many boxes.
@@ -140,15 +140,15 @@ impl Ray {
 /// Largest absolute value of a direction's component that is treated as 0: its reciprocal would be close to infinity.
 const MIN_DIRECTION_COMPONENT: f64 = 1e-290;
 
-/// Indices of tree nodes still to be visited, each with the distance of its box; with a tree of a million items, no
-/// allocation is needed.
+/// Indices of the tree nodes that a query has still to visit, each with the distance of its box; with a tree of a
+/// million items, no allocation is needed.
 type Stack = SmallVec<[(f64, usize); 24]>;
 
-/// Maximum number of boxes in a leaf: 1 doubles the number of nodes, 16 tests many boxes in vain.
+/// Maximum number of boxes in a leaf of a [`BoxTree`]: 1 doubles the number of nodes, 16 tests many boxes in vain.
 const LEAF: usize = 4;
 
-/// A balanced bounding volume hierarchy. Its size is linear in the number of boxes whatever their shapes, and equal
-/// boxes give an equal tree.
+/// A balanced bounding volume hierarchy of boxes, for overlap, nearest-box and ray queries. Its size is linear in the
+/// number of boxes whatever their shapes, and equal boxes give an equal tree.
 #[derive(Clone, Debug, Default)]
 pub struct BoxTree {
     nodes: Vec<Node>,
@@ -158,14 +158,14 @@ pub struct BoxTree {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// Inner node: index of the second child (the first is the next node). Leaf: index of the first item.
+    /// Inner node: index of the second child (the first child is the next node). Leaf: index of its first item.
     link: u32,
     /// Number of items in a leaf; 0 for an inner node.
     count: u32,
 }
 
 impl BoxTree {
-    /// Builds the tree over `boxes`; an item is the index of its box.
+    /// Builds the tree over `boxes`; queries pass boxes to their callers as items, indices into `boxes`.
     pub fn new(boxes: &[Bounds]) -> Self {
         let mut items: Vec<(Bounds, u32)> = boxes.iter().copied().zip(0..).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
@@ -175,8 +175,8 @@ impl BoxTree {
         Self { nodes, items }
     }
 
-    /// Visits each pair of items whose boxes overlap, once, the lower index first. The order of the pairs is
-    /// deterministic but arbitrary.
+    /// Calls `visit` once with each pair of items (indices of boxes) whose boxes overlap, the lower index first. The
+    /// order of the pairs is deterministic but arbitrary.
     pub fn for_each_pair(&self, mut visit: impl FnMut(u32, u32)) {
         let mut stack = Vec::new();
         if !self.nodes.is_empty() {
@@ -199,9 +199,9 @@ impl BoxTree {
         }
     }
 
-    /// Visits items whose boxes are near `p`, roughly from near to far. `visit` receives an item and the current bound,
-    /// a squared distance that is infinite at first, and returns the new bound; items whose boxes are farther are
-    /// skipped, those exactly at the bound are visited.
+    /// Calls `visit` with items (indices of boxes) whose boxes are near `p`, roughly from near to far. `visit` also
+    /// receives the current bound, a squared distance that is infinite at first, and returns the new bound; items whose
+    /// boxes are farther are skipped, those exactly at the bound are visited.
     pub fn nearest(&self, p: Vec3, mut visit: impl FnMut(u32, f64) -> f64) {
         let mut bound = f64::INFINITY;
         self.descend(
@@ -214,26 +214,29 @@ impl BoxTree {
         );
     }
 
-    /// Visits items whose boxes have a squared distance of at most `squared` from `p`, until `visit` returns true.
+    /// Calls `visit` with the items (indices of boxes) whose boxes have a squared distance of at most `squared` from
+    /// `p`, until it returns true.
     pub fn within(&self, p: Vec3, squared: f64, mut visit: impl FnMut(u32) -> bool) {
         let entry = |bounds: &Bounds| Some(bounds.distance_squared(p));
         self.descend(squared, entry, |item| if visit(item) { -1.0 } else { squared });
     }
 
-    /// Visits items whose boxes the ray enters, roughly nearest entry first. `visit` returns the new bound, a distance
-    /// in lengths of the ray's direction; items whose boxes are entered beyond the bound are skipped.
+    /// Calls `visit` with items (indices of boxes) whose boxes the ray enters, roughly nearest entry first. `visit`
+    /// returns the new bound, a distance in lengths of the ray's direction that is infinite at first; items whose boxes
+    /// are entered beyond the bound are skipped.
     pub fn along_ray(&self, ray: &Ray, visit: impl FnMut(u32) -> f64) {
         self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    /// Visits items whose boxes the whole line meets, ahead of the ray's origin or behind, roughly nearest first. The
-    /// bound is `max_distance` at first, then the last value that `visit` returned: a distance from the origin, in
-    /// lengths of the ray's direction. Items whose boxes are beyond the bound are skipped.
+    /// Calls `visit` with items (indices of boxes) whose boxes the whole line of a ray meets, ahead of the ray's origin
+    /// or behind, roughly nearest first. The bound is `max_distance` at first, then the last value that `visit`
+    /// returned: a distance from the origin, in lengths of the ray's direction. Items whose boxes are beyond the bound
+    /// are skipped.
     pub fn along_line(&self, ray: &Ray, max_distance: f64, visit: impl FnMut(u32) -> f64) {
         self.descend(max_distance, |bounds| bounds.line_entry(ray), visit);
     }
 
-    /// Visits items whose boxes overlap `bounds`.
+    /// Calls `visit` with the items (indices of boxes) whose boxes overlap `bounds`.
     pub fn for_each_overlapping(&self, bounds: &Bounds, mut visit: impl FnMut(u32)) {
         let entry = |other: &Bounds| other.overlaps(bounds).then_some(0.0);
         self.descend(0.0, entry, |item| {
@@ -242,9 +245,9 @@ impl BoxTree {
         });
     }
 
-    /// Visits items for whose boxes `entry` returns a distance within the bound: `bound` at first, then the last value
-    /// that `visit` returned. Boxes for which it returns `None` are skipped. Of two sibling nodes, the nearer is
-    /// visited first.
+    /// The traversal that all queries share: visits items for whose boxes `entry` returns a distance within the bound,
+    /// which is `bound` at first, then the last value that `visit` returned. Boxes for which `entry` returns `None` are
+    /// skipped. Of two sibling nodes, the nearer is visited first.
     fn descend(
         &self,
         mut bound: f64,
@@ -291,7 +294,7 @@ impl BoxTree {
         if node.count == 0 { &[] } else { &self.items[node.link as usize..(node.link + node.count) as usize] }
     }
 
-    /// Visits the pairs of items of a leaf whose boxes overlap.
+    /// Calls `visit` with the pairs of items of one leaf whose boxes overlap, the lower index first.
     fn pairs_within(&self, leaf: &Node, visit: &mut impl FnMut(u32, u32)) {
         let items = self.items_of(leaf);
         for (k, (bounds, item)) in items.iter().enumerate() {
@@ -303,7 +306,8 @@ impl BoxTree {
         }
     }
 
-    /// Visits the pairs of an item of leaf `a` and an item of leaf `b` whose boxes overlap.
+    /// Calls `visit` with the pairs of an item of leaf `a` and an item of leaf `b` whose boxes overlap, the lower index
+    /// first.
     fn pairs_between(&self, a: &Node, b: &Node, visit: &mut impl FnMut(u32, u32)) {
         for (bounds, item) in self.items_of(a) {
             if !bounds.overlaps(&b.bounds) {

@@ -1,5 +1,5 @@
-//! Basic geometry: the vector types shared by all layers, bounding boxes, triangles, exact predicates and quadric
-//! errors.
+//! Geometry and numerics shared by all layers: vector types, bounding boxes, triangles, exact predicates, quadric
+//! errors, eigenvectors of symmetric matrices, sorting and random numbers.
 
 mod bounds;
 mod min_max;

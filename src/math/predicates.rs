@@ -77,7 +77,7 @@ pub fn triangles_intersect_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 
 }
 
 /// Returns whether the triangles `u v a` and `v u b` overlap beyond their common edge: they are coplanar and on the
-/// same side of it. A triangle without area is on neither side.
+/// same side of this edge. A triangle without area is on neither side, so it overlaps with none.
 pub fn triangles_overlap_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
     orient3d(u, v, a, b) == 0.0
         && Axis::ALL.into_iter().any(|axis| {
@@ -172,7 +172,7 @@ fn point_in_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
         && orientations.iter().any(|&orientation| orientation < 0.0))
 }
 
-/// A coordinate axis along which points are projected.
+/// A coordinate axis along which points are projected, to reduce tests of coplanar points to two dimensions.
 #[derive(Clone, Copy)]
 enum Axis {
     X,

@@ -38,21 +38,21 @@ impl Quadric {
         }
     }
 
-    /// Returns the value at `p`, which is never negative.
+    /// Returns the value of the quadratic function at `p`, a weighted sum of squared distances; rounding never makes it
+    /// negative.
     pub fn evaluate(&self, p: DVec3) -> f64 {
         let value = (self.matrix() * p - 2.0 * self.linear).dot(p) + self.constant;
         // Rounding can make the difference negative.
         value.max(0.0)
     }
 
-    /// Returns the position of the minimum; `None` if it is not a unique finite point.
+    /// Returns the position at which the quadratic function is least; `None` if it is not a unique finite point.
     pub fn minimizer(&self) -> Option<DVec3> {
         let matrix = self.matrix();
         let minimum = matrix.inverse() * self.linear;
         (matrix.determinant() > 0.0 && minimum.is_finite()).then_some(minimum)
     }
 
-    /// Returns the matrix A.
     fn matrix(&self) -> DMat3 {
         let ([xx, yy, zz], [xy, yz, zx]) = (self.diagonal.to_array(), self.mixed.to_array());
         DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
@@ -105,7 +105,8 @@ mod tests {
         assert!((corner.minimizer().unwrap() - P).length() < 1e-14);
     }
 
-    /// On a flat region the planes do not determine the minimum, and a small weight of the points does.
+    /// On a flat region, quadrics of planes do not determine the position of the minimum, and quadrics of points with a
+    /// small weight do.
     #[test]
     fn points_settle_what_planes_leave_open() {
         let mut flat = Quadric::default();

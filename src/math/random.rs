@@ -5,14 +5,14 @@
 pub struct Random(u64);
 
 impl Random {
-    /// Creates the generator of a seed.
+    /// Creates a generator whose sequence of numbers is determined by `seed`.
     pub fn new(seed: u64) -> Self {
         let mut random = Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
         random.next_u32();
         random
     }
 
-    /// Returns 32 random bits.
+    /// Returns the next 32 random bits of the sequence.
     pub fn next_u32(&mut self) -> u32 {
         let state = self.0;
         self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

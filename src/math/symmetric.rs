@@ -1,12 +1,14 @@
-//! Eigenvalues and eigenvectors of symmetric matrices by Jacobi rotations: all of 3×3, the least of any size.
+//! Eigenvalues and eigenvectors of symmetric matrices by Jacobi rotations: all of a 3×3 matrix, and the eigenvector of
+//! the least eigenvalue of a matrix of any size.
 
 use super::{DMat3, DVec3};
 
-/// Maximum number of Jacobi sweeps. Jacobi converges quadratically, and 6 sweeps were the most observed.
+/// Maximum number of Jacobi sweeps over all off-diagonal entries. Jacobi converges quadratically, and 6 sweeps were the
+/// most observed.
 const SWEEPS: usize = 16;
 
-/// Returns the eigenvalues of a symmetric matrix in ascending order, and their orthonormal eigenvectors as the columns
-/// of a rotation.
+/// Returns the eigenvalues of a symmetric matrix in ascending order, and their orthonormal eigenvectors in the same
+/// order as the columns of a rotation.
 ///
 /// Only the symmetric part of `matrix` is used. Every eigenvalue is accurate to rounding relative to the one with the
 /// largest absolute value. If an entry is not finite, some of the results are not.
@@ -26,7 +28,7 @@ pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
 }
 
 /// Returns the Jacobi rotation R in the plane of axes `p` and `q`, for which RᵀaR has a zero at `(p, q)`; the identity
-/// if that entry is negligible.
+/// if the entry of `a` there is negligible.
 fn jacobi_rotation(a: &DMat3, p: usize, q: usize) -> DMat3 {
     let off = a.col(q)[p];
     let gap = a.col(q)[q] - a.col(p)[p];
@@ -53,7 +55,8 @@ fn jacobi_angle(off: f64, gap: f64) -> [f64; 3] {
     [tangent, cosine, tangent * cosine]
 }
 
-/// Returns the eigenvalues in ascending order, with their eigenvectors as the columns of a right-handed basis.
+/// Returns eigenvalues in ascending order, and their eigenvectors, the columns of `vectors`, in the same order as the
+/// columns of a right-handed basis.
 fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
@@ -81,8 +84,8 @@ pub fn least_eigenvector<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     vectors[least]
 }
 
-/// Zeroes the entry `(p, q)` of `a` by a Jacobi rotation, and applies it to the rows of `vectors`, which become the
-/// eigenvectors. Returns false, and does nothing, if the entry is negligible.
+/// Zeroes the entry `(p, q)` of `a` by a Jacobi rotation, and applies the rotation to the rows of `vectors`, which
+/// become the eigenvectors. Returns false, and changes nothing, if the entry is negligible.
 #[inline]
 fn rotate<const N: usize>(a: &mut [[f64; N]; N], vectors: &mut [[f64; N]; N], p: usize, q: usize) -> bool {
     let (off, gap) = (a[p][q], a[q][q] - a[p][p]);

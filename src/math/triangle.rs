@@ -17,8 +17,8 @@ pub fn area(triangle: [Vec3; 3]) -> f64 {
 }
 
 /// Returns the solid angle of the triangle seen from `p`, in steradians, from −2π to 2π; positive if `p` is behind the
-/// triangle, on the side from which its corners are clockwise. Over a closed surface with outward triangles they sum to
-/// 4π inside and to 0 outside.
+/// triangle, on the side from which its corners are clockwise. The solid angles of all triangles of a closed surface,
+/// if they face outwards, sum to 4π for points inside and to 0 for points outside.
 ///
 /// Van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983.
 pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
@@ -28,7 +28,7 @@ pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
     2.0 * libm::atan2(a.dot(b.cross(c)), cosine)
 }
 
-/// Returns the point with the given barycentric coordinates.
+/// Returns the point of the triangle with the given barycentric coordinates.
 #[inline]
 pub fn point_at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
     a.as_dvec3() * barycentric.x + b.as_dvec3() * barycentric.y + c.as_dvec3() * barycentric.z
@@ -65,19 +65,20 @@ pub fn closest_barycentric([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
     }
 }
 
-/// Squared sine of the angle at `a` below which a triangle is treated as its edges: rounding then hides on which side
-/// of an edge a point is.
+/// Squared sine of the angle at the first corner below which a triangle is treated as its three edges in closest-point
+/// queries: rounding then hides on which side of an edge a point is.
 const SLIVER: f64 = 1e-12;
 
-/// Returns the barycentric coordinates, the first component, of the candidate with the least squared distance, the
-/// second; the first of equals.
+/// Returns the barycentric coordinates of the nearest candidate, the first of equally near ones; each candidate is a
+/// pair of barycentric coordinates and a squared distance.
 fn nearest<const N: usize>(candidates: [(DVec3, f64); N]) -> DVec3 {
     let nearer = |best: (DVec3, f64), next: (DVec3, f64)| if next.1 < best.1 { next } else { best };
     candidates.into_iter().fold((DVec3::X, f64::INFINITY), nearer).0
 }
 
-/// Returns the barycentric coordinates of the closest point to the origin on the segment from `a` to `b`, and its
-/// squared distance; `barycentric` converts its position, a fraction from `a` to `b`, to these coordinates.
+/// Returns the closest point to the origin on the segment from `a` to `b`, an edge of a triangle, as barycentric
+/// coordinates, and its squared distance; `barycentric` converts a position on the segment, a fraction from `a` to `b`,
+/// to these coordinates.
 #[inline]
 fn segment(a: DVec3, b: DVec3, barycentric: impl Fn(f64) -> DVec3) -> (DVec3, f64) {
     let s = closest_segment_parameter(a, b);
@@ -96,7 +97,7 @@ fn closest_segment_parameter(a: DVec3, b: DVec3) -> f64 {
 pub struct LineHit {
     /// Distance along the line, in lengths of its direction; negative behind its origin.
     pub distance: f64,
-    /// Barycentric coordinates of the point in the triangle.
+    /// Barycentric coordinates of the intersection in the triangle.
     pub barycentric: DVec3,
 }
 
@@ -105,9 +106,9 @@ pub struct LineHit {
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     origin: DVec3,
-    /// Indices of the coordinate axes: the two across the line, then the one along it.
+    /// Indices of the coordinate axes: the two across the line, then the one closest to its direction.
     axes: [usize; 3],
-    /// Displacement of the line along each of the two axes across it, per unit along the third.
+    /// Displacement of the line along each of the first two of `axes`, per unit along the third.
     shear: [f64; 2],
     /// Distance along the line, in lengths of its direction, per unit along the third of `axes`.
     scale: f64,
@@ -125,8 +126,8 @@ impl Line {
     /// Returns where the line meets the triangle, from either side, ahead or behind; `None` if it misses or the
     /// triangle is edge-on.
     ///
-    /// Two triangles that share an edge leave no gap between them: the edge function has the same value for both with
-    /// opposite signs, and zero belongs to both.
+    /// Two triangles that share an edge leave no gap between them: on which side of the edge the line is, is computed
+    /// alike for both, and a line exactly through the edge hits both.
     #[inline]
     pub fn hit(&self, triangle: [Vec3; 3]) -> Option<LineHit> {
         let [a, b, c] = triangle.map(|q| self.sheared(q));

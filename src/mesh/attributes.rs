@@ -1,4 +1,4 @@
-//! Per-vertex attributes that are kept up to date by edits.
+//! Per-vertex attributes of a [`Mesh`](super::Mesh), such as data of a method, that edits keep up to date.
 
 use super::VertexId;
 use crate::math::Vec3;
@@ -62,8 +62,8 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.push(0.0));
     }
 
-    /// Sets the attributes of `target` to those of `a` and `b`, interpolated linearly: those of `a` for `t` = 0, those
-    /// of `b` for `t` = 1.
+    /// Sets the attributes of slot `target` to those of `a` and `b`, interpolated linearly: those of `a` for `t` = 0,
+    /// those of `b` for `t` = 1.
     pub(super) fn blend(&mut self, target: VertexId, a: VertexId, b: VertexId, t: f32) {
         let (target, a, b) = (target.index(), a.index(), b.index());
         for v in &mut self.vectors {
@@ -74,13 +74,13 @@ impl Attributes {
         }
     }
 
-    /// Appends the attributes of a slot to `out`, for the undo log.
+    /// Appends all attributes of the vertex in a slot to `out`, for the undo log.
     pub(super) fn get(&self, slot: usize, out: &mut Vec<f32>) {
         self.vectors.iter().for_each(|v| out.extend(v[slot].to_array()));
         out.extend(self.scalars.iter().map(|s| s[slot]));
     }
 
-    /// Restores the attributes of a slot from the numbers appended by [`Self::get`].
+    /// Restores all attributes of the vertex in a slot from the numbers appended by [`Self::get`].
     pub(super) fn set(&mut self, slot: usize, data: &[f32]) {
         let (vectors, scalars) = data.split_at(3 * self.vectors.len());
         for (to, from) in self.vectors.iter_mut().zip(vectors.chunks_exact(3)) {
@@ -96,7 +96,7 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.truncate(slots));
     }
 
-    /// Moves the attributes of slot `order[i]` to slot `i`.
+    /// Moves the attributes of slot `order[i]` to slot `i`, when vertices are renumbered.
     pub(super) fn reorder(&mut self, order: &[VertexId]) {
         for v in &mut self.vectors {
             *v = order.iter().map(|id| v[id.index()]).collect();
@@ -106,7 +106,7 @@ impl Attributes {
         }
     }
 
-    /// Returns the numbers of vector and scalar attributes.
+    /// Returns the numbers of vector and of scalar attributes.
     pub(super) fn counts(&self) -> [usize; 2] {
         [self.vectors.len(), self.scalars.len()]
     }

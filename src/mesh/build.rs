@@ -41,8 +41,8 @@ impl Mesh {
         Self { rings, positions, half_edges, euler, attributes: Attributes::default(), ..Self::default() }
     }
 
-    /// Creates an icosahedron with all vertices at distance `radius` from `center`, counter-clockwise seen from
-    /// outside.
+    /// Creates the mesh of an icosahedron with all vertices at distance `radius` from `center`; triangles are
+    /// counter-clockwise seen from outside.
     pub fn icosahedron(center: Vec3, radius: f32) -> Self {
         let golden = 0.5 * (1.0 + 5.0_f32.sqrt());
         let scale = radius / (1.0 + golden * golden).sqrt();
@@ -101,8 +101,9 @@ impl Mesh {
         TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
     }
 
-    /// Adds a copy of `other`, a mesh without attributes that must not touch this one, and returns the new vertices.
-    /// Their attributes are unspecified; the caller sets them.
+    /// Adds a copy of `other`, which must not touch this mesh, as further connected components, and returns the ids of
+    /// the added vertices in the slot order of `other`. `other` must have no attributes; those of the added vertices
+    /// are unspecified, and the caller sets them.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if there are not enough vertex ids left.
@@ -126,10 +127,11 @@ impl Mesh {
     }
 }
 
-/// The new id of a free slot in [`Mesh::append`], which copies no vertex from it.
+/// Placeholder in [`Mesh::append`] for the new id of a free slot, as only live vertices are copied.
 const NO_ID: VertexId = VertexId(u32::MAX);
 
-/// The largest vertex count of a sphere: as many as fit into a browser's memory with room to work.
+/// The largest vertex count of a sphere made by [`Mesh::icosphere`]: as many as fit into a browser's memory with room
+/// to work.
 const MAX_SPHERE_VERTICES: usize = 16_000_000;
 
 fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
@@ -157,7 +159,8 @@ fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// For every vertex, its links: the edges (a, b) opposite it in its triangles.
+/// For every vertex of a triangle list, its links, from which its one-ring is built: the edges (a, b) opposite it in
+/// its triangles.
 struct Links {
     starts: Vec<usize>,
     links: Vec<(u32, u32)>,
@@ -188,8 +191,8 @@ impl Links {
     }
 }
 
-/// Orders the links of vertex `v` into its one-ring, or reports why they are not a single cycle of 3 to
-/// [`LARGEST_VALENCE`] edges.
+/// Orders the links of vertex `v`, the edges opposite it in its triangles, into its one-ring, or reports why they are
+/// not a single cycle of 3 to [`LARGEST_VALENCE`] edges.
 fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
@@ -220,7 +223,7 @@ fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     Ok(Ring::new(ring))
 }
 
-/// The vertices of an icosahedron, before scaling; ±2 stands for ± the golden ratio.
+/// The vertices of an icosahedron around the origin, before scaling; ±2 stands for ± the golden ratio.
 const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
     [-1.0, 2.0, 0.0],
     [1.0, 2.0, 0.0],
@@ -236,7 +239,7 @@ const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
     [-2.0, 0.0, 1.0],
 ];
 
-/// The one-rings of the vertices of an icosahedron, counter-clockwise seen from outside.
+/// The one-rings of the vertices of an icosahedron, by vertex index, counter-clockwise seen from outside.
 const ICOSAHEDRON_RINGS: [[u32; 5]; 12] = [
     [11, 5, 1, 7, 10],
     [5, 9, 8, 7, 0],

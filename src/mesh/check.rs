@@ -1,20 +1,21 @@
-//! Tests of the invariants of a dynamic mesh, one function each.
+//! Tests of the invariants of the dynamic [`Mesh`], one function each.
 
 use super::{Mesh, VertexId};
 
 /// A violated invariant of a mesh, found by [`Mesh::check`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvariantViolation {
-    /// A vertex has fewer than three neighbours.
+    /// This vertex has fewer than three neighbours.
     #[error("{0:?} has fewer than three neighbours")]
     LowValence(VertexId),
-    /// A neighbour occurs twice in the ring of a vertex, so that an edge is doubled.
+    /// The second vertex occurs twice in the ring of the first, so that the edge between them is doubled.
     #[error("the edge from {0:?} to {1:?} is doubled")]
     DoubledEdge(VertexId, VertexId),
-    /// A neighbour is not live, is the vertex itself, or does not have the vertex as its neighbour.
+    /// The second vertex is in the ring of the first, but is not live, is the first itself, or does not have the first
+    /// in its ring.
     #[error("{1:?} is in the ring of {0:?}, but not {0:?} in the ring of {1:?}")]
     OneSidedEdge(VertexId, VertexId),
-    /// The rings of the three corners of a triangle are inconsistent: the surface is open or not oriented there.
+    /// The rings of these three corners of a triangle are inconsistent: the surface is open or not oriented there.
     #[error("the rings of the corners of triangle ({0:?}, {1:?}, {2:?}) are inconsistent")]
     BrokenTriangle(VertexId, VertexId, VertexId),
     /// The Euler characteristic or the number of half-edges maintained by the edits differs from the counted one.
@@ -25,17 +26,19 @@ pub enum InvariantViolation {
         /// The Euler characteristic V − E + F, counted.
         counted: i64,
     },
-    /// Per-vertex arrays, rings and the free list are inconsistent.
+    /// The lengths of the per-vertex arrays differ, or the free list does not contain each slot with an empty ring
+    /// once.
     #[error("the arrays of the mesh are inconsistent")]
     InconsistentArrays,
-    /// A position or attribute of a vertex is NaN or infinite.
+    /// A position or attribute of this vertex is NaN or infinite.
     #[error("{0:?} has a position or attribute that is not finite")]
     NotFinite(VertexId),
 }
 
 impl Mesh {
-    /// Tests the invariants listed in the documentation of the [module](super), and that the per-vertex arrays, the
-    /// free list and the counters are consistent and all positions and attributes finite.
+    /// Tests the invariants of a closed, oriented 2-manifold listed in the documentation of the [module](super), and
+    /// that the per-vertex arrays, the free list and the counters are consistent and all positions and attributes
+    /// finite.
     ///
     /// # Errors
     /// The first violated invariant found.

@@ -6,7 +6,7 @@ use crate::math::DVec3;
 
 impl TriangleMesh {
     /// Returns the mesh without the connected components that enclose a volume below `volume`, in the cubed length unit
-    /// of the mesh, whatever their orientation.
+    /// of the mesh, whether their triangles face outwards or inwards.
     ///
     /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
     /// shell is removed together with its cavity, and a small cavity in a larger solid is filled. Only positions and
@@ -17,15 +17,16 @@ impl TriangleMesh {
         self.components_where(|v| enclosed[component_of[v as usize] as usize].abs() >= volume)
     }
 
-    /// Appends the positions and triangles of another mesh; other data of it is ignored.
+    /// Appends the positions and triangles of another mesh, as separate components; normals, colours and texture of it
+    /// are ignored.
     pub(crate) fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
 
-    /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use; whole components if
-    /// `keeps` has the same value for all vertices of one. Only positions and triangles are kept.
+    /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use: whole connected
+    /// components if `keeps` has the same value for all vertices of one. Only positions and triangles are kept.
     pub(crate) fn components_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();
@@ -45,7 +46,7 @@ impl TriangleMesh {
         kept
     }
 
-    /// Returns for each vertex the lowest vertex index of its connected component.
+    /// Returns for each vertex the lowest vertex index of its connected component, which identifies the component.
     pub(crate) fn component_of_each_vertex(&self) -> Vec<u32> {
         let mut groups = DisjointSets::new(self.positions.len());
         for [a, b, c] in &self.triangles {
@@ -55,8 +56,8 @@ impl TriangleMesh {
         (0..self.positions.len()).map(|v| groups.find(v) as u32).collect()
     }
 
-    /// Returns the signed volume of each connected component, stored at its lowest vertex index; positive if its
-    /// triangles face outwards.
+    /// Returns the signed volume of each connected component, positive if its triangles face outwards, at the lowest
+    /// vertex index of the component, and 0 at other indices. `component_of` is that index by vertex.
     fn enclosed_volumes(&self, component_of: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.positions.len()];
         for triangle in &self.triangles {

@@ -2,8 +2,8 @@
 
 use super::{Mesh, VertexId};
 
-/// The largest limit for which [`Mesh::component_of`] searches the vertices found so far linearly, instead of marking
-/// them in an array over the whole mesh.
+/// The largest `limit` for which [`Mesh::component_of`] searches the vertices found so far linearly, instead of marking
+/// them in an array over the whole mesh, which is slower for few vertices.
 const LINEAR_SEARCH_LIMIT: usize = 64;
 
 impl Mesh {
@@ -37,7 +37,7 @@ impl Mesh {
             .filter_map(move |v| if seen[v.index()] { None } else { Some(self.flood(v, &mut seen)) })
     }
 
-    /// Marks in `seen` and returns the vertices connected with `v`, in breadth-first order.
+    /// Marks the vertices connected with `v` in `seen`, by slot, and returns them in breadth-first order.
     fn flood(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
         let mut found = vec![v];
         seen[v.index()] = true;

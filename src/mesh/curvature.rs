@@ -40,17 +40,18 @@ pub fn curvature(mesh: &TriangleMesh) -> Curvature {
     }
 }
 
-/// The sums over the triangles around a vertex from which its curvature is computed.
+/// The sums over the triangles around a vertex from which the curvature at the vertex is computed.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    /// The sum of the angles at the vertex, in radians.
+    /// The sum of the angles of the triangles at the vertex, in radians.
     angle: f64,
-    /// The mixed Voronoi area.
+    /// The mixed Voronoi area around the vertex, which the curvature is averaged over.
     area: f64,
-    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y of the vertex x, with the angles α and β opposite the edge;
-    /// this is 2 H n times the area.
+    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y of the vertex x, with the angles α and β opposite the edge
+    /// between them; this is 2 H n times the mixed Voronoi area, with the mean curvature H and the unit normal n.
     laplacian: DVec3,
-    /// The sum of the cross products of the triangles, outwards; its length is twice their area if they are coplanar.
+    /// The sum of the cross products of the triangles, an outward normal; its length is twice their area if they are
+    /// coplanar.
     normal: DVec3,
     on_rim: bool,
 }
@@ -64,8 +65,8 @@ impl Sums {
         self.per_area(std::f64::consts::TAU - self.angle)
     }
 
-    /// Returns an integral over the mixed area divided by the area; 0 on a boundary or if the area is 0. The result is
-    /// limited to the range of `f32`: a tiny area can give any number.
+    /// Returns a curvature: its `integral` over the mixed Voronoi area, divided by that area; 0 on a boundary or if the
+    /// area is 0. The result is limited to the range of `f32`: a tiny area can give any number.
     fn per_area(&self, integral: f64) -> f64 {
         let value = integral / self.area;
         if self.on_rim || self.area == 0.0 || value.is_nan() {
@@ -75,7 +76,7 @@ impl Sums {
     }
 }
 
-/// Adds the contributions of a triangle to the sums of its corners.
+/// Adds the contributions of a triangle to the sums, by vertex, of its three corners.
 fn add(sums: &mut [Sums], corners: [usize; 3], points: [DVec3; 3]) {
     let angles = angles(points);
     let normal = (points[1] - points[0]).cross(points[2] - points[0]);
@@ -118,8 +119,8 @@ fn angles(points: [DVec3; 3]) -> [f64; 3] {
     angles
 }
 
-/// Returns the share of each corner in the area of a triangle: its Voronoi region, or, if an angle is obtuse, half of
-/// the area at that corner and a quarter at the others (figure 4 of Meyer et al.).
+/// Returns the part of the area of a triangle that belongs to each corner: its Voronoi region, or, if an angle is
+/// obtuse, half of the area at that corner and a quarter at the others (figure 4 of Meyer et al.).
 fn mixed_areas(points: [DVec3; 3], cotangents: [f64; 3], area: f64) -> [f64; 3] {
     if cotangents.iter().any(|&c| c < 0.0) {
         return cotangents.map(|c| if c < 0.0 { 0.5 * area } else { 0.25 * area });
@@ -145,8 +146,8 @@ mod tests {
         Mesh::icosphere(Vec3::new(1.0, -2.0, 3.0), radius, edge).unwrap().to_triangles()
     }
 
-    /// Returns a sphere with vertices shifted on it by up to 0.15 of an edge in each direction, so that triangles have
-    /// all shapes.
+    /// Returns a sphere with vertices shifted on it at random, by up to 0.15 of an edge in each direction, so that
+    /// triangles have all shapes.
     fn uneven_sphere(radius: f32, edge: f32) -> TriangleMesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, radius, edge).unwrap().to_triangles();
         let mut state = 7_u32;
@@ -164,7 +165,7 @@ mod tests {
         values.zip(weights).map(|(v, w)| v * w).sum::<f64>() / weights.iter().sum::<f64>()
     }
 
-    /// Returns the largest and the area-weighted mean relative error of `values`.
+    /// Returns the largest and the area-weighted mean relative error of `values`, by vertex, against `expected`.
     fn off(values: &[f64], areas: &[f64], expected: f64) -> [f64; 2] {
         let off = |v: &f64| (v / expected - 1.0).abs();
         [values.iter().map(off).fold(0.0, f64::max), mean_of(values.iter().map(off), areas)]
@@ -225,7 +226,8 @@ mod tests {
         }
     }
 
-    /// Returns Σ K A and Σ A over the vertices, with their curvature K and area A, and the area of the mesh.
+    /// Returns Σ K A and Σ A over the vertices, with their Gaussian curvature K and mixed Voronoi area A, and the area
+    /// of the mesh, to test the Gauss–Bonnet theorem.
     fn integrals(mesh: &TriangleMesh) -> [f64; 3] {
         let found = curvature(mesh);
         let total = found.gaussian.iter().zip(&found.areas).map(|(k, a)| k * a).sum();
@@ -258,7 +260,7 @@ mod tests {
         assert_eq!(areas_of(DVec3::new(0.5, 1.0, 0.0)), [0.15625, 0.171875, 0.171875]);
     }
 
-    /// Returns the mixed areas of the corners of a single triangle.
+    /// Returns the mixed Voronoi areas of the corners of a single triangle, for tests.
     fn lone_areas(points: [DVec3; 3]) -> [f64; 3] {
         let mut sums = [Sums::default(); 3];
         add(&mut sums, [0, 1, 2], points);

@@ -1,20 +1,20 @@
-//! The half-edges of a triangle list sorted by edge, for its measures, report and connected components.
+//! The half-edges of a triangle list sorted by edge, for computing its measures, report and connected components.
 
 use crate::math::order::sort_by_rank;
 
-/// A half-edge: the use of an edge by a triangle.
+/// A half-edge of a triangle list: the use of an edge by one triangle, with a direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct HalfEdge {
-    /// The ends as a sort key, the lower vertex index in the high half.
+    /// The vertex indices of the ends as a sort key, the lower one in the high half.
     key: u64,
-    /// The index of the triangle.
+    /// The index of the triangle that uses the edge.
     pub triangle: u32,
-    /// Whether the half-edge runs from the lower vertex index to the higher one.
+    /// Whether the triangle traverses the edge from the lower vertex index to the higher one.
     pub forward: bool,
 }
 
 impl HalfEdge {
-    /// Returns the vertex indices of the ends, the lower one first.
+    /// Returns the vertex indices of the ends of the edge, the lower one first.
     pub fn ends(&self) -> [u32; 2] {
         [(self.key >> 32) as u32, self.key as u32]
     }
@@ -37,7 +37,8 @@ pub(super) fn sorted_half_edges(triangles: &[[u32; 3]]) -> Vec<HalfEdge> {
     half_edges
 }
 
-/// Iterates over the edges of `half_edges`, which are sorted by edge: each edge as the slice of its half-edges.
+/// Iterates over the edges of `half_edges`, which must be sorted by edge: yields for each edge the slice of its
+/// half-edges.
 pub(super) fn by_edge(half_edges: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
     half_edges.chunk_by(|a, b| a.key == b.key)
 }

@@ -1,5 +1,5 @@
-//! Eulerian edits: split (creation), collapse (deletion), flip (inversion; Lachaud & Montanvert, section 3.3), and
-//! removal of components.
+//! Eulerian edits of the dynamic mesh: split (creation), collapse (deletion) and flip (inversion) of an edge (Lachaud &
+//! Montanvert, section 3.3), and removal of connected components.
 
 use super::{EditError, Mesh, Ring, VertexId};
 use crate::math::Vec3;
@@ -7,14 +7,14 @@ use crate::math::Vec3;
 /// The two vertices opposite an edge: the third corners of its two triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OppositeVertices {
-    /// The third corner of the triangle to the left of the directed edge, seen from outside.
+    /// The third corner of the triangle to the left of the edge in its given direction, seen from outside.
     pub left: VertexId,
-    /// The third corner of the triangle to the right of the directed edge, seen from outside.
+    /// The third corner of the triangle to the right of the edge in its given direction, seen from outside.
     pub right: VertexId,
 }
 
 impl Mesh {
-    /// Returns the third corners of the two triangles at the edge `uv`.
+    /// Returns the third corners of the two triangles at the edge from `u` to `v`.
     ///
     /// # Errors
     /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent.
@@ -88,8 +88,8 @@ impl Mesh {
         Ok(())
     }
 
-    /// Tests whether [`Mesh::collapse`] of `uv` is possible, by the link condition and the valences of the opposite
-    /// vertices, and returns the vertices opposite the edge.
+    /// Tests whether [`Mesh::collapse`] of the edge `uv` is possible, by the link condition and the valences of the
+    /// opposite vertices, and returns the two vertices opposite the edge if it is.
     ///
     /// # Errors
     /// As [`Mesh::collapse`].

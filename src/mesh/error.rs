@@ -5,25 +5,25 @@ use super::VertexId;
 /// An error of building or validating a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// An argument is outside its accepted range.
+    /// An argument of a function is outside its accepted range.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
         /// The name of the argument.
         parameter: &'static str,
-        /// The invalid value and the accepted range.
+        /// The invalid value and the accepted range, as text for the user.
         problem: String,
     },
     /// The surface has a boundary, a non-manifold edge or vertex, inconsistently oriented triangles, a triangle with
     /// two equal corners, or a vertex with too few or too many triangles.
     #[error("the mesh is not a closed surface: {problem}")]
     NotClosed {
-        /// The defect and its location.
+        /// The defect and its location, as text for the user.
         problem: String,
     },
     /// The mesh intersects itself, but an embedded surface is required.
     #[error("the mesh intersects itself ({pairs} pairs of triangles); an embedded mesh is required")]
     SelfIntersecting {
-        /// The number of intersecting pairs of triangles.
+        /// The number of pairs of triangles that intersect.
         pairs: usize,
     },
     /// The mesh needs more memory, or more vertices, than are available.
@@ -34,32 +34,32 @@ pub enum MeshError {
     },
 }
 
-/// The reason why an edit was rejected; the mesh is unmodified.
+/// The reason why an edit of a mesh was rejected; the mesh is then unmodified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
     /// The two vertices are not adjacent, or one of them is not live.
     #[error("{0:?} and {1:?} are not adjacent")]
     NotAnEdge(VertexId, VertexId),
-    /// The two vertices are already adjacent, or are the same vertex.
+    /// The two vertices, which the edit would connect, are already adjacent, or are the same vertex.
     #[error("{0:?} and {1:?} are already adjacent")]
     Adjacent(VertexId, VertexId),
     /// The edit would leave this vertex with fewer than three neighbours.
     #[error("{0:?} would be left with fewer than three neighbours")]
     ValenceTooLow(VertexId),
-    /// The ends of the edge have this common neighbour besides the two opposite vertices, so that a collapse would
-    /// pinch a neck (link condition).
+    /// The ends of the edge to be collapsed have this common neighbour besides the two vertices opposite the edge, so
+    /// that a collapse would pinch a neck (link condition).
     #[error("link condition violated: {0:?} is a common neighbour but not opposite the edge")]
     LinkCondition(VertexId),
     /// The three edges passed to [`Mesh::cut`](super::Mesh::cut) bound a triangle of the surface.
     #[error("the three edges bound a triangle of the surface")]
     IsTriangle,
-    /// This vertex is not a corner of a component of four vertices.
+    /// This vertex is not a corner of an isolated tetrahedron, a connected component of four vertices.
     #[error("{0:?} is not a corner of an isolated tetrahedron")]
     NotATetrahedron(VertexId),
-    /// The edit would make the mesh intersect itself.
+    /// The edit would make the mesh intersect itself; only edits through a collision guard are tested for it.
     #[error("the edit would make the mesh intersect itself")]
     WouldSelfIntersect,
-    /// No vertex ids are left.
+    /// The edit needs a new vertex, but no vertex ids are left.
     #[error("no vertex ids are left")]
     Full,
 }

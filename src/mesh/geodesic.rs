@@ -2,9 +2,9 @@
 //!
 //! Distances propagate from the nearest vertex outwards, as in Dijkstra's algorithm, but also across triangles. In the
 //! plane of a triangle, a virtual source has the known distances from two of its corners. The distance of the third
-//! corner is its straight distance from this source, if the line between them passes through the edge of the two
-//! (Novotni & Klein, *Computing geodesic distances on triangular meshes*, 2002). On planes, and across their folds,
-//! this is exact.
+//! corner is its straight distance from this source, if the line between them passes through the edge between the two
+//! known corners (Novotni & Klein, *Computing geodesic distances on triangular meshes*, 2002). On planes, and across
+//! their folds, this is exact.
 //!
 //! A vertex whose distance decreases later propagates it again. Obtuse triangles, through which a shorter path may be
 //! found late, thus need no special treatment.
@@ -14,21 +14,21 @@ use crate::math::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The maximum number of times that a vertex propagates its distance. Usually it is one, and at most three on ordinary
-/// surfaces; among needle triangles, two vertices could reduce each other's distance by ever smaller amounts almost
-/// endlessly.
+/// The maximum number of times that [`Front::propagate`] is called for a vertex. Usually it is one, and at most three
+/// on ordinary surfaces; among needle triangles, two vertices could reduce each other's distance by ever smaller
+/// amounts almost endlessly.
 const MAX_PROPAGATIONS: u8 = 30;
 
-/// The relative decrease of a distance below which it counts as rounding error and is not propagated.
+/// The relative decrease of a vertex's tentative distance below which it counts as rounding error and is ignored.
 const MIN_RELATIVE_DECREASE: f64 = 1e-12;
 
-/// Returns the geodesic distance from vertex `from` to every vertex, in the length unit of the mesh; infinite if they
-/// are not connected.
+/// Returns the geodesic distance from vertex `from` to every vertex, in the length unit of the mesh; infinite for
+/// vertices that are not connected with `from`.
 ///
 /// Exact up to rounding on flat regions, and across folds if the shortest path is unique. On curved surfaces, and where
 /// shortest paths from two sides meet, a distance may be up to half an edge too short: on a ball of radius 1 with edges
-/// of 0.1, 0.03 at the far end and 0.003 on average. Never shorter than the straight line, nor longer than the
-/// shortest path along edges. O(n log n). Indices must be valid, see [`TriangleMesh::validate`].
+/// of 0.1, 0.03 at the far end and 0.003 on average. Never shorter than the straight line, nor longer than the shortest
+/// path along edges. O(n log n). Indices must be valid, see [`TriangleMesh::validate`].
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] if there is no vertex `from`.
@@ -45,16 +45,18 @@ pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, Me
     Ok(front.distances)
 }
 
-/// The state of the propagation: tentative distances, and a queue of vertices whose distance is to be propagated.
+/// The state of the propagation in [`geodesic_distances`]: tentative distances from the origin, a vertex, and a queue
+/// of vertices whose distance is to be propagated.
 struct Front<'a> {
     positions: &'a [Vec3],
     links: Links,
     origin: DVec3,
     distances: Vec<f64>,
-    /// By vertex, how often it has propagated its distance.
+    /// By vertex, how often its distance has been propagated.
     propagations: Vec<u8>,
     /// The vertices to propagate, nearest first: the distance as bits, which are ordered like the non-negative numbers
-    /// they represent, and the vertex index, the lower one first at equal distances.
+    /// they represent, and the vertex index, the lower one first at equal distances. An entry is out of date once the
+    /// distance of its vertex has decreased.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
 }
 
@@ -73,8 +75,8 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// Takes vertices from the queue up to the nearest one that has not propagated its current distance, and returns
-    /// it; `None` if there is none.
+    /// Removes the nearest vertex from the queue and returns its index; `None` if the queue is empty. Skips entries
+    /// that are out of date, and vertices that have been propagated [`MAX_PROPAGATIONS`] times.
     fn pop(&mut self) -> Option<usize> {
         while let Some(Reverse((bits, v))) = self.queue.pop() {
             let v = v as usize;
@@ -87,7 +89,8 @@ impl<'a> Front<'a> {
         None
     }
 
-    /// Propagates the distance of `v` to the other corners of the triangles around it.
+    /// Propagates the distance of `v` to the other corners of the triangles around it, and queues those whose distance
+    /// decreases.
     fn propagate(&mut self, v: usize) {
         for k in self.links.range(v) {
             let [a, b] = self.links.edges[k].map(|w| w as usize);
@@ -96,8 +99,8 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// Returns the distance of `c` by paths along the edges of the triangle `a b c` or through it, from the distances
-    /// of `a` and `b`; at least its straight distance from the origin.
+    /// Returns the distance from the origin to vertex `c` by paths along the edges of the triangle `a b c` or through
+    /// it, given the distances of `a` and `b`; at least the straight distance.
     fn path_length(&self, a: usize, b: usize, c: usize) -> f64 {
         let [p, q, r] = [a, b, c].map(|v| self.positions[v].as_dvec3());
         let (to_a, to_b) = (self.distances[a], self.distances[b]);
@@ -116,9 +119,9 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Returns the distance of the third corner of a triangle from the virtual source: the point in its plane, beyond an
-/// edge, at the distances `to_a` and `to_b` from the ends of the edge. `None` if there is no such point, or if the
-/// straight line from it to the corner misses the edge.
+/// Returns the distance of the third corner of a triangle from the virtual source: the point in the plane of the
+/// triangle, beyond the edge between the two other corners, at the distances `to_a` and `to_b` from the ends of the
+/// edge. `None` if there is no such point, or if the straight line from it to the third corner misses the edge.
 ///
 /// `edge` and `spoke` are the vectors from the first end of the edge to its second end and to the third corner.
 fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64> {
@@ -137,7 +140,7 @@ fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64
     enters.then(|| ((x - source_x) * (x - source_x) + depth * depth).sqrt())
 }
 
-/// For each vertex, the edges opposite it in its triangles.
+/// For each vertex of a triangle list, the edges opposite it in its triangles.
 struct Links {
     starts: Vec<u32>,
     edges: Vec<[u32; 2]>,
@@ -174,7 +177,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns the largest and the mean absolute error of `found`.
+    /// Returns the largest and the mean absolute error of the distances `found` against those `expected`.
     fn off(found: &[f64], expected: impl Iterator<Item = f64>) -> [f64; 2] {
         let off: Vec<f64> = found.iter().zip(expected).map(|(d, e)| (d - e).abs()).collect();
         [off.iter().copied().fold(0.0, f64::max), off.iter().sum::<f64>() / off.len() as f64]
@@ -200,7 +203,7 @@ mod tests {
         }
     }
 
-    /// Tests a ball with triangles of all shapes, many of them obtuse.
+    /// Tests geodesic distances on a ball with triangles of all shapes, many of them obtuse.
     #[test]
     fn great_circles_of_an_uneven_ball() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles();
@@ -211,7 +214,7 @@ mod tests {
         assert!(largest < 0.06 && mean < 0.006, "{largest}, {mean}");
     }
 
-    /// Returns a pseudorandom vector with coordinates from −1 to 1.
+    /// Returns a pseudorandom vector with coordinates from −1 to 1, determined by `seed`.
     fn shift(seed: u32) -> Vec3 {
         let mut state = seed.wrapping_mul(2_654_435_761) ^ 99;
         Vec3::from_array([(); 3].map(|()| {
@@ -220,7 +223,7 @@ mod tests {
         }))
     }
 
-    /// Returns a closed box with a corner at the origin, each face a grid of `cells` × `cells` squares, inner vertices
+    /// Returns a closed box from the origin to `size`, each face a grid of `cells` × `cells` squares, inner vertices
     /// shifted within the face by up to `shake` of a cell.
     fn plate(size: Vec3, cells: u32, shake: f32) -> TriangleMesh {
         let mut soup = TriangleMesh::default();
@@ -291,8 +294,8 @@ mod tests {
         }
     }
 
-    /// Returns whether every distance is at least the straight distance from `from`, and at most the distance of each
-    /// neighbour plus the edge between them.
+    /// Returns whether every distance in `found` is at least the straight distance from vertex `from`, and at most the
+    /// distance of each neighbour plus the length of the edge between them.
     fn is_between_bounds(mesh: &TriangleMesh, from: u32, found: &[f64]) -> bool {
         let at = |v: u32| mesh.positions[v as usize].as_dvec3();
         let straight = |v: usize| at(v as u32).distance(at(from));

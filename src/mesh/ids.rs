@@ -1,4 +1,4 @@
-//! Vertex handles.
+//! Handles of the vertices of a dynamic mesh.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +16,8 @@ impl VertexId {
         self.0 as usize
     }
 
-    /// Returns the id of the vertex in slot `index`.
-    ///
-    /// [`Mesh`](super::Mesh) ensures when it is built that it has at most `u32::MAX` vertices.
+    /// Returns the id of the vertex in slot `index`, which must fit into `u32`: [`Mesh`](super::Mesh) ensures when it
+    /// is built that it has at most `u32::MAX` vertices.
     #[inline]
     pub fn from_index(index: usize) -> Self {
         Self(index as u32)

@@ -1,26 +1,26 @@
-//! Transactions: edits are recorded and can be rolled back.
+//! Transactions: edits of a [`Mesh`] are recorded and can be rolled back.
 
 use super::{Mesh, Ring, VertexId};
 use crate::math::Vec3;
 use smallvec::SmallVec;
 
-/// The undo log of the edits since [`Mesh::begin`]: the state of each slot before its first change.
+/// The undo log of the edits since [`Mesh::begin`]: the state of each vertex slot before its first change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Journal {
     touched: Vec<Touched>,
     /// The attributes of the touched slots before their first change, one slot after the other, in the order of
     /// `touched`.
     attributes: Vec<f32>,
-    /// The changes of the free list, in order.
+    /// The vertex slots taken from and returned to the free list, in order, so that a rollback restores the list.
     slots_taken_and_freed: Vec<SlotChange>,
     slots: usize,
     half_edges: usize,
     euler: i64,
-    /// Whether edits are recorded. A closed journal keeps its storage for the next one.
+    /// Whether edits are being recorded. A closed journal keeps its memory for the next recording.
     open: bool,
 }
 
-/// The state of a vertex before its first change.
+/// The state of a vertex before its first change since [`Mesh::begin`], so that a rollback restores it.
 #[derive(Clone, Debug, PartialEq)]
 struct Touched {
     vertex: VertexId,
@@ -34,7 +34,7 @@ enum SlotChange {
     Freed,
 }
 
-/// A list of triangles by their corners, each starting at its lowest id.
+/// A list of triangles by the ids of their corners, each starting at the lowest id.
 pub type TriangleCorners = SmallVec<[[VertexId; 3]; 16]>;
 
 impl Mesh {
@@ -91,8 +91,8 @@ impl Mesh {
         self.journal = Journal { open: false, ..journal };
     }
 
-    /// Iterates over the vertices touched by edits since [`Mesh::begin`]: those moved, created or deleted, and those
-    /// whose one-ring changed.
+    /// Iterates over the vertices touched by edits since [`Mesh::begin`], which collision handling updates: those
+    /// moved, created or deleted, and those whose one-ring changed.
     pub fn touched_vertices(&self) -> impl Iterator<Item = VertexId> + '_ {
         let made = (self.journal.slots..self.slots()).map(VertexId::from_index);
         self.journal.touched.iter().map(|was| was.vertex).chain(made)
@@ -116,7 +116,8 @@ impl Mesh {
         found
     }
 
-    /// Records the state of `v` if edits are being recorded; must be called before its slot is changed.
+    /// Records the state of vertex `v` in the undo log if edits are being recorded; must be called before its slot is
+    /// changed.
     #[inline]
     pub(super) fn touch(&mut self, v: VertexId) {
         if self.journal.open {
@@ -147,14 +148,14 @@ impl Mesh {
         }
     }
 
-    /// Returns the ring of `v` for modification, after recording its state.
+    /// Returns the ring of `v` for modification, after recording the state of `v` in the undo log.
     #[inline]
     pub(super) fn ring_mut(&mut self, v: VertexId) -> &mut Ring {
         self.touch(v);
         &mut self.rings[v.index()]
     }
 
-    /// Returns the triangles that have a corner in `vertices`, each once.
+    /// Returns the triangles that have a corner in `vertices`, each once, sorted by vertex ids.
     pub fn triangles_at(&self, vertices: &[VertexId]) -> TriangleCorners {
         let mut found: TriangleCorners = vertices
             .iter()

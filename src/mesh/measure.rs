@@ -5,7 +5,7 @@ use super::disjoint_sets::DisjointSets;
 use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use crate::math::{DMat3, DVec3};
 
-/// Geometric and topological measures of a mesh, in the length unit of its positions.
+/// Geometric and topological measures of a mesh, in the length unit of its positions; the result of [`measure`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
     /// The number of vertices used by triangles.
@@ -19,10 +19,11 @@ pub struct Measures {
     pub euler: i64,
     /// The sum of the genera of the components, from χ = 2 components − 2 genus; valid for closed, oriented manifolds.
     pub genus: i64,
-    /// The total area of the triangles.
+    /// The total area of the triangles, in squared units of the mesh.
     pub area: f64,
-    /// The signed enclosed volume, positive if triangles are counter-clockwise seen from outside. If the mesh is not
-    /// closed, the sum of the signed volumes of the tetrahedra from its triangles to the centre of its bounding box.
+    /// The signed enclosed volume, in cubed units of the mesh, positive if triangles are counter-clockwise seen from
+    /// outside. If the mesh is not closed, the sum of the signed volumes of the tetrahedra from its triangles to the
+    /// centre of its bounding box.
     pub volume: f64,
     /// The centroid of the enclosed solid; the centroid of the surface if the volume is negligible (|volume| ≤ 1e-9
     /// area^1.5).
@@ -31,17 +32,17 @@ pub struct Measures {
     /// fifth power of the length unit, with the sign of the volume. (The inertia tensor is tr(M) I − M for this matrix
     /// M.)
     pub inertia: [f64; 9],
-    /// The length of the shortest edge.
+    /// The length of the shortest edge, in units of the mesh.
     pub edge_min: f64,
-    /// The mean length of the edges.
+    /// The mean length of the edges, in units of the mesh.
     pub edge_mean: f64,
-    /// The length of the longest edge.
+    /// The length of the longest edge, in units of the mesh.
     pub edge_max: f64,
-    /// The smallest angle of a triangle, in degrees; 0 if two corners coincide.
+    /// The smallest angle of all triangles, in degrees; 0 if two corners coincide.
     pub min_angle_degrees: f64,
-    /// The largest angle of a triangle, in degrees.
+    /// The largest angle of all triangles, in degrees.
     pub max_angle_degrees: f64,
-    /// The lowest and the highest corner of the bounding box of the used vertices.
+    /// The lowest and the highest corner of the bounding box of the vertices used by triangles.
     pub bounds: [DVec3; 2],
 }
 
@@ -104,12 +105,12 @@ struct Solid {
     moments: DMat3,
 }
 
-/// The volume, as a multiple of area^1.5 (0.094 for a ball), up to which it is regarded as rounding error; dividing by
-/// it would give an arbitrary centroid.
+/// The absolute volume, as a multiple of area^1.5 (0.094 for a ball), up to which [`solid`] treats it as rounding
+/// error; dividing by it would give an arbitrary centroid.
 const FLAT: f64 = 1e-9;
 
-/// Sums area, volume and moments over the tetrahedra from each triangle to `reference`, whose choice affects only
-/// rounding if the mesh is closed, and computes the centroid.
+/// Sums area, volume and moments over the tetrahedra from each triangle to the point `reference`, whose choice affects
+/// only rounding if the mesh is closed, and computes the centroid.
 fn solid(triangles: impl Iterator<Item = [DVec3; 3]>, reference: DVec3) -> Solid {
     let (mut area, mut surface_first) = (0.0, DVec3::ZERO);
     let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
@@ -195,8 +196,8 @@ impl Angle {
         if sine == 0.0 && cosine == 0.0 { Self { sine: 0.0, cosine: 1.0 } } else { Self { sine, cosine } }
     }
 
-    /// Returns whether this angle is smaller: if sin(other − self) > 0, or, where that is 0, if this angle is 0 and the
-    /// other one 180°.
+    /// Returns whether this angle is smaller than `other`: if sin(other − self) > 0, or, where that is 0, if this angle
+    /// is 0 and the other one 180°.
     fn is_less_than(&self, other: &Self) -> bool {
         let turn = self.cosine * other.sine - self.sine * other.cosine;
         turn > 0.0 || (turn == 0.0 && self.cosine > 0.0 && other.cosine < 0.0)

@@ -77,7 +77,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Returns the number of live vertices.
+    /// Returns the number of live vertices, which have not been deleted.
     #[inline]
     pub fn vertex_count(&self) -> usize {
         self.rings.len() - self.free.len()
@@ -121,13 +121,13 @@ impl Mesh {
     }
 
     /// Advances both version counters beyond those of `replaced`, the mesh that this one replaces, so that caches built
-    /// for the old mesh are invalidated.
+    /// for `replaced` are invalidated.
     pub fn advance_versions_past(&mut self, replaced: &Self) {
         self.topology_version = replaced.topology_version.wrapping_add(1);
         self.geometry_version = replaced.geometry_version.wrapping_add(1);
     }
 
-    /// Returns whether `v` is a vertex of the mesh and its slot is not free.
+    /// Returns whether `v` is a vertex of the mesh: its slot exists and is not free.
     #[inline]
     pub fn is_live(&self, v: VertexId) -> bool {
         self.rings.get(v.index()).is_some_and(|ring| !ring.is_empty())
@@ -146,7 +146,8 @@ impl Mesh {
         })
     }
 
-    /// Returns the triangle with these corners as a [`Facet`], with current positions, for intersection tests.
+    /// Returns the triangle with the given corners as a [`Facet`], with their current positions, for intersection
+    /// tests.
     #[inline]
     pub fn facet(&self, corners: [VertexId; 3]) -> Facet {
         Facet { corners: corners.map(|v| v.0), points: corners.map(|v| self.position(v)) }
@@ -157,7 +158,7 @@ impl Mesh {
         self.edges_from(self.vertices())
     }
 
-    /// Iterates over the edges whose lower-id end is in `vertices`, each as (lower id, higher id).
+    /// Iterates over the edges whose end with the lower id is in `vertices`, each as (lower id, higher id).
     pub fn edges_from<'a>(
         &'a self,
         vertices: impl Iterator<Item = VertexId> + 'a,
@@ -197,7 +198,7 @@ impl Mesh {
         &mut self.positions
     }
 
-    /// Moves `v` to `position`.
+    /// Moves `v` to `position`; [`Mesh::roll_back`] undoes it if edits are being recorded.
     #[inline]
     pub fn set_position(&mut self, v: VertexId, position: Vec3) {
         self.touch(v);
@@ -215,7 +216,8 @@ impl Mesh {
         self.attributes.add_scalar(self.slots())
     }
 
-    /// Returns the numbers of vector and scalar attributes per vertex.
+    /// Returns the numbers of vector and scalar attributes per vertex, to check that a restored mesh has the expected
+    /// ones.
     pub fn attribute_counts(&self) -> [usize; 2] {
         self.attributes.counts()
     }
@@ -244,12 +246,13 @@ impl Mesh {
         self.attributes.scalar_mut(key)
     }
 
-    /// Borrows the positions and, mutably, a vector attribute, both indexed by slot.
+    /// Borrows the positions and, mutably, a vector attribute, both indexed by slot, so that one loop can read the
+    /// former and write the latter.
     pub fn positions_and_vector_mut(&mut self, key: VectorKey) -> (&[Vec3], &mut [Vec3]) {
         (&self.positions, self.attributes.vector_mut(key))
     }
 
-    /// Mutably borrows a vector and a scalar attribute at once, both indexed by slot.
+    /// Mutably borrows a vector and a scalar attribute at once, both indexed by slot, so that one loop can write both.
     pub fn vector_and_scalar_mut(
         &mut self,
         vector: VectorKey,
@@ -258,13 +261,14 @@ impl Mesh {
         self.attributes.vector_and_scalar_mut(vector, scalar)
     }
 
-    /// Borrows the one-rings and, mutably, a scalar attribute, both indexed by slot.
+    /// Borrows the one-rings and, mutably, a scalar attribute, both indexed by slot, so that one loop can read the
+    /// former and write the latter.
     pub fn rings_and_scalar_mut(&mut self, key: ScalarKey) -> (&[Ring], &mut [f32]) {
         (&self.rings, self.attributes.scalar_mut(key))
     }
 
-    /// Returns the sum of the cross products of the triangles around `v`: the area-weighted outward normal, scaled by
-    /// two.
+    /// Returns the area-weighted outward normal at `v`, not normalised: the sum of the cross products of the triangles
+    /// around `v`, twice their area vectors. Zero if the slot of `v` is free.
     #[inline]
     pub fn area_normal(&self, v: VertexId) -> Vec3 {
         let ring = self.ring(v).as_slice();
@@ -286,7 +290,7 @@ impl Mesh {
         self.ring(u).as_slice().iter().copied().filter(|&w| other.contains(w)).collect()
     }
 
-    /// Returns a free slot, or appends one, and sets its position; the caller must set its ring.
+    /// Takes a free vertex slot, or appends one, sets its position, and returns its id; the caller must set its ring.
     fn allocate(&mut self, position: Vec3) -> VertexId {
         self.geometry_version = self.geometry_version.wrapping_add(1);
         if let Some(v) = self.free.pop() {

@@ -1,4 +1,4 @@
-//! Global √3 subdivision.
+//! √3 subdivision of a whole mesh.
 
 use super::{Mesh, MeshError, Ring, VertexId};
 
@@ -47,13 +47,13 @@ impl Mesh {
     }
 }
 
-/// The new vertex of each triangle, its face point, looked up by half-edge.
+/// The face point of each triangle, its new vertex in [`Mesh::refine`], looked up by half-edge.
 struct FacePoints {
-    /// For each vertex, the start of its ring in `ids`.
+    /// For each vertex slot, where the face points around it start in `ids`.
     starts: Vec<usize>,
-    /// For each vertex and each pair of its ring, the face point of their triangle.
+    /// For each vertex slot, the ids of the face points of the triangles around it, in the order of [`Ring::pairs`].
     ids: Vec<VertexId>,
-    /// The corners of the triangles, in the order of their face points.
+    /// The corners of each triangle, in the order of the ids of their face points.
     corners: Vec<[VertexId; 3]>,
 }
 
@@ -80,7 +80,7 @@ impl FacePoints {
         points
     }
 
-    /// Sets the face point of the triangle to the left of `p` → `q`.
+    /// Sets the face point of the triangle to the left of the half-edge from `p` to `q`.
     fn set(&mut self, rings: &[Ring], p: VertexId, q: VertexId, point: VertexId) {
         if let Some(at) = rings[p.index()].position(q) {
             self.ids[self.starts[p.index()] + at] = point;
@@ -95,7 +95,7 @@ impl FacePoints {
         self.left_of(rings, u, a)
     }
 
-    /// Returns the face point of the triangle to the right of `from` → `to`.
+    /// Returns the face point of the triangle to the right of the half-edge from `from` to `to`.
     fn across(&self, rings: &[Ring], from: VertexId, to: VertexId) -> VertexId {
         self.left_of(rings, to, from)
     }

@@ -7,7 +7,7 @@ use super::{MeshError, TriangleMesh};
 use crate::math::order::{combined_rank, sort_by_rank};
 use crate::math::predicates::collinear;
 
-/// The result of validating a mesh; see [`Self::is_healthy`].
+/// The result of validating a mesh by [`report`]; see [`Self::is_healthy`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshReport {
     /// Whether no edge belongs to exactly one triangle; true without triangles.
@@ -82,7 +82,7 @@ fn non_manifold_vertices(mesh: &TriangleMesh) -> usize {
     links.chunk_by(|a, b| a.vertex == b.vertex).filter(|link| !is_path_or_cycle(link)).count()
 }
 
-/// An edge of the link of a vertex: the edge opposite the vertex in one of its triangles.
+/// An edge of the link of a vertex: the edge opposite `vertex` in one of its triangles.
 #[derive(Clone, Copy)]
 struct LinkEdge {
     vertex: u32,
@@ -90,7 +90,7 @@ struct LinkEdge {
     to: u32,
 }
 
-/// Returns the link edges of all vertices, sorted by vertex.
+/// Returns the link edges of all vertices, sorted by vertex, without those of triangles with two equal corners.
 fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
     let valid = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
     let mut links: Vec<_> = valid
@@ -103,7 +103,8 @@ fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
     links
 }
 
-/// Returns whether the link is connected, with at most two edges at each of its vertices.
+/// Returns whether the link of a vertex is a path or a cycle, so that the vertex is manifold: connected, with at most
+/// two edges at each vertex of the link.
 fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
     let mut ends: Vec<(u64, u32)> =
         link.iter().zip(0..).flat_map(|(edge, i)| [(edge.from.into(), i), (edge.to.into(), i)]).collect();
@@ -130,7 +131,8 @@ mod tests {
         report(&TriangleMesh::default()).unwrap()
     }
 
-    /// Returns a tetrahedron with outward triangles.
+    /// Returns a tetrahedron with the given corners; its triangles face outwards if the edges from the first corner to
+    /// the others, in order, are right-handed.
     fn tetrahedron(corners: [Vec3; 4]) -> TriangleMesh {
         TriangleMesh {
             positions: corners.to_vec(),

@@ -4,8 +4,8 @@ use super::VertexId;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// The number of neighbours stored without heap allocation. With fewer, many vertices need an allocation; with more,
-/// cache lines are wasted, as the mean valence is six.
+/// The number of neighbours that a ring stores without heap allocation. With fewer, many vertices need an allocation;
+/// with more, cache lines are wasted, as the mean valence is six.
 const INLINE: usize = 10;
 
 /// The one-ring of a vertex: its neighbours as a cycle, counter-clockwise seen from outside.
@@ -15,12 +15,12 @@ const INLINE: usize = 10;
 pub struct Ring(SmallVec<[VertexId; INLINE]>);
 
 impl Ring {
-    /// Creates a ring from the neighbours in cyclic order.
+    /// Creates a ring from the neighbours of a vertex in cyclic order, counter-clockwise seen from outside.
     pub fn new(neighbours: impl IntoIterator<Item = VertexId>) -> Self {
         Self(neighbours.into_iter().collect())
     }
 
-    /// Returns the number of neighbours.
+    /// Returns the number of neighbours in the ring.
     #[inline]
     pub fn valence(&self) -> usize {
         self.0.len()
@@ -38,33 +38,35 @@ impl Ring {
         &self.0
     }
 
-    /// Returns whether `v` is a neighbour.
+    /// Returns whether `v` is in the ring.
     #[inline]
     pub fn contains(&self, v: VertexId) -> bool {
         self.0.contains(&v)
     }
 
-    /// Returns the index of `v` in the cycle, or `None` if it is not a neighbour.
+    /// Returns the index of `v` in the cycle of neighbours, or `None` if it is not a neighbour.
     #[inline]
     pub fn position(&self, v: VertexId) -> Option<usize> {
         self.0.iter().position(|&w| w == v)
     }
 
-    /// Returns the neighbour after `v` in the cycle, or `None` if `v` is not a neighbour.
+    /// Returns the neighbour after `v` in the cycle, counter-clockwise seen from outside, or `None` if `v` is not a
+    /// neighbour.
     #[inline]
     pub fn after(&self, v: VertexId) -> Option<VertexId> {
         let next = self.position(v)? + 1;
         Some(if next == self.0.len() { self.0[0] } else { self.0[next] })
     }
 
-    /// Returns the neighbour before `v` in the cycle, or `None` if `v` is not a neighbour.
+    /// Returns the neighbour before `v` in the cycle, clockwise seen from outside, or `None` if `v` is not a neighbour.
     #[inline]
     pub fn before(&self, v: VertexId) -> Option<VertexId> {
         let here = self.position(v)?;
         Some(self.0[if here == 0 { self.0.len() - 1 } else { here - 1 }])
     }
 
-    /// Iterates over consecutive neighbours `(a, b)`; each pair forms a triangle with the vertex of the ring.
+    /// Iterates over pairs of consecutive neighbours `(a, b)`, cyclically; each pair forms a triangle with the vertex
+    /// of the ring.
     pub fn pairs(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {
         let shifted = self.0.iter().skip(1).chain(self.0.first());
         self.0.iter().copied().zip(shifted.copied())
@@ -72,7 +74,7 @@ impl Ring {
 
     /// Returns the neighbours strictly between `from` and `to` in cyclic order.
     ///
-    /// Empty if either is not a neighbour.
+    /// Empty if `from` or `to` is not a neighbour.
     pub fn between(&self, from: VertexId, to: VertexId) -> SmallVec<[VertexId; INLINE]> {
         let (Some(start), Some(end)) = (self.position(from), self.position(to)) else {
             return SmallVec::new();
@@ -100,7 +102,7 @@ impl Ring {
         }
     }
 
-    /// Replaces `old` by the sequence `new`.
+    /// Replaces the neighbour `old` by the neighbours `new`, in cyclic order; does nothing if `old` is not in the ring.
     pub(super) fn splice(&mut self, old: VertexId, new: &[VertexId]) {
         if let Some(i) = self.position(old) {
             self.0.remove(i);

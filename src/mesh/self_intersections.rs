@@ -66,8 +66,8 @@ pub struct Facet {
 }
 
 impl Facet {
-    /// Returns the corner positions, rotated cyclically so that the corner whose vertex index satisfies `is_first`
-    /// comes first.
+    /// Returns the corner positions of the triangle, rotated cyclically so that the corner whose vertex index satisfies
+    /// `is_first` comes first.
     fn rotated(&self, is_first: impl Fn(u32) -> bool) -> [Vec3; 3] {
         let [a, b, c] = self.points;
         match self.corners.map(is_first) {

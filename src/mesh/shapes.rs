@@ -3,7 +3,8 @@
 use super::TriangleMesh;
 use crate::math::Vec3;
 
-/// The faces of a box by vertex indices, counter-clockwise seen from outside.
+/// The faces of a box by the indices of their corners, counter-clockwise seen from outside; bits 0 to 2 of an index are
+/// the x, y and z coordinates in a unit cube.
 const FACES: [[u32; 4]; 6] =
     [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
@@ -42,7 +43,7 @@ pub fn icosahedron() -> TriangleMesh {
 }
 
 /// Returns a torus around the z axis: a tube of radius `minor` around a circle of radius `major`, with `around`
-/// vertices along that circle times `along` around the tube.
+/// vertices along the circle times `along` vertices around the tube.
 pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
     let angle = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
     let point = |i: u32, j: u32| {
@@ -71,8 +72,8 @@ pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
     all
 }
 
-/// Returns random triangles over half as many points with integer coordinates from 0 to `range` − 1; if the range is
-/// small, they include all kinds of degeneracies.
+/// Returns `triangles` random triangles over half as many points with integer coordinates from 0 to `range` − 1, for
+/// tests of invalid input; if the range is small, they include all kinds of degeneracies.
 pub fn soup(seed: u64, triangles: usize, range: u64) -> TriangleMesh {
     let mut state = seed;
     let mut next = |limit: u64| {

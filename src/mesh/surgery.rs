@@ -1,26 +1,27 @@
-//! Topological edits: cutting along a cycle of three edges and capping both sides (annular change), and joining two
-//! discs by a tube (axial change).
+//! Topology changes of the dynamic mesh: cutting along a cycle of three edges and capping both sides (annular change),
+//! and joining two discs by a tube (axial change).
 
 use super::tube::shortest_tube;
 use super::{EditError, Mesh, Ring, VertexId};
 use crate::math::Vec3;
 
-/// The two triangles that cap the surface after [`Mesh::cut`].
+/// The two triangles that cap the surface after [`Mesh::cut`] along a cycle of three edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The vertices of the cycle, in the order given: the corners of the triangle that caps the surface to its left.
+    /// The vertices of the cycle, in the order passed to [`Mesh::cut`]: the corners of the triangle that caps the
+    /// surface to the left of the cycle.
     pub kept: [VertexId; 3],
-    /// The copies of the vertices of the cycle, in the same order: the corners of the triangle that caps the surface to
-    /// the right of the cycle.
+    /// The copies of the vertices of the cycle, in the same order as `kept`: the corners of the triangle that caps the
+    /// surface to the right of the cycle.
     pub copies: [VertexId; 3],
 }
 
-/// The two rims that [`Mesh::join`] connected by a tube.
+/// The two rims, cycles of new vertices, that [`Mesh::join`] connected by a tube.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TubeRims {
-    /// The vertices of the rim around the first of the two joined vertices, in the order of its ring.
+    /// The vertices of the rim around the first of the two joined vertices, in the order of that vertex's ring.
     pub first: Vec<VertexId>,
-    /// The vertices of the rim around the second of the two joined vertices, in the order of its ring.
+    /// The vertices of the rim around the second of the two joined vertices, in the order of that vertex's ring.
     pub second: Vec<VertexId>,
 }
 
@@ -28,7 +29,8 @@ impl Mesh {
     /// Cuts the surface along the cycle of edges `u v`, `v o`, `o u` and caps both sides with a triangle (annular
     /// change; Lachaud & Montanvert, section 3.3, figure 5). χ increases by 2.
     ///
-    /// The copies have the positions of their originals; the caller moves the two sides apart.
+    /// The three vertices are kept on one side and copied on the other. The copies have the positions of their
+    /// originals; the caller moves the two sides apart.
     ///
     /// # Errors
     /// [`EditError::NotAnEdge`] if two of the vertices are not adjacent; [`EditError::IsTriangle`] if the cycle bounds
@@ -58,7 +60,8 @@ impl Mesh {
         Ok(Cut { kept, copies })
     }
 
-    /// Splits the ring of corner `k` of a cut: the original keeps the left half, the copy gets the right half.
+    /// Splits the ring of vertex `k` of the cycle of a cut: the original keeps the half to the left of the cycle, the
+    /// copy gets the right half.
     fn split_ring(&mut self, kept: [VertexId; 3], copies: [VertexId; 3], k: usize) {
         let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
         let ring = self.ring(kept[k]);
@@ -78,7 +81,7 @@ impl Mesh {
     /// figure 4). χ decreases by 2.
     ///
     /// The rims of the tube are new vertices on the edges around `u` and `v`, at the fraction `reach` of each edge from
-    /// the centre (0 < reach < 1). As they are new, the result is simplicial even if `u` and `v` have common
+    /// `u` or `v` (0 < reach < 1). As they are new, the result is simplicial even if `u` and `v` have common
     /// neighbours.
     ///
     /// # Errors
@@ -106,8 +109,9 @@ impl Mesh {
         Ok(TubeRims { first, second })
     }
 
-    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim
-    /// in the order of its ring.
+    /// Opens a hole around `centre`, for one end of a tube: inserts a rim of new vertices on the edges at `centre`,
+    /// each at the fraction `reach` from it, deletes `centre`, and returns the rim in the order of the ring of
+    /// `centre`.
     ///
     /// ```text
     ///   n1-----n0             n1-----n0
@@ -135,7 +139,7 @@ impl Mesh {
         point
     }
 
-    /// Connects two rims by the tube of least total squared edge length.
+    /// Connects the rims of two holes by the tube of least total squared edge length.
     fn connect_rims(&mut self, first: &[VertexId], second: &[VertexId]) {
         let at = |rim: &[VertexId]| rim.iter().map(|&w| self.position(w)).collect::<Vec<_>>();
         let tube = shortest_tube(&at(first), &at(second));

@@ -1,16 +1,16 @@
-//! Texture images, kept in encoded form.
+//! Texture images of meshes, kept in encoded form.
 
 use super::MeshError;
 use std::fmt;
 
-/// An image encoding that every browser can decode.
+/// An encoding of texture images that every browser can decode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageKind {
     /// PNG (Portable Network Graphics).
     Png,
     /// JPEG (Joint Photographic Experts Group).
     Jpeg,
-    /// WebP.
+    /// WebP, with lossy or lossless compression.
     Webp,
 }
 
@@ -71,7 +71,7 @@ impl Texture {
     }
 }
 
-/// Omits the bytes, to keep the messages of failed tests short.
+/// Omits the bytes of the image, to keep the messages of failed tests short.
 impl fmt::Debug for Texture {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         write!(out, "Texture({}, {} bytes)", self.kind.media_type(), self.bytes.len())

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// position, except `corner_uvs`, which has one per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Vertex positions.
+    /// The positions of the vertices.
     pub positions: Vec<Vec3>,
     /// The indices of the corners of each triangle, into `positions`.
     pub triangles: Vec<[u32; 3]>,
@@ -29,8 +29,8 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Checks that all indices are valid, all positions are finite, all optional arrays have the right length, and a
-    /// texture comes with texture coordinates.
+    /// Checks that all triangle indices are below the number of positions, all positions are finite, all optional
+    /// arrays have the right length, and a texture comes with texture coordinates.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`], which names the array, and its first invalid entry or its wrong length.
@@ -64,7 +64,7 @@ impl TriangleMesh {
         Ok(())
     }
 
-    /// Returns whether there are texture coordinates, per vertex or per corner.
+    /// Returns whether the mesh has texture coordinates, per vertex or per corner.
     pub fn has_uvs(&self) -> bool {
         self.uvs.is_some() || self.corner_uvs.is_some()
     }
@@ -77,7 +77,8 @@ impl TriangleMesh {
         self.corner_uvs.iter_mut().flatten().flatten().for_each(turn);
     }
 
-    /// Iterates over the corner positions of the triangles. Indices must be valid, see [`TriangleMesh::validate`].
+    /// Iterates over the triangles, each as the positions of its corners. Indices must be valid, see
+    /// [`TriangleMesh::validate`].
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
         self.triangles.iter().map(|t| t.map(|v| self.positions[v as usize]))
     }
@@ -119,8 +120,8 @@ impl TriangleMesh {
             .collect()
     }
 
-    /// Returns the given triangles as a mesh, its vertices numbered in order of first use. `slots` is scratch space,
-    /// all `u32::MAX` before and after.
+    /// Returns the triangles with the given indices as a mesh, its vertices numbered in order of first use. `slots` is
+    /// scratch space with one entry per vertex, all `u32::MAX` before and after.
     fn triangle_subset(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
         let mut used = Vec::new();
         let renumbered = |t: &usize| {
@@ -140,8 +141,8 @@ impl TriangleMesh {
         Self { triangles: renumbered, corner_uvs, ..component }
     }
 
-    /// Returns a mesh of the given vertices without triangles, with their normals, texture coordinates per vertex and
-    /// colours, and with the texture.
+    /// Returns a mesh of the vertices with the given indices, without triangles, with their normals, texture
+    /// coordinates per vertex and colours, and with the texture.
     pub(super) fn vertex_subset(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
@@ -165,9 +166,9 @@ impl TriangleMesh {
         sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
     }
 
-    /// Returns texture coordinates per vertex, for formats without seams, or `None` if there are none: at a seam those
-    /// of one side are used, which distorts the texture on the triangles of the other sides. [`Self::split_at_seams`]
-    /// avoids this with more vertices.
+    /// Returns texture coordinates per vertex, for formats without seams, or `None` if the mesh has none: at a seam
+    /// those of one side are used, which distorts the texture on the triangles of the other sides.
+    /// [`Self::split_at_seams`] avoids this with more vertices.
     pub fn uvs_ignoring_seams(&self) -> Option<Vec<Vec2>> {
         let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
         let mut uvs = vec![Vec2::ZERO; self.positions.len()];

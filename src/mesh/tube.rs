@@ -3,29 +3,28 @@
 
 use crate::math::Vec3;
 
-/// A triangulated tube between two closed polygons, as a cyclic sequence of its edges.
+/// A triangulated tube between two closed polygons, as a cyclic sequence of the edges between them.
 ///
 /// Each edge is a pair (corner `i` of the first polygon, corner `j` of the second); consecutive edges span a triangle.
-/// `i` increases and `j` decreases, because both rims are oriented as holes of one oriented surface.
+/// `i` increases and `j` decreases, because both polygons are oriented as holes of one oriented surface.
 pub(super) struct Tube {
     pairs: Vec<(usize, usize)>,
 }
 
 impl Tube {
-    /// Returns the corners of the second polygon connected to corner `i` of the first, in the order of the edges along
-    /// the tube.
+    /// Returns the corners of the second polygon that tube edges connect to corner `i` of the first, in the order of
+    /// the edges along the tube.
     pub(super) fn connected_to_first(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(a, _)| a == i).map(|(_, j)| j)
     }
 
-    /// Returns the corners of the first polygon connected to corner `j` of the second, in the order of the edges along
-    /// the tube.
+    /// Returns the corners of the first polygon that tube edges connect to corner `j` of the second, in the order of
+    /// the edges along the tube.
     pub(super) fn connected_to_second(&self, j: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(_, b)| b == j).map(|(i, _)| i)
     }
 
-    /// Returns the edges that satisfy `holds`, which must be consecutive in the cyclic sequence, from the first of
-    /// them.
+    /// Iterates, in order, over the tube edges that satisfy `holds`, which must be consecutive in the cyclic sequence.
     fn run<'a>(
         &'a self,
         holds: impl Fn(&(usize, usize)) -> bool + Copy + 'a,
@@ -37,17 +36,20 @@ impl Tube {
     }
 }
 
-/// The minimum number of times that a walk around the tube switches from one polygon to the other. With fewer, a whole
-/// polygon is connected to a single corner of the other, and the first and last edge of that fan coincide.
+/// The minimum number of times that a walk around the tube, from edge to edge, changes the polygon along which it
+/// advances. With fewer, a whole polygon is connected to a single corner of the other, and the first and last edge of
+/// that fan coincide.
 const MIN_SWITCHES: usize = 4;
 
-/// The largest coordinate for which squared distances, and sums of them, are sure to fit into `f32`. Polygons beyond it
-/// are scaled by [`OVERFLOW_SCALE`] first.
+/// The largest coordinate, in absolute value, for which squared distances, and sums of them, are sure to fit into
+/// `f32`. Polygons beyond it are scaled by [`OVERFLOW_SCALE`] first.
 const MAX_COORDINATE: f32 = (1u64 << 55) as f32;
-/// The scale of polygons beyond [`MAX_COORDINATE`]; a power of two, so that scaling is exact.
+/// The factor by which polygons with coordinates beyond [`MAX_COORDINATE`] are scaled; a power of two, so that scaling
+/// is exact.
 const OVERFLOW_SCALE: f32 = 1.0 / (1u128 << 80) as f32;
 
-/// Returns the tube with the least sum of squared edge lengths, over all offsets between the polygons.
+/// Returns the tube between two closed polygons with the least sum of squared edge lengths, over all choices of the
+/// first edge.
 ///
 /// Dynamic programming over (i, j, polygon of the last step, number of switches); each polygon has at least three
 /// corners.
@@ -77,20 +79,21 @@ pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     Tube { pairs: best.map(|(_, pairs)| pairs).unwrap_or_default() }
 }
 
-/// The polygon along which a walk around the tube advances from one edge to the next.
+/// The polygon along which a walk around the tube advances from one tube edge to the next.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Step {
     First = 0,
     Second = 1,
 }
 
-/// The table of the dynamic programming in [`shortest_tube`]: the cheapest walk to each state, for one offset and one
-/// first step.
+/// The table of the dynamic programming in [`shortest_tube`], for one first tube edge and one first step: the cheapest
+/// walk to each state (i, j, last step, number of switches), where i and j count the steps along the two polygons.
 struct WalkTable {
     rows: usize,
     columns: usize,
     first_step: Step,
-    /// By state, the cost of the cheapest walk to it, and the step and number of switches of the state before it.
+    /// By state, the cost of the cheapest walk to it, and the last step and the number of switches of the state before
+    /// it.
     states: Vec<(f32, u8, u8)>,
 }
 
@@ -112,7 +115,8 @@ impl WalkTable {
         walks
     }
 
-    /// Updates the costs of the states that can follow each state at (i, j).
+    /// Updates the costs of the states that follow the states at (i, j), by one step along either polygon; `cost` is
+    /// the squared length of a tube edge.
     fn relax(&mut self, i: usize, j: usize, cost: &impl Fn(usize, usize) -> f32) {
         for last in 0..2 {
             for switches in 0..=MIN_SWITCHES {
@@ -142,7 +146,8 @@ impl WalkTable {
     }
 
     /// Returns the last step and the number of switches of the cheapest closed walk with at least [`MIN_SWITCHES`]
-    /// switches; a switch between the last and the first step is not in the number. `None` if there is no such walk.
+    /// switches between polygons; a switch between the last and the first step counts, but is not in the returned
+    /// number. `None` if there is no such walk.
     fn best_end(&self) -> Option<(usize, usize)> {
         let other = 1 - self.first_step as usize;
         let ends =
@@ -158,7 +163,8 @@ impl WalkTable {
             .map(|(step, switches)| self.states[self.index(self.rows, self.columns, step, switches)].0)
     }
 
-    /// Returns the pairs of the cheapest walk in order, without the closing pair, which equals the first.
+    /// Returns the tube edges (i, j) of the cheapest closed walk in order, without the last one, which equals the
+    /// first.
     fn trace(&self) -> Vec<(usize, usize)> {
         let Some((mut step, mut switches)) = self.best_end() else { return Vec::new() };
         let (mut i, mut j) = (self.rows, self.columns);

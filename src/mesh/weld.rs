@@ -30,7 +30,7 @@ impl TriangleMesh {
         welded
     }
 
-    /// Returns for each vertex the first vertex at the same position.
+    /// Returns for each vertex the lowest index of a vertex at exactly the same position.
     fn representatives(&self) -> Vec<usize> {
         let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut order: Vec<([u32; 3], u32)> = self.positions.iter().map(key).zip(0..).collect();
@@ -59,7 +59,8 @@ impl TriangleMesh {
     }
 }
 
-/// Returns the new index of vertex `v`, assigned on first use.
+/// Returns the index of vertex `v` in the welded mesh, assigned on first use: `slots` is that index by vertex, or
+/// `u32::MAX`, and `vertices` are the vertices with an index, in order.
 fn slot(slots: &mut [u32], vertices: &mut Vec<usize>, v: usize) -> u32 {
     if slots[v] == u32::MAX {
         slots[v] = vertices.len() as u32;
@@ -68,7 +69,8 @@ fn slot(slots: &mut [u32], vertices: &mut Vec<usize>, v: usize) -> u32 {
     slots[v]
 }
 
-/// Returns the mean of the values assigned to each target; values with target `u32::MAX` are ignored.
+/// Returns the mean of the values of the vertices that are merged into each of `count` new ones; `targets` is the new
+/// vertex of each old one, or `u32::MAX` for none.
 fn means(values: &[Vec3], targets: &[u32], count: usize) -> Vec<Vec3> {
     let mut sums = vec![(Vec3::ZERO, 0.0_f32); count];
     for (&value, &target) in values.iter().zip(targets) {
@@ -91,7 +93,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns the mesh with separate vertices for each triangle.
+    /// Returns the mesh with three separate vertices for each triangle, for tests of welding.
     fn soup(mesh: &TriangleMesh) -> TriangleMesh {
         let positions: Vec<Vec3> = mesh.corners().flatten().collect();
         let triangles = (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();

@@ -1,4 +1,4 @@
-//! Validation of meshes passed in by the caller, shared by all methods.
+//! Validation of meshes passed in by the caller, shared by the methods that accept one.
 
 use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
@@ -25,8 +25,8 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
     }
 }
 
-/// Checks that the mean edge length of a mesh is at least [`MIN_MEAN_EDGE`], long enough for computations in single
-/// precision. `parameter` is the name used in errors.
+/// Checks that the mean edge length of a caller's mesh is at least [`MIN_MEAN_EDGE`], long enough for computations in
+/// single precision. `parameter` is the name used in errors.
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {

@@ -9,9 +9,10 @@ pub enum MethodError {
     /// A parameter, option or input is not accepted, such as a number out of its range.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
-        /// The name of the parameter in the public API.
+        /// The name of the parameter, option or input in the public API.
         parameter: &'static str,
-        /// The reason; if it is a range, usually with the accepted range and the invalid value.
+        /// The reason why the value is not accepted; if it is out of range, usually with the accepted range and the
+        /// invalid value.
         problem: String,
     },
     /// The caller's mesh is unsuitable, a mesh would intersect itself, or one does not fit into memory.
@@ -20,34 +21,36 @@ pub enum MethodError {
     /// The volume is unsuitable, or data of its size does not fit into memory.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The surface exceeds the largest number of vertices that the image and the sampling allow.
+    /// The surface would exceed the largest number of vertices, since its edges are too short for its size or forces
+    /// inflate it.
     #[error(
         "the surface would have more than {most} vertices: use longer edges, a smaller volume or smaller ellipsoids, or forces that do not inflate it"
     )]
     TooManyVertices {
-        /// The largest number of vertices accepted.
+        /// The largest number of vertices accepted for the surface.
         most: usize,
     },
-    /// A linear system could not be solved to the requested tolerance.
+    /// A linear system, that of the implicit surface's constraints, could not be solved to the requested tolerance.
     #[error("the system of {constraints} constraints cannot be solved to the requested tolerance: {cause}")]
     Singular {
-        /// The number of equations in the system.
+        /// The number of constraints, the equations of the system.
         constraints: usize,
-        /// The likely cause, and how to avoid it.
+        /// The likely cause of the failure, and how to avoid it.
         cause: &'static str,
     },
     /// The bytes from which a run should be restored are not a valid state of this model.
     #[error("saved state, {field}: {problem}")]
     BadState {
-        /// The invalid part of the state.
+        /// The part of the saved state that is invalid.
         field: &'static str,
-        /// The defect, with the accepted range if there is one.
+        /// The defect of the invalid part, with the accepted range if there is one.
         problem: String,
     },
 }
 
 impl MethodError {
-    /// Makes a [`MethodError::InvalidArgument`].
+    /// Makes a [`MethodError::InvalidArgument`] from the name of a parameter and the reason why its value is not
+    /// accepted.
     pub fn invalid(parameter: &'static str, problem: impl Into<String>) -> Self {
         Self::InvalidArgument { parameter, problem: problem.into() }
     }

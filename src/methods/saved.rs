@@ -1,4 +1,4 @@
-//! The binary envelope of saved states: magic bytes, a checksum, and the serialised state.
+//! The binary envelope of the saved states of all methods: magic bytes, a checksum, and the serialised state.
 
 use super::MethodError;
 use crate::mesh::Mesh;
@@ -8,16 +8,16 @@ use serde::de::DeserializeOwned;
 /// The first bytes of a saved state: they identify the method, and the last one is the version of the layout.
 pub type Magic = [u8; 8];
 
-/// An upper bound of the valence of a vertex in a valid state; no edit creates more neighbours.
+/// The largest valence of a vertex accepted in a saved state; no edit creates more neighbours.
 pub const MAX_VALENCE: usize = 4096;
 
-/// Whether every vertex has at most [`MAX_VALENCE`] neighbours. Checking a mesh takes time quadratic in the
-/// valence, so a forged state could otherwise stall [`Mesh::check`].
+/// Returns whether every vertex has at most [`MAX_VALENCE`] neighbours, so that the mesh of a saved state may be passed
+/// to [`Mesh::check`]. Its time is quadratic in the valence, so a forged state could otherwise stall it.
 pub fn can_be_checked(mesh: &Mesh) -> bool {
     mesh.rings().iter().all(|ring| ring.valence() <= MAX_VALENCE)
 }
 
-/// Serialises a state of a method, preceded by `magic` and a checksum.
+/// Serialises a state of a method, preceded by `magic` and a checksum, so that [`decode`] can restore it.
 pub fn encode<T: Serialize>(magic: &Magic, state: &T) -> Vec<u8> {
     // Serialising plain data into memory cannot fail.
     let body = postcard::to_allocvec(state).unwrap_or_default();
@@ -48,7 +48,7 @@ pub fn decode<T: DeserializeOwned>(magic: &Magic, bytes: &[u8]) -> Result<T, Met
 pub struct Hash(u64);
 
 impl Hash {
-    /// Returns the hash of an empty sequence of words.
+    /// Returns the hash of an empty sequence of words, to which [`Self::mix`] adds words.
     pub fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
@@ -58,7 +58,7 @@ impl Hash {
         self.0 = (self.0 ^ word).wrapping_mul(0x100_0000_01b3);
     }
 
-    /// The hash of the words added so far.
+    /// Returns the hash of the words added so far.
     pub fn value(&self) -> u64 {
         self.0
     }

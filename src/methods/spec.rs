@@ -1,4 +1,4 @@
-//! Descriptions of parameters, from which a user interface can build its controls.
+//! Descriptions of the parameters of all methods, from which a user interface can build its controls.
 
 use super::MethodError;
 use serde::Serialize;
@@ -7,33 +7,33 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct ParamSpec {
-    /// The name in the public API.
+    /// The name of the parameter in the public API.
     pub name: &'static str,
-    /// A short label for the control.
+    /// A short label for the parameter's control in a user interface.
     pub label: &'static str,
-    /// One sentence of help that a student understands.
+    /// One sentence of help on the parameter that a student understands.
     pub help: &'static str,
-    /// The symbol in the paper.
+    /// The symbol of the parameter in the paper, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub symbol: Option<&'static str>,
-    /// The type of the values.
+    /// The type of the parameter's values.
     #[serde(rename = "type")]
     pub kind: ParamKind,
-    /// The default value.
+    /// The value of the parameter if the caller gives none.
     pub default: ParamDefault,
-    /// The smallest value accepted, if there is a bound.
+    /// The smallest value accepted for the parameter; `None` if there is no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// The largest value accepted, if there is a bound.
+    /// The largest value accepted for the parameter; `None` if there is no bound.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
-    /// A suitable increment for the control.
+    /// A suitable increment for the parameter's control, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<f64>,
-    /// How values are spread over a slider; `None` for parameters without one.
+    /// How values are spread over the parameter's slider; `None` for parameters without a slider.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<ParamScale>,
-    /// The unit, if there is one.
+    /// The unit of the parameter's values, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
     /// The words that a parameter of kind [`ParamKind::Choice`] accepts; a number is accepted, too, if `min` is set.
@@ -42,7 +42,8 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
-    /// An unbounded number with default 0; specifications override the fields in which they differ.
+    /// The specification of an unbounded number with default 0; those of all parameters are made from it by overriding
+    /// the fields in which they differ.
     pub(super) const NUMBER: Self = Self {
         name: "",
         label: "",
@@ -58,7 +59,7 @@ impl ParamSpec {
         choices: None,
     };
 
-    /// Checks that a number is finite and within the accepted range, ends included.
+    /// Checks that a numerical value of the parameter is finite and within the accepted range, ends included.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the parameter and the accepted range.
@@ -75,35 +76,35 @@ impl ParamSpec {
     }
 }
 
-/// The type of a parameter.
+/// The type of a parameter's values, by which a user interface chooses a control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ParamKind {
-    /// Any number in the range.
+    /// Any number from [`ParamSpec::min`] to [`ParamSpec::max`].
     Number,
-    /// An integer in the range.
+    /// An integer from [`ParamSpec::min`] to [`ParamSpec::max`].
     Integer,
     /// One of the words in [`ParamSpec::choices`], or a number if [`ParamSpec::min`] is set.
     Choice,
-    /// On or off.
+    /// On or off, as a Boolean.
     Boolean,
 }
 
-/// The default value of a parameter.
+/// The default value of a parameter, in a form that suits its type.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ParamDefault {
-    /// A number.
+    /// The default of a numerical parameter.
     Number(f64),
-    /// One of the words in [`ParamSpec::choices`].
+    /// The default of a choice, one of the words in [`ParamSpec::choices`].
     Choice(&'static str),
-    /// On or off.
+    /// The default of a parameter that is on or off.
     Boolean(bool),
-    /// Derived from the data; serialised as `null`.
+    /// The default depends on the data, such as the volume; serialised as `null`.
     FromData,
 }
 
-/// How values are spread over a slider.
+/// How the values of a parameter are spread over its slider in a user interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ParamScale {

@@ -1,4 +1,4 @@
-//! The stepping interface common to all methods.
+//! The stepping interface common to all methods: the report that each step returns.
 
 use crate::remesh::Changes;
 use serde::Serialize;
@@ -7,9 +7,9 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct StepReport {
-    /// The number of steps since the start, without calls after the end.
+    /// The number of steps since the start of the run; calls after its end are not counted.
     pub iteration: u32,
-    /// Whether the method has finished.
+    /// Whether the method has finished, so that no further step is necessary.
     pub done: bool,
     /// The current phase as text for the user, such as "level 1".
     pub phase: String,
@@ -17,7 +17,7 @@ pub struct StepReport {
     pub progress: f64,
     /// The convergence measure of the method, such as the mean energy of a deformable model; NaN if unknown.
     pub residual: f64,
-    /// The value below which the residual counts as converged.
+    /// The value of `residual` below which the method counts as converged.
     pub tolerance: f64,
     /// The number of vertices of the mesh.
     pub vertices: u32,
@@ -27,13 +27,13 @@ pub struct StepReport {
     pub components: u32,
     /// The Euler characteristic χ of the mesh, summed over its components.
     pub euler: i32,
-    /// The number of edits since the last report, by kind.
+    /// The numbers of edits of the mesh since the last report, by kind of edit.
     pub events: Changes,
-    /// The time spent in each part of the step, in milliseconds; all 0 without a clock.
+    /// The time spent in each part of the step, in milliseconds; all 0 if the model has no clock.
     pub times: Times,
 }
 
-/// Durations in milliseconds of named parts of a step, in the order in which they first ran.
+/// Durations in milliseconds of named parts of a step, for its report, in the order in which they first ran.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times(pub Vec<(&'static str, f64)>);
 
@@ -44,7 +44,7 @@ impl Serialize for Times {
 }
 
 impl Times {
-    /// Adds `milliseconds` to the duration of `part`.
+    /// Adds `milliseconds` to the duration of the part of the step named `part`.
     pub fn add(&mut self, part: &'static str, milliseconds: f64) {
         match self.0.iter_mut().find(|(name, _)| *name == part) {
             Some((_, sum)) => *sum += milliseconds,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Numbers of edits made to a mesh in one call, named as in the papers.
+/// Numbers of edits made to a mesh in one call, named as in the paper of Lachaud & Montanvert.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Changes {
     /// Number of edges split.
@@ -12,9 +12,9 @@ pub struct Changes {
     pub deletions: u32,
     /// Number of edges flipped.
     pub inversions: u32,
-    /// Number of contacts joined by a tube.
+    /// Number of axial changes: contacts of two vertices joined by a tube.
     pub axial: u32,
-    /// Number of necks cut.
+    /// Number of annular changes: necks cut.
     pub annular: u32,
     /// Number of components added for regions of the image that the mesh does not cover.
     pub seeds: u32,
@@ -23,7 +23,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Returns whether any edit changed the topology, not only the sampling.
+    /// Returns whether any edit changed the topology of the mesh, not only its sampling.
     pub fn changed_topology(self) -> bool {
         self.axial + self.annular + self.seeds + self.vanished > 0
     }

@@ -8,7 +8,7 @@ use crate::mesh::{DisjointSets, TriangleMesh};
 /// The cosine of the largest angle by which a triangle may turn when vertices are merged, 60°.
 const LARGEST_TURN: f64 = 0.5;
 
-/// The smallest valence of a vertex of the result.
+/// The smallest number of triangles at a vertex of the simplified surface; with fewer it would not be a closed mesh.
 const MIN_VALENCE: u32 = 3;
 
 /// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
@@ -28,7 +28,7 @@ pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec
     }
 }
 
-/// A partition of the vertices into connected clusters.
+/// A partition of the vertices of a mesh into connected clusters, each of which is to be merged into one vertex.
 struct Clusters {
     /// For each vertex, the lowest vertex of its cluster, which identifies the cluster.
     first: Vec<u32>,
@@ -46,8 +46,8 @@ impl Clusters {
         Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
     }
 
-    /// Dissolves clusters with a vertex further than `furthest` from the mean of its cluster, measured along the vertex
-    /// normal.
+    /// Dissolves, into single vertices, clusters with a vertex further than `furthest` from the mean of its cluster,
+    /// measured along the vertex normal, so that bends and thin parts are kept.
     fn dissolve_bent(&mut self, mesh: &TriangleMesh, furthest: f32) {
         let means = self.means(mesh);
         let normals = mesh.vertex_normals();
@@ -62,8 +62,8 @@ impl Clusters {
         vertices.map(|v| self.first[v as usize])
     }
 
-    /// Dissolves clusters whose Euler characteristic is not 1: those with a loop, and whole components. Merging any
-    /// others does not change the topology.
+    /// Dissolves, into single vertices, clusters whose Euler characteristic is not 1: those with a loop, and whole
+    /// components. Merging any other cluster does not change the topology.
     fn keep_contractible(&mut self, mesh: &TriangleMesh) {
         let mut euler = vec![0; self.first.len()];
         self.first.iter().for_each(|&c| euler[c as usize] += 1);
@@ -77,7 +77,7 @@ impl Clusters {
     }
 
     /// Dissolves into single vertices the clusters for which `dissolves` is true, identified by their lowest vertex;
-    /// returns whether one of them had more than one vertex.
+    /// returns whether the partition has changed.
     fn dissolve(&mut self, dissolves: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
         for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && dissolves(**c)) {
@@ -87,7 +87,7 @@ impl Clusters {
         any
     }
 
-    /// Returns the mean position of each cluster, stored at its lowest vertex.
+    /// Returns the mean position of the vertices of each cluster, at the index of its lowest vertex.
     fn means(&self, mesh: &TriangleMesh) -> Vec<Vec3> {
         let mut means = vec![Vec3::ZERO; mesh.positions.len()];
         let mut members = vec![0u32; mesh.positions.len()];
@@ -104,8 +104,9 @@ impl Clusters {
         TriangleMesh { positions: self.means(mesh), triangles, ..TriangleMesh::default() }
     }
 
-    /// Dissolves the clusters at edges of more than two triangles of `merged`, at vertices of fewer than three, and at
-    /// triangles turned by more than 60° against `mesh`; returns whether one of them had more than one vertex.
+    /// Dissolves the clusters that must not be merged: those at edges of more than two triangles of the result
+    /// `merged`, at vertices of fewer than three triangles, and at triangles turned by more than 60° against `mesh`;
+    /// returns whether the partition has changed.
     fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
@@ -150,8 +151,8 @@ fn edges(mesh: &TriangleMesh) -> impl Iterator<Item = [usize; 2]> + '_ {
     directed_edges(mesh).filter(|[u, v]| u < v).map(|edge| edge.map(|v| v as usize))
 }
 
-/// Returns the edges that several triangles contain in the same direction; `valences` are the numbers of triangles at
-/// the vertices.
+/// Returns the edges that several triangles contain in the same direction, at which the surface is not a manifold;
+/// `valences` are the numbers of triangles at the vertices.
 fn doubled_edges(mesh: &TriangleMesh, valences: &[u32]) -> Vec<[u32; 2]> {
     let mut ends = vec![0u32; directed_edges(mesh).count()];
     // Ends of the edges from each vertex, in one range of `ends` each.
@@ -226,7 +227,8 @@ mod tests {
         assert!(near.positions.len() > rough.positions.len());
     }
 
-    /// Cells of a noisy shape contain tubes, both sides of thin walls, and whole components.
+    /// Cells of a noisy shape contain tubes, both sides of thin walls, and whole components, none of which may be
+    /// merged away.
     #[test]
     fn noise_keeps_its_components_and_handles() {
         for seed in 0..40 {

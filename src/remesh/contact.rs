@@ -1,12 +1,13 @@
-//! Contact queries between non-adjacent vertices: equation (3) and the axial change of figures 3 and 4.
+//! Contact between non-adjacent vertices, and its resolution by flips and joins: equation (3) and the axial change of
+//! figures 3 and 4 (Lachaud & Montanvert).
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
-/// Where the rim of a tube lies on the edges around a joined vertex, as fractions of the edge from that vertex. Nearer
-/// to the vertex than the first, the tube is so thin that it is cut again at once; further out, the strip around it is
-/// thinner than δ and collapses. The others are tried in turn if the first causes a self-intersection.
+/// Fractions of the edges around a joined vertex, measured from that vertex, at which the rim of the new tube lies;
+/// tried in turn until one causes no self-intersection. Below the first, the tube is so thin that it is cut again at
+/// once; above it, the strip around the tube is thinner than δ and collapses.
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower id first, with their squared distance.
@@ -18,7 +19,8 @@ struct ContactPair {
 }
 
 impl Resolver {
-    /// Resolves the contacts of the vertices marked for a contact query; returns whether anything changed.
+    /// Resolves the contacts of the vertices marked for a contact query, by flips and joins; returns whether the mesh
+    /// was changed.
     pub(super) fn join_contacts(
         &mut self,
         mesh: &mut Mesh,
@@ -54,8 +56,8 @@ impl Resolver {
         }
     }
 
-    /// Returns the pairs of vertices in contact, nearest first, of which at least one was marked for the contact query;
-    /// clears the marks.
+    /// Returns the pairs of vertices in contact, nearest first, of which at least one is marked for the contact query,
+    /// and clears these marks.
     fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<ContactPair> {
         let mut dirty = self.take_dirty();
         dirty.retain(|&v| mesh.is_live(v));
@@ -84,8 +86,8 @@ impl Resolver {
     }
 
     /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge longer than their
-    /// distance, whose square is `square`; by a tube if they are opposite across no edge and `guide` allows it. `None`
-    /// if nothing was changed.
+    /// distance, whose square is `square`; by a tube if they are opposite across no edge and `guide` allows it. Returns
+    /// `Some(true)` if the mesh was changed, else `None`.
     fn resolve_contact(
         &mut self,
         mesh: &mut Mesh,
@@ -117,7 +119,8 @@ fn free(mesh: &Mesh, busy: &[bool], v: VertexId) -> bool {
     mesh.is_live(v) && busy.get(v.index()) == Some(&false)
 }
 
-/// Returns the longest edge across which `u` and `v` are opposite each other, and its squared length.
+/// Returns the ends of the longest edge across which `u` and `v` are opposite each other, and its squared length;
+/// `None` if there is no such edge.
 fn longest_edge_between(mesh: &Mesh, u: VertexId, v: VertexId) -> Option<(VertexId, VertexId, f32)> {
     let across = mesh.ring(u).pairs().filter(|&(a, b)| mesh.ring(a).before(b) == Some(v));
     across

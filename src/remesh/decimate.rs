@@ -25,8 +25,8 @@ const MAX_NEIGHBOURS: usize = 24;
 /// The cosine of the largest angle by which one collapse may turn a triangle, 78°.
 const MIN_COSINE: f64 = 0.2;
 
-/// The largest number of times all edges are queued. A rejected edge may become possible once its neighbours are gone;
-/// rounds that free one edge each would make the work quadratic.
+/// The largest number of passes in which all edges are queued for collapse. A rejected edge may become possible once
+/// its neighbours are gone; passes that free one edge each would make the work quadratic.
 const ROUNDS: usize = 4;
 
 /// The work limit of the intersection tests, in boxes visited and pairs of triangles tested: this much per triangle of
@@ -37,12 +37,12 @@ const WORK_PER_TRIANGLE: u64 = 2_000;
 const WORK_AT_LEAST: u64 = 10_000_000;
 
 /// Decimates a mesh: collapses edges in the order of their quadric error until at most `target_triangles` are left, no
-/// safe collapse is found (rejected edges are tried again in up to four passes), or the work limit is reached, as among
-/// thousands of needles that block each other. Returns the number of collapses, each of which removes two triangles.
-/// Vertices are renumbered unless the target is met from the start.
+/// safe collapse is found (rejected edges are tried again, in up to four passes in all), or the work limit is reached,
+/// as among thousands of needles that block each other. Returns the number of collapses, each of which removes two
+/// triangles. Vertices are renumbered unless the target is met from the start.
 ///
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
-/// intersection. The attributes of the remaining vertex are the means of both.
+/// intersection. The vertex that remains after a collapse has the mean attributes of both ends.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
@@ -64,29 +64,30 @@ pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
 struct Decimation<'a> {
     mesh: &'a mut Mesh,
     target: usize,
-    /// The quadric of each vertex slot, relative to `origin`.
+    /// The quadric error of each vertex, by slot, as a function of a position relative to `origin`.
     quadrics: Vec<Quadric>,
-    /// The origin of the quadrics, near the mesh for precision.
+    /// The origin of the positions at which quadrics are evaluated, near the mesh, so that they do not lose precision.
     origin: DVec3,
-    /// The number of collapses at each vertex slot, by which outdated candidates are recognised.
+    /// The number of collapses at each vertex, by slot, by which outdated candidates in the queue are recognised.
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
 }
 
-/// A candidate edge in the priority queue, ordered by error, then by ids.
+/// An edge to be collapsed, in the priority queue of decimation, ordered by error, then by vertex ids.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
-    /// The bits of the error; for non-negative numbers they are ordered like the numbers.
+    /// The bits of the quadric error; for non-negative numbers they are ordered like the numbers.
     error: u64,
     ends: [VertexId; 2],
-    /// The index of the position to be tried, in [`Decimation::positions`].
+    /// The index of the position to which the edge is to be collapsed, in [`Decimation::positions`].
     choice: u8,
-    /// The sum of the stamps of both ends; the candidate is outdated if it has changed.
+    /// The number of collapses at both ends (the sum of their `stamps`) when the edge was queued; the candidate is
+    /// outdated if it has increased.
     stamp: u32,
 }
 
-/// The quadric error of a candidate position for the remaining vertex, and that position.
+/// A candidate position for the vertex that remains after a collapse, preceded by its quadric error.
 type RatedPosition = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
@@ -123,7 +124,8 @@ impl<'a> Decimation<'a> {
         }
     }
 
-    /// Collapses the edge into its candidate position if that is safe; otherwise queues it with the next position.
+    /// Collapses the edge `uv` into its candidate position number `choice` if that is safe; otherwise queues the edge
+    /// with the next candidate position, if there is one.
     fn attempt(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if self.mesh.can_collapse(u, v).is_err() {
             return;
@@ -146,7 +148,7 @@ impl<'a> Decimation<'a> {
         ring.as_slice().iter().for_each(|&w| self.enqueue(u.min(w), u.max(w), 0));
     }
 
-    /// Queues the edge with the error of its candidate position number `choice`, if there is one.
+    /// Queues the edge `uv` with the error of its candidate position number `choice`, if there is one.
     fn enqueue(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
             let stamp = self.stamp(u, v);
@@ -158,8 +160,8 @@ impl<'a> Decimation<'a> {
         self.stamps[u.index()] + self.stamps[v.index()]
     }
 
-    /// Returns the candidate positions for the remaining vertex by increasing error: the position of least error, if it
-    /// is determined and finite, the midpoint of the edge and both ends.
+    /// Returns the candidate positions, by increasing error, for the vertex that remains after a collapse of the edge
+    /// `uv`: the position of least error, if it is determined and finite, the midpoint of the edge and both ends.
     fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[RatedPosition; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
@@ -173,8 +175,9 @@ impl<'a> Decimation<'a> {
         positions
     }
 
-    /// Returns whether the collapse turns no triangle by more than 78°, degenerates none and makes none intersect
-    /// another, moves no component to the other side of the surface, and leaves a valence of at most 24.
+    /// Returns whether collapsing the edge `uv` into `position` turns no triangle by more than 78°, degenerates none
+    /// and makes none intersect another, moves no component to the other side of the surface, and leaves a valence of
+    /// at most 24.
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -197,16 +200,16 @@ impl<'a> Decimation<'a> {
     }
 }
 
-/// Returns whether a triangle may be replaced by another: it turns by at most 78° and has a nonzero area. A degenerate
-/// triangle has no orientation to keep.
+/// Returns whether a collapse may replace the triangle `old` by `new`: it turns by at most 78° and has a nonzero area.
+/// A degenerate triangle has no orientation to keep.
 fn may_replace(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));
     let flips = before.dot(after) < MIN_COSINE * before.length() * after.length();
     !flips && !collinear(new.points)
 }
 
-/// Returns, by vertex slot, the quadric of the planes of its triangles and, with a small weight, of its position; each
-/// triangle is weighted by a third of its area.
+/// Returns the initial quadric of each vertex, by slot: that of the planes of its triangles and, with a small weight,
+/// of its position; each triangle is weighted by a third of its area.
 fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
     let mut quadrics = vec![Quadric::default(); mesh.slots()];
     for corners in mesh.triangles() {

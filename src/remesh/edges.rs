@@ -1,23 +1,24 @@
-//! Restores the edge bounds of equations (1) and (2), figure 1, by splits, flips and collapses.
+//! Restores the bounds of edge lengths, equations (1) and (2) and figure 1 (Lachaud & Montanvert), by splits, flips and
+//! collapses.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
 use crate::mesh::{EditError, Mesh, OppositeVertices, VertexId};
 
-/// The longest edge that a collapse may produce, as a factor of the upper bound, unless it was as long before. While
-/// all edges are within bounds, none exceeds 1.4; in a surface much finer than δ and too crowded for splits, repeated
-/// collapses would produce needles.
+/// The longest edge that a collapse may produce, as a factor of the upper bound of edges, unless the edge was as long
+/// before. While all edges are within bounds, none exceeds 1.4; in a surface much finer than δ and too crowded for
+/// splits, repeated collapses would produce needles.
 const LENGTHENED: f32 = 1.6;
 
-/// The largest number of edits around one vertex in a call. The vertex is then skipped for the rest of the call, and
-/// not left pending for the next. Edits of edges with different bounds may undo each other; on a head scan they used up
-/// the work of a whole call, 20 s.
+/// The largest number of edits around one vertex in a call of the resolver. The vertex is then skipped for the rest of
+/// the call, and not left pending for the next. Edits of edges with different bounds may undo each other; on a head
+/// scan they used up the work of a whole call, 20 s.
 const MAX_EDITS: u8 = 40;
 
 impl Resolver {
-    /// Brings the edges around queued vertices within bounds where possible, until the queue is empty or the work limit
-    /// of the call is reached.
+    /// Brings the lengths of edges around queued vertices within bounds where possible, until the queue is empty or the
+    /// work limit of the resolver's call is reached.
     pub(super) fn restore_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
         while self.embedding.effort() < self.max_effort {
             let Some(u) = self.pop() else { return };
@@ -27,8 +28,8 @@ impl Resolver {
         }
     }
 
-    /// Makes a split, flip or collapse at a vertex, and rolls it back if triangles would intersect. Outside the cells
-    /// of [`Self::set_tested_cells`], only pairs of triangles with a common corner are tested.
+    /// Makes a split, flip or collapse at the vertex `at`, and rolls it back if triangles would intersect. Outside the
+    /// cells of [`Self::set_tested_cells`], only pairs of triangles with a common corner are tested.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -42,7 +43,8 @@ impl Resolver {
         }
     }
 
-    /// Returns whether edges around `u` may still be edited in this call.
+    /// Returns whether edges around `u` may still be edited in the current call of the resolver, by the limit
+    /// [`MAX_EDITS`].
     fn may_edit(&self, u: VertexId) -> bool {
         self.edits.get(u.index()).is_none_or(|&edits| edits < MAX_EDITS)
     }
@@ -54,8 +56,8 @@ impl Resolver {
         self.edits[u.index()] += 1;
     }
 
-    /// Edits the first edge around `u` that is out of bounds, to bring it within them; if an edit is rejected, tries
-    /// the next such edge.
+    /// Edits the first edge around `u` whose length is out of bounds, to bring it within them; if an edit is rejected,
+    /// tries the next such edge.
     fn restore_vertex(
         &mut self,
         mesh: &mut Mesh,
@@ -83,7 +85,8 @@ impl Resolver {
     }
 
     /// Removes an edge that is too long: flips it if a vertex at its midpoint would be too near an opposite one and the
-    /// flip makes it shorter; otherwise, or if the flip is rejected, splits it. `Ok(false)` at the limit of vertices.
+    /// flip makes it shorter; otherwise, or if the flip is rejected, splits it. Returns `Ok(true)` if the mesh was
+    /// changed, `Ok(false)` if it has the largest number of vertices.
     fn shorten(
         &mut self,
         mesh: &mut Mesh,
@@ -111,7 +114,7 @@ impl Resolver {
     }
 
     /// Removes an edge that is too short: collapses it if `guide` allows it, cuts the neck that blocks the collapse, or
-    /// removes an isolated tetrahedron. `Ok(false)` if `guide` forbids it.
+    /// removes an isolated tetrahedron. Returns `Ok(true)` if the mesh was changed, `Ok(false)` if `guide` forbids it.
     fn remove_short(
         &mut self,
         mesh: &mut Mesh,
@@ -131,8 +134,8 @@ impl Resolver {
         }
     }
 
-    /// Collapses the edge into the first of [`collapse_positions`] that makes no edge too long and causes no
-    /// self-intersection.
+    /// Collapses the edge `uv` into the first of [`collapse_positions`] that makes no edge too long and causes no
+    /// self-intersection; returns `Ok(true)` if there is one.
     fn collapse(
         &mut self,
         mesh: &mut Mesh,
@@ -160,8 +163,8 @@ impl Resolver {
     }
 }
 
-/// Returns the candidate positions of a collapse: the midpoint of the edge and its ends, in this order, but positions
-/// at which a triangle turns over last.
+/// Returns the candidate positions for the vertex that remains after a collapse of the edge `uv`: the midpoint of the
+/// edge and its ends, in this order, but positions at which a triangle turns over last.
 fn collapse_positions(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let (p, q) = (mesh.position(u), mesh.position(v));
     let mut positions = [(p + q) * 0.5, p, q];
@@ -169,7 +172,8 @@ fn collapse_positions(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     positions
 }
 
-/// Returns whether collapsing `ends` into a position makes an edge longer than `most` and than before.
+/// Returns whether collapsing the edge between `ends` into the position `at` makes another edge longer than both `most`
+/// and its present length.
 fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     ends.into_iter().any(|end| {
         let from = mesh.position(end);

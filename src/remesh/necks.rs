@@ -1,22 +1,22 @@
-//! Cuts necks thinner than the lower bound of edges: the annular change of figure 5.
+//! Cuts necks thinner than the lower bound of edge lengths: the annular change of figure 5 (Lachaud & Montanvert).
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::{rank_f32, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, VertexId};
 
-/// Distances in δ by which each side of a cut is moved away from the other; the first that causes no self-intersection
-/// is used. At shorter ones the sides are soon in contact again.
+/// Distances in units of δ by which each side of a cut is moved away from the other; the first that causes no
+/// self-intersection is used. At shorter ones the sides are soon in contact again.
 const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 
-/// The largest displacement of a side of a cut, as a share of its distance from the mean of its neighbours along the
+/// The largest displacement of one side of a cut, as a share of its distance from the mean of its neighbours along the
 /// axis of the neck, so that no triangle turns over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
 
 impl Resolver {
-    /// Cuts the neck along a ring of three edges through the edge `uv` and a common neighbour (annular change): the
-    /// shortest such ring that `guide` allows and whose cut causes no self-intersection. `Ok(false)` if there is none
-    /// that `guide` allows.
+    /// Cuts a neck (annular change) along a cycle of three edges, formed by the edge `uv` and a common neighbour of its
+    /// ends: the shortest such cycle that `guide` allows and whose cut causes no self-intersection. Returns `Ok(true)`
+    /// after a cut, `Ok(false)` if `guide` allows none.
     pub(super) fn cut_neck(
         &mut self,
         mesh: &mut Mesh,
@@ -46,8 +46,8 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Cuts along a ring of three edges and moves the two sides apart by the largest of [`CUT_PUSHES`] that causes no
-    /// self-intersection.
+    /// Cuts along the cycle of the three edges between `u`, `v` and `o`, and moves the two sides apart by the largest
+    /// of [`CUT_PUSHES`] that causes no self-intersection; `None`, with the mesh unchanged, if each causes one.
     fn cut_apart(&mut self, mesh: &mut Mesh, sampling: Sampling, [u, v, o]: [VertexId; 3]) -> Option<Cut> {
         let mut apart = |push: f32| {
             self.embedding.attempt(mesh, |mesh| {
@@ -59,8 +59,8 @@ impl Resolver {
         CUT_PUSHES.into_iter().find_map(|push| apart(push).ok())
     }
 
-    /// Cuts necks at vertices that could not move: in a neck compressed until its vertices are held, no edge becomes
-    /// short, and it would never be cut otherwise.
+    /// Cuts necks at the vertices `stuck`, which could not move at all: in a neck compressed until its vertices are
+    /// held, no edge becomes short, and it would never be cut otherwise.
     pub(super) fn cut_stuck_necks(
         &mut self,
         mesh: &mut Mesh,
@@ -78,7 +78,8 @@ impl Resolver {
     }
 }
 
-/// Moves the two sides of a cut apart along the axis of the neck, each by `push` or less (see [`CUT_PUSH_LIMIT`]).
+/// Moves the two sides of a cut apart along the axis of the neck, each by `push` or less, in units of the mesh (see
+/// [`CUT_PUSH_LIMIT`]).
 fn move_apart(mesh: &mut Mesh, cut: Cut, push: f32) {
     let [a, b, c] = cut.kept.map(|v| mesh.position(v));
     let centre = (a + b + c) * (1.0 / 3.0);

@@ -11,13 +11,15 @@ use crate::mesh::{Facet, Mesh, VertexId, facets_intersect};
 pub(super) struct Obstacles {
     /// Nodes in heap order: node i has the children 2i and 2i + 1, and the leaves are the last half.
     nodes: Vec<Bounds>,
-    /// The leaf of each vertex slot, counted from the first leaf.
+    /// The leaf of each vertex, by slot, counted from the first leaf.
     leaves: Vec<u32>,
-    /// The vertex of each leaf.
+    /// The vertex whose one-ring each leaf bounds.
     vertices: Vec<VertexId>,
-    /// The number of the connected component of each vertex slot.
+    /// The number of the connected component of each vertex, by slot of the mesh; vertices of other components must not
+    /// change sides of the surface.
     components: Vec<u32>,
-    /// The remaining work budget, in boxes visited and pairs of triangles tested; see [`Self::is_exhausted`].
+    /// The remaining work budget of decimation, in boxes visited and pairs of triangles tested; see
+    /// [`Self::is_exhausted`].
     work_left: u64,
     stack: Vec<u32>,
 }
@@ -81,8 +83,8 @@ impl Obstacles {
         self.one_ring_intersects(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
     }
 
-    /// Returns whether a triangle that has `v` as its lowest vertex, and no vertex in `replaced`, intersects a new
-    /// triangle.
+    /// Returns whether a triangle that has `v` as its lowest vertex, and no vertex among the replaced ones, intersects
+    /// a new triangle of `edit`.
     fn one_ring_intersects(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             self.work_left = self.work_left.saturating_sub(1);
@@ -100,13 +102,13 @@ impl Obstacles {
         false
     }
 
-    /// Returns whether the work budget is used up. The work of testing triangles whose boxes all overlap is quadratic
-    /// in their number.
+    /// Returns whether the work budget is used up, so that decimation has to end. The work of testing triangles whose
+    /// boxes all overlap is quadratic in their number.
     pub fn is_exhausted(&self) -> bool {
         self.work_left == 0
     }
 
-    /// Updates the tree after `removed` was removed and the triangles around `centre` changed.
+    /// Updates the tree after a collapse that deleted the vertex `removed` and changed the triangles around `centre`.
     pub fn update(&mut self, mesh: &Mesh, centre: VertexId, removed: VertexId) {
         self.set(removed, Bounds::EMPTY);
         self.set(centre, one_ring_bounds(mesh, centre));
@@ -129,7 +131,7 @@ impl Obstacles {
     }
 }
 
-/// An edit to be tested: the new triangles, and the vertices whose one-rings they replace.
+/// A collapse to be tested: the new triangles, and the vertices whose one-rings they replace.
 struct Edit<'a> {
     fresh: &'a [Facet],
     boxes: &'a [Bounds],
@@ -143,8 +145,8 @@ fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
     boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.union(&one))
 }
 
-/// Returns whether `p`, a vertex of another component, is enclosed between the old and the new triangles, so that it
-/// would change sides of the surface.
+/// Returns whether `p`, a vertex of another component, is enclosed between the old and the new triangles of `edit`, so
+/// that it would change from inside to outside of the surface or back.
 fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     if !edit.around.contains(p) {
         return false;
@@ -162,7 +164,7 @@ fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     (fresh - old).abs() > std::f64::consts::TAU
 }
 
-/// Returns the number of the connected component of each vertex slot.
+/// Returns the number of the connected component of each vertex, by slot; 0 for free slots.
 fn components(mesh: &Mesh) -> Vec<u32> {
     let mut components = vec![0; mesh.slots()];
     for (number, members) in (0..).zip(mesh.component_members()) {
@@ -183,7 +185,8 @@ fn one_ring_bounds(mesh: &Mesh, v: VertexId) -> Bounds {
     ring.fold(point(mesh.position(v)), |all, &w| all.union(&point(mesh.position(w))))
 }
 
-/// Returns the vertices in the order of a Z-curve through their bounding box.
+/// Returns the vertices in the order of a Z-curve through their bounding box, so that consecutive ones are near each
+/// other.
 fn in_curve_order(mesh: &Mesh) -> Vec<VertexId> {
     let bounds = mesh
         .vertices()
@@ -202,11 +205,11 @@ fn in_curve_order(mesh: &Mesh) -> Vec<VertexId> {
     keyed.into_iter().map(|(_, v)| VertexId(v)).collect()
 }
 
-/// The binary logarithm of the number of cells along an axis of the Z-curve: more than enough to separate the vertices
-/// of a mesh.
+/// The binary logarithm of the number of cells along an axis of the Z-curve by which vertices are ordered: more than
+/// enough to separate the vertices of a mesh.
 const CURVE_BITS: u32 = 16;
 
-/// Returns the bits of a number below 2^16, each followed by two zeros.
+/// Returns the bits of a number below 2^16, each followed by two zeros, for interleaving those of three coordinates.
 fn spread(cell: u32) -> u64 {
     let mut bits = u64::from(cell);
     let steps = [(16, 0xff00_00ff), (8, 0x00f0_0f00_f00f), (4, 0x0c30_c30c_30c3), (2, 0x2492_4924_9249)];
@@ -237,7 +240,8 @@ mod tests {
         (mesh, v, fan)
     }
 
-    /// Returns the x of a vertex of the first sphere, and `f32::MIN` for the second.
+    /// Returns the x of a vertex of the first sphere, and `f32::MIN` for one of the second, by which the vertex of the
+    /// first nearest to the second is found.
     fn first_x(mesh: &Mesh, v: VertexId) -> f32 {
         let x = mesh.position(v).x;
         if x < 1.1 { x } else { f32::MIN }

@@ -1,4 +1,4 @@
-//! The loop of figure 9: restores edge bounds, then resolves contacts, until all bounds hold.
+//! The loop of figure 9 (Lachaud & Montanvert): restores edge bounds, then resolves contacts, until all bounds hold.
 
 use super::small_components::SmallComponents;
 use super::{Changes, Embedding, Sampling};
@@ -8,16 +8,18 @@ use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// The largest number of rounds of edge and contact processing in one call. Each repairs bounds that the one before
-/// violated. Hard scenes never needed more than five; the rest stays pending for the next call.
+/// The largest number of rounds of edge and contact processing in one call of [`Resolver::resolve`]. Each repairs
+/// bounds that the one before violated. Hard scenes never needed more than five; the rest stays pending for the next
+/// call.
 const PASSES: usize = 8;
 
-/// The work limit of a call, in nearby vertices visited: this much per vertex of the mesh, plus [`MIN_EFFORT`]; the
-/// rest stays pending for the next call. An edit visits about 60, and ordinary iterations make less than one edit per
-/// ten vertices. Without this limit a call might never return: edits can undo each other, and on a needle pulled out of
-/// the surface edges cannot be brought within bounds.
+/// The work limit of a call of [`Resolver::resolve`], in nearby vertices visited: this much per vertex of the mesh,
+/// plus [`MIN_EFFORT`]; the rest stays pending for the next call. An edit visits about 60, and ordinary iterations make
+/// less than one edit per ten vertices. Without this limit a call might never return: edits can undo each other, and on
+/// a needle pulled out of the surface edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
-/// The constant part of the work limit, in nearby vertices visited, for small meshes.
+/// The constant part of the work limit of a call of [`Resolver::resolve`], in nearby vertices visited, for small
+/// meshes.
 const MIN_EFFORT: u64 = 100_000;
 
 /// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
@@ -29,18 +31,19 @@ pub struct Resolver {
     /// The cells in which splits, flips and collapses are tested in full for self-intersections; everywhere if `None`.
     pub(super) tested_cells: Option<CellSet>,
     overflowed: bool,
-    /// The value of [`Embedding::effort`] at which the current call ends.
+    /// The value of [`Embedding::effort`] at which the current call of [`Self::resolve`] ends.
     pub(super) max_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
-    /// Number of edits made around each vertex in the current call, by slot.
+    /// Number of edits made around each vertex in the current call of [`Self::resolve`], by slot.
     pub(super) edits: Vec<u8>,
     /// Vertices marked for the next contact query.
     dirty: Vec<VertexId>,
     is_dirty: Vec<bool>,
-    /// Vertices that could not move at all in the last move, sorted.
+    /// Vertices that could not move at all in the last move, sorted by id; the next call of [`Self::resolve`] cuts the
+    /// necks at them.
     pub(super) stuck: Vec<VertexId>,
-    /// Components of so few vertices that they may be removed.
+    /// The components with so few vertices that they may be removed.
     pub(super) small: SmallComponents,
     /// Vertices that edits of the last call of [`Self::resolve`] created or displaced.
     pub(super) edited: Vec<VertexId>,
@@ -48,13 +51,13 @@ pub struct Resolver {
     pub(super) changes: Changes,
 }
 
-/// Treatment of contacts between non-adjacent vertices.
+/// What the [`Resolver`] does about contacts between non-adjacent vertices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactPolicy {
-    /// The two vertices are joined by a tube (axial change).
+    /// Two vertices in contact are joined by a tube (axial change).
     #[default]
     Join,
-    /// The topology is kept: the two sides stay in contact, and the collision handling keeps them apart.
+    /// The topology is kept: sides in contact stay so, and the collision handling prevents that they intersect.
     Leave,
 }
 
@@ -64,19 +67,21 @@ pub trait TopologyGuide {
     /// Returns whether two vertices in contact may be joined by a tube (axial change).
     fn may_join(&self, mesh: &Mesh, pair: [VertexId; 2]) -> bool;
 
-    /// Returns whether the mesh may be cut along a ring of three edges (annular change).
+    /// Returns whether the mesh may be cut along a cycle of three edges between the vertices `ring` (annular change).
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool;
 
-    /// Returns whether a short edge may be collapsed: one that spans a thin wall or gap would merge the two sides.
+    /// Returns whether a short edge may be collapsed; not if it spans a thin wall or gap, whose two sides the collapse
+    /// would merge.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Returns whether there is foreground inside a small solid component, or background inside a small cavity. Those
-    /// without are removed sooner when they are crushed or lose their volume: such a cavity would grow inside the
-    /// foreground.
+    /// Returns whether the image shows foreground inside a small solid component with the vertices `members`, or
+    /// background inside a small cavity. Components for which it does not are removed sooner when they are crushed or
+    /// lose their volume; such a cavity would otherwise grow inside the foreground.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
-/// A [`TopologyGuide`] that allows every topology change, as in the paper, and finds content in no small component.
+/// A [`TopologyGuide`] that allows every topology change, as in the paper of Lachaud & Montanvert, and finds content in
+/// no small component.
 #[derive(Clone, Copy, Debug)]
 pub struct Unguided;
 
@@ -102,14 +107,15 @@ impl TopologyGuide for Unguided {
 /// run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pending {
-    /// Vertices whose edges have to be checked.
+    /// Vertices whose edge lengths are still to be checked.
     pub queue: Vec<VertexId>,
-    /// Vertices whose contacts have to be queried.
+    /// Vertices whose contacts are still to be queried.
     pub dirty: Vec<VertexId>,
 }
 
 impl Pending {
-    /// Returns the pending vertices after renumbering, without deleted ones; `new_ids` maps old ids to new ones.
+    /// Returns the pending vertices after the mesh was renumbered, without deleted ones; `new_ids` contains the new id
+    /// of each old one.
     pub fn renumbered(&self, new_ids: &[Option<VertexId>]) -> Self {
         let rename = |list: &[VertexId]| list.iter().filter_map(|v| *new_ids.get(v.index())?).collect();
         Self { queue: rename(&self.queue), dirty: rename(&self.dirty) }
@@ -138,53 +144,54 @@ impl Resolver {
         }
     }
 
-    /// Sets how contacts are resolved.
+    /// Sets what is done about contacts between non-adjacent vertices: they are joined by tubes, or left as they are.
     pub fn set_contact_policy(&mut self, contact: ContactPolicy) {
         self.contact_policy = contact;
     }
 
     /// Restricts the full tests for self-intersections of splits, flips and collapses to `cells`; elsewhere these are
     /// tested as by [`Embedding::attempt_in_one_rings`]. With `None` all are tested in full. The restriction halves the
-    /// time; the whole mesh has to be tested afterwards.
+    /// time of [`Self::resolve`]; the caller has to test the whole mesh afterwards.
     pub fn set_tested_cells(&mut self, cells: Option<CellSet>) {
         self.tested_cells = cells;
     }
 
-    /// Returns the collision guard, synchronised with `mesh`, for edits made by the caller.
+    /// Returns the collision handling of the resolver, synchronised with `mesh`, for edits made by the caller.
     pub fn embedding(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
         self.embedding.sync_with_edge(mesh, sampling.longest());
         &mut self.embedding
     }
 
-    /// Enables the test of output positions, as [`Embedding::watch_output`] does.
+    /// From now on also prevents self-intersections that the mesh, which stays within `bounds`, would have after
+    /// mapping by `map` and rounding to single precision, as [`Embedding::watch_output`] does.
     pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
         self.embedding.watch_output(map, bounds);
     }
 
-    /// Returns the number of vertices at which splitting stops.
+    /// Returns the number of vertices of the mesh at which the resolver stops splitting edges.
     pub fn max_vertices(&self) -> usize {
         self.max_vertices
     }
 
-    /// Returns [`Self::max_vertices`] if the last call of [`Self::resolve`] left an edge too long because of this
-    /// limit; reported once.
+    /// Returns the limit [`Self::max_vertices`] if the last call of [`Self::resolve`] left an edge too long because of
+    /// it; `None` otherwise, or if asked again.
     pub fn take_overflow(&mut self) -> Option<usize> {
         std::mem::take(&mut self.overflowed).then_some(self.max_vertices)
     }
 
-    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it, and none may be
-    /// until the next call of [`Self::resolve`].
+    /// Returns whether a vertex may be added to the mesh. If not, [`Self::take_overflow`] will report it, and no vertex
+    /// may be added until the next call of [`Self::resolve`].
     pub(super) fn may_add_vertex(&mut self, mesh: &Mesh) -> bool {
         self.overflowed |= mesh.vertex_count() >= self.max_vertices;
         !self.overflowed
     }
 
-    /// Restores the edge bounds and resolves contacts around the `active` vertices and those pending since the last
-    /// call; returns the changes made.
+    /// Restores the edge bounds and resolves contacts around the vertices `active`, which have moved, and those left
+    /// pending by the last call; returns the changes made.
     ///
-    /// Other vertices are processed only if an edit or a contact reaches them. First, components crushed by the last
-    /// move are removed, and necks held in it are cut. What is left after eight rounds or at the work limit stays
-    /// pending.
+    /// Other vertices are processed only if an edit or a contact reaches them. First, small components that the last
+    /// move crushed are removed, and necks whose vertices it could not move are cut. What is left after eight rounds or
+    /// at the work limit stays pending.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }
@@ -228,8 +235,9 @@ impl Resolver {
         self.changes
     }
 
-    /// Moves all vertices by `displacements`, scaled down to prevent self-intersections, as
-    /// [`Embedding::move_all`] does.
+    /// Moves all vertices by `displacements`, given by slot and scaled down to prevent self-intersections, as
+    /// [`Embedding::move_all`] does; returns the vertices held back, with the share of its displacement by which each
+    /// moved.
     pub fn move_all(
         &mut self,
         mesh: &mut Mesh,
@@ -240,8 +248,9 @@ impl Resolver {
         self.move_some(mesh, sampling, &all, displacements)
     }
 
-    /// Moves the vertices `moving` by `displacements`, as [`Embedding::move_some`] does, and records those
-    /// that could not move.
+    /// Moves the vertices `moving` by `displacements`, given by slot, as [`Embedding::move_some`] does, and records
+    /// those that could not move, for the next call of [`Self::resolve`]; returns the vertices held back, with the
+    /// share of its displacement by which each moved.
     pub fn move_some(
         &mut self,
         mesh: &mut Mesh,
@@ -262,7 +271,8 @@ impl Resolver {
         self.embedding.is_embedded(mesh)
     }
 
-    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is the one before refinement.
+    /// Refines the mesh as [`Embedding::refine`] does, and returns whether it was refined; `sampling` is that of the
+    /// mesh before the refinement.
     ///
     /// # Errors
     /// As [`Mesh::refine`].
@@ -277,12 +287,13 @@ impl Resolver {
         &self.edited
     }
 
-    /// Returns whether edges are pending for the next call.
+    /// Returns whether the last call of [`Self::resolve`] has left vertices whose edge lengths the next call has to
+    /// check.
     pub fn has_pending_edges(&self) -> bool {
         !self.queue.is_empty()
     }
 
-    /// Returns the vertices pending for the next call, to be saved with a run.
+    /// Returns the vertices that the last call of [`Self::resolve`] left to the next one, to be saved with a run.
     pub fn pending(&self) -> Pending {
         Pending { queue: self.queue.iter().copied().collect(), dirty: self.dirty.clone() }
     }
@@ -297,7 +308,8 @@ impl Resolver {
         self.dirty = pending.dirty;
     }
 
-    /// Marks `v` as dirty: appends it to the queue of edges to check, and marks it for the next contact query.
+    /// Marks `v` as dirty: appends it to the queue of vertices whose edges are to be checked, and marks it for the next
+    /// contact query.
     pub(super) fn touch(&mut self, v: VertexId) {
         if mark(&mut self.queued, v) {
             self.queue.push_back(v);
@@ -329,7 +341,7 @@ impl Resolver {
     }
 }
 
-/// Sets the flag of a vertex; returns whether it was clear.
+/// Sets the flag of the vertex `v` in an array by slot; returns whether it was clear.
 fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
     if v.index() >= flags.len() {
         flags.resize(v.index() + 1, false);
@@ -344,7 +356,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Regression: on a needle pulled out of a sphere, edits undo each other or are rejected, and contacts are
-    /// everywhere; a single call never returned.
+    /// everywhere; a single call of `resolve` never returned.
     #[test]
     fn a_needle_is_resolved_in_calls_of_bounded_work() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 5.0, 1.5).unwrap();

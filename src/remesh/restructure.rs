@@ -10,12 +10,12 @@ use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, OppositeVertices, VertexId};
 
-/// The shortest and the longest edge allowed (ε_min and ε_max of the paper), in units of the mesh.
+/// The shortest and the longest edge allowed (ε_min and ε_max of Kobbelt, Bareuther & Seidel), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeBounds {
-    /// Shorter edges are collapsed.
+    /// The lower bound: shorter edges are collapsed.
     pub min: f32,
-    /// Longer edges are split. More than twice `min`, so that halves stay within bounds.
+    /// The upper bound: longer edges are split. More than twice `min`, so that halves stay within bounds.
     pub max: f32,
 }
 
@@ -26,12 +26,14 @@ impl EdgeBounds {
     }
 }
 
-/// The largest number of vertices of a result: a limit for use in a browser.
+/// The largest number of vertices of a remeshed mesh: a limit for use in a browser.
 pub(super) const MAX_VERTICES: usize = 8_000_000;
-/// The memory that a vertex takes during remeshing, in bytes.
+/// The memory that a vertex takes during remeshing, in bytes, by which the error about a result that is too large
+/// estimates its size.
 const BYTES_PER_VERTEX: f64 = 250.0;
 
-/// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length): 2 / √3.
+/// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length), to estimate the size of
+/// a result: 2 / √3.
 const VERTICES_PER_AREA: f64 = 1.1547;
 
 impl EdgeBounds {
@@ -61,13 +63,13 @@ impl EdgeBounds {
     }
 }
 
-/// Returns the memory needed to remesh to a number of vertices, in bytes.
+/// Returns the memory needed to remesh to a number of vertices, in bytes, for errors about results that are too large.
 pub(super) fn bytes(vertices: f64) -> u64 {
     // Saturates beyond the range.
     (vertices * BYTES_PER_VERTEX) as u64
 }
 
-/// Decides which edits restructuring makes, and how they are checked.
+/// Decides which edits restructuring makes, and how they are tested for self-intersections.
 pub trait EditPolicy {
     /// Makes an edit, or leaves the mesh unchanged on an error.
     ///
@@ -79,20 +81,23 @@ pub trait EditPolicy {
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError>;
 
-    /// Returns whether the second vertex may be collapsed into the first, in addition to the tests of the mesh itself.
+    /// Returns whether the vertex `_gone` may be collapsed into `_kept`, in addition to the tests that restructuring
+    /// makes itself; by default always.
     fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
         true
     }
 
-    /// Returns whether the edge between `ends` may be flipped to `across`, in addition to the tests of the mesh itself.
+    /// Returns whether the edge between `ends` may be flipped to connect `across`, in addition to the tests that
+    /// restructuring makes itself; by default always.
     fn may_flip(&mut self, _mesh: &Mesh, _ends: [VertexId; 2], _across: [VertexId; 2]) -> bool {
         true
     }
 
-    /// Called after the last edge passed to [`Self::may_collapse`] was collapsed into `kept`.
+    /// Called after the last edge passed to [`Self::may_collapse`] was collapsed into `kept`, to update the data of a
+    /// policy.
     fn collapsed(&mut self, _kept: VertexId) {}
 
-    /// Called after an edge at `u` was split by the new vertex `fresh`.
+    /// Called after an edge at `u` was split by the new vertex `fresh`, to update the data of a policy.
     fn was_split(&mut self, _fresh: VertexId, _u: VertexId) {}
 }
 
@@ -125,19 +130,19 @@ impl EditPolicy for Embedding {
 /// many edits; with a smaller one, edges on ridges stay out of bounds.
 const MIN_COSINE: f32 = 0.2;
 
-/// The lowest valence after a collapse or flip: a vertex of valence three lies inside a triangle.
+/// The lowest valence that a collapse or flip may leave: a vertex of valence three lies inside a triangle.
 pub(super) const MIN_VALENCE: usize = 4;
 
-/// The highest valence after a collapse: among many short edges it would grow without bound, and rings are searched
-/// linearly.
+/// The highest valence that a collapse may leave: among many short edges it would grow without bound, and rings are
+/// searched linearly.
 const MAX_VALENCE: usize = 16;
 
-/// The largest number of passes of splits or flips in one call. Each pass halves the longest edges, so this many reach
-/// any bound; flips never needed more than six.
+/// The largest number of passes of splits or flips in one call. Each pass of splits halves the longest edges, so this
+/// many reach any bound; flips never needed more than six.
 const PASSES: usize = 24;
 
 /// Performs one round of restructuring: collapses short edges, splits long ones, and flips edges to bring valences near
-/// six. Rejected edits are skipped.
+/// six. Rejected edits are skipped. Returns the numbers of edits.
 pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = collapse_short(mesh, bounds, edits);
     changes += split_long(mesh, bounds, usize::MAX, edits);
@@ -146,7 +151,7 @@ pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPol
 }
 
 /// Collapses edges shorter than the lower bound into the end of higher valence, or into the other if that is rejected
-/// (figure 4).
+/// (Kobbelt, Bareuther & Seidel, figure 4); returns the number of collapses.
 pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let shortest = bounds.min * bounds.min;
@@ -167,7 +172,8 @@ pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edit
     changes
 }
 
-/// Returns the first edge at `u` that is too short and may be collapsed: the vertex to keep and the one to remove.
+/// Returns the first edge at `u` that is shorter than the square root of `shortest` and may be collapsed according to
+/// `may`: the vertex to keep and the one to remove; `None` if there is no such edge.
 fn short_edge(
     mesh: &Mesh,
     u: VertexId,
@@ -212,8 +218,8 @@ fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) 
     })
 }
 
-/// Returns whether two normals, of any positive length, differ by less than 78°, the angle by which a triangle may
-/// turn.
+/// Returns whether two triangle normals, of any positive length, differ by less than 78°, the largest angle by which an
+/// edit may turn a triangle.
 pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
     // Squares avoid square roots; the comparison is false for NaN.
@@ -221,8 +227,8 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
         && cosine * cosine > MIN_COSINE * MIN_COSINE * before.length_squared() * after.length_squared()
 }
 
-/// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (figure 5) or the
-/// mesh has `most` vertices; rejected splits are skipped.
+/// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (Kobbelt, Bareuther
+/// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped. Returns the number of splits.
 pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let longest = bounds.max * bounds.max;
@@ -250,8 +256,9 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
-/// Flips edges where that is allowed and lowers the sum of (valence − 6)² over the four corners around them (figure 6).
-/// Allowed are flips that `may_flip` and `edits` permit. Ends when a pass flips none, or after `PASSES` passes.
+/// Flips edges where that is allowed and lowers the sum of (valence − 6)² over the four corners around them (Kobbelt,
+/// Bareuther & Seidel, figure 6). Allowed are flips that `may_flip` and `edits` permit. Ends when a pass flips none, or
+/// after `PASSES` passes. Returns the number of flips.
 pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     // Vertices whose edges have to be tested again since a flip changed valences near them.
@@ -279,8 +286,9 @@ pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Ed
     changes
 }
 
-/// Flips the edge if that lowers the sum of (valence − 6)² over its four corners and is allowed, and marks as stale the
-/// vertices of all edges with changed corners; returns whether it was flipped.
+/// Flips the edge `uv` if that lowers the sum of (valence − 6)² over its four corners and is allowed. Then marks as
+/// stale, to be tested again, the vertices of all edges that have one of these corners. Returns whether the edge was
+/// flipped.
 fn flip_if_wanted(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -321,8 +329,8 @@ fn wants_flip(
         && edits.may_flip(mesh, [u, v], [left, right])
 }
 
-/// Returns whether a flip is allowed: the new edge is within bounds, or nearer to them than the old one, and the new
-/// triangles face as the old ones, within 78°.
+/// Returns whether the edge between `ends` may be flipped to connect `across`: the new edge is within bounds, or nearer
+/// to them than the old one, and the new triangles face as the old ones, within 78°.
 pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], across: [VertexId; 2]) -> bool {
     let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
     let (old, new) = (p.distance_squared(q), a.distance_squared(b));

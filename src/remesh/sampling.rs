@@ -1,4 +1,5 @@
-//! The sampling distance δ and the three bounds derived from it (section 3.2), uniform or with a size per vertex.
+//! The sampling distance δ of a mesh and the three bounds derived from it (Lachaud & Montanvert, section 3.2), uniform
+//! or with a size per vertex.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
@@ -7,17 +8,17 @@ use crate::mesh::{Mesh, ScalarKey, VertexId};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     delta: f32,
-    /// The scalar attribute that stores size − 1, where size is the local factor on δ; 0 for new vertices without a
-    /// source.
+    /// The scalar attribute that stores the size of each vertex minus 1, where size is the local factor on δ; without
+    /// it, all sizes are 1.
     sizes: Option<ScalarKey>,
 }
 
-/// Upper bound of the edge length in δ, equation (2): above 2, so that the halves of a split edge respect the lower
-/// bound.
+/// Upper bound of the edge length in units of δ, equation (2): above 2, so that the halves of a split edge respect the
+/// lower bound δ.
 const LONGEST: f32 = 2.5;
 
-/// Contact distance in δ, 2.5/√3, equation (3): the longest distance between a vertex passing through a triangle and
-/// its nearest corner.
+/// Contact distance in units of δ, 2.5/√3, equation (3): the longest distance between a vertex passing through a
+/// triangle and its nearest corner.
 const CONTACT: f32 = 1.443_375_7;
 
 impl Sampling {
@@ -27,13 +28,14 @@ impl Sampling {
     }
 
     /// Returns this sampling with a local δ at each vertex: δ times 1 + the scalar attribute `sizes`, which must be
-    /// above −1. Small components are still measured by δ, and no contacts beyond its contact distance are found, also
-    /// where the local δ is larger.
+    /// above −1. Also where the local δ is larger, small components are measured by δ itself, and contacts are found
+    /// only up to the contact distance of δ itself.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
     }
 
-    /// Returns the uniform sampling that applies to a pair of vertices: δ scaled by the mean of their sizes.
+    /// Returns the uniform sampling that applies between two vertices: δ scaled by the mean of their sizes (local
+    /// factors).
     #[inline]
     pub(super) fn between(self, mesh: &Mesh, u: VertexId, v: VertexId) -> Self {
         let Some(sizes) = self.sizes else { return self };
@@ -41,19 +43,20 @@ impl Sampling {
         Self::new(self.delta * (1.0 + 0.5 * (of[u.index()] + of[v.index()])))
     }
 
-    /// Returns δ, the lower bound of the edge length (1).
+    /// Returns δ, the lower bound of the edge length, equation (1) of Lachaud & Montanvert.
     #[inline]
     pub fn shortest(self) -> f32 {
         self.delta
     }
 
-    /// Returns 2.5 δ, the upper bound of the edge length (2).
+    /// Returns 2.5 δ, the upper bound of the edge length, equation (2) of Lachaud & Montanvert.
     #[inline]
     pub fn longest(self) -> f32 {
         LONGEST * self.delta
     }
 
-    /// Returns 2.5/√3 δ, the distance below which two non-adjacent vertices are in contact (3).
+    /// Returns 2.5/√3 δ, the distance below which two non-adjacent vertices are in contact, equation (3) of Lachaud &
+    /// Montanvert.
     #[inline]
     pub fn contact(self) -> f32 {
         CONTACT * self.delta

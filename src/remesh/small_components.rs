@@ -5,31 +5,33 @@ use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 
-/// The largest number of vertices of a small component. Larger ones are not removed; a small volume alone would not
-/// tell, since that of a cavity is negative.
+/// The largest number of vertices of a small component. Larger ones are never removed: a volume below the thresholds
+/// alone does not show that a component is small, since the volume of a cavity is negative.
 const MAX_VERTICES: usize = 32;
 
-/// The volume of an icosahedron with edges of length δ, in δ³: the smallest sphere that can be sampled.
+/// The volume of an icosahedron with edges of length δ, in δ³: the smallest sphere that can be sampled, to which the
+/// volume of small components is compared.
 const SMALLEST_SPHERE: f32 = 2.18;
 
 /// The small components of a mesh, of at most [`MAX_VERTICES`] vertices, which are removed when they lose their volume.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallComponents {
-    /// A vertex of each small component, and whether it is solid, with a positive volume.
+    /// One vertex of each small component, and whether the component is solid, that is of positive volume; the others
+    /// are cavities.
     components: Vec<(VertexId, bool)>,
-    /// The topology version of the mesh for which the list is valid.
+    /// The topology version of the mesh for which `components` is up to date.
     topology_version: Option<u32>,
 }
 
 impl SmallComponents {
-    /// Finds the small components, unless the list is up to date.
+    /// Finds the small components of the mesh, unless the list is up to date.
     pub(super) fn find(&mut self, mesh: &Mesh) {
         if self.topology_version != Some(mesh.topology_version()) {
             self.find_among(mesh, mesh.vertices());
         }
     }
 
-    /// Updates the list after edits that created or displaced the vertices `edited`.
+    /// Updates the list of small components after edits that created or displaced the vertices `edited`.
     fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
         let known = std::mem::take(&mut self.components);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
@@ -55,9 +57,8 @@ impl SmallComponents {
 }
 
 impl Resolver {
-    /// Removes the component of `v` if it is negligibly small; returns whether it no longer exists.
-    ///
-    /// It may have been removed before: the two sides of a cut handle are one component.
+    /// Removes the component of `v` if it is negligibly small; returns whether it no longer exists, since it may have
+    /// been removed before the call (the two sides of a cut handle are one component).
     ///
     /// A negligible component has at most 32 vertices and a signed volume less than δ³, and is not a cavity of at least
     /// δ³ in which `guide` finds background. Other components of negative volume would grow in empty space.
@@ -116,9 +117,9 @@ impl Resolver {
         }
     }
 
-    /// Updates the list of small components after the edits of a call, and removes cavities smaller than the smallest
-    /// sphere, except for those of at least δ³ in which `guide` finds background: an edit may have inverted a solid,
-    /// which would grow in empty space.
+    /// Updates the list of small components after the edits of a call of the resolver, and removes cavities smaller
+    /// than the smallest sphere, except for those of at least δ³ in which `guide` finds background: an edit may have
+    /// inverted a solid, which would grow in empty space.
     pub(super) fn update_small_components(
         &mut self,
         mesh: &mut Mesh,
@@ -146,7 +147,7 @@ impl Resolver {
     }
 
     /// Removes the component of `v` and, if it is small, the components inside it, which would otherwise be on the
-    /// wrong side of the surface around them.
+    /// wrong side of the surface that remains around them.
     pub(super) fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) {
         let members = mesh.component_of(v, MAX_VERTICES + 1);
         let within =
@@ -183,8 +184,9 @@ impl Resolver {
     }
 }
 
-/// Returns whether a component with `stuck` vertices that could not move is crushed: smaller than the smallest sphere,
-/// all stuck, or solid, more than half stuck and empty according to `guide`.
+/// Returns whether a small component is crushed and has to be removed; `stuck` of its vertices `members` could not
+/// move. It is crushed if it is smaller than the smallest sphere, if all its vertices are stuck, or if it is solid,
+/// more than half of them are stuck and `guide` finds it empty.
 fn is_crushed(
     mesh: &Mesh,
     members: &[VertexId],
@@ -198,20 +200,21 @@ fn is_crushed(
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }
 
-/// Returns the volume of a component to be compared with the thresholds of removal: that of a cavity counts as positive
-/// if `guide` finds background in it, otherwise as negative.
+/// Returns the volume of a component that is compared with the thresholds of removal: the absolute value of that of a
+/// cavity if `guide` finds background in it, otherwise the signed volume.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
 
-/// Returns whether a point is inside a component, by its solid angle.
+/// Returns whether the point `p` is inside the component with the vertices `members`, by the solid angle of its
+/// triangles.
 fn is_within(mesh: &Mesh, members: &[VertexId], p: Vec3) -> bool {
     // The total is 4π for points inside, 0 for points outside.
     let angle: f64 = triangles(mesh, members).map(|corners| solid_angle(corners, p)).sum();
     angle.abs() > std::f64::consts::TAU
 }
 
-/// Returns the corner positions of the triangles of a component, each triangle once.
+/// Returns the corner positions of the triangles of the component with the vertices `members`, each triangle once.
 fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3]> {
     members.iter().flat_map(move |&u| {
         let counted_here = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
@@ -219,7 +222,7 @@ fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3
     })
 }
 
-/// Returns the signed volume of a component; positive if its triangles face outwards.
+/// Returns the signed volume of the component with the vertices `members`; positive if its triangles face outwards.
 fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
     let origin = mesh.position(members[0]);
     let below = |corners: [Vec3; 3]| {
@@ -251,8 +254,8 @@ mod tests {
         resolver.resolve(mesh, sampling, &all)
     }
 
-    /// The component intersects itself neither before nor after the inversion. Regression: an inverted component grew
-    /// until it filled the image (merge and split, seed 297).
+    /// The component, a lens, intersects itself neither before nor after its inversion. Regression: an inverted
+    /// component grew until it filled the image (test `merge_and_split`, seed 297).
     #[test]
     fn an_inverted_component_is_removed() {
         let rim = |k: u32| {
@@ -271,7 +274,8 @@ mod tests {
         assert_eq!(passing.vertex_count(), 0);
     }
 
-    /// All edges are within bounds, and any move inwards is rejected (merge and split, seed 404).
+    /// All edges of the component are within bounds, and any move inwards is rejected (test `merge_and_split`, seed
+    /// 404).
     #[test]
     fn a_component_that_cannot_shrink_is_removed() {
         let component = mesh(
@@ -309,8 +313,8 @@ mod tests {
         assert_shrinks_away(component, Sampling::new(1.4), 0.3);
     }
 
-    /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed
-    /// 10529).
+    /// More than half of the component's vertices are held, though it is larger than the smallest sphere (test
+    /// `merge_and_split`, seed 10529).
     #[test]
     fn a_crumpled_component_is_removed() {
         let component = mesh(
@@ -374,7 +378,7 @@ mod tests {
         assert!(both.vertices().all(|v| both.position(v).x > 1.0));
     }
 
-    /// The inner component is listed after the one with which it is removed.
+    /// A component inside a removed cavity is removed with it, although it is listed after it.
     #[test]
     fn removed_components_are_not_visited_again() {
         let (mut both, hollow) = nested();
@@ -397,7 +401,7 @@ mod tests {
         (both, members)
     }
 
-    /// Asserts that a component shrinks and is removed, in steps of `share` times δ.
+    /// Asserts that a component that is moved inwards, in steps of `share` times δ, is removed in the end.
     fn assert_shrinks_away(mut component: Mesh, sampling: Sampling, share: f32) {
         for _ in 0..20 {
             let normals = component.to_triangles().vertex_normals();

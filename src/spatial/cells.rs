@@ -1,10 +1,11 @@
-//! Grid cells that cover a neighbourhood of a set of points.
+//! A set of grid cells around given points, by which tests are limited to the region near these points.
 
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 
 /// A set of cells of a regular grid: those that contain an added point, and all cells adjacent to them. Quickly rejects
-/// positions that are not near the points.
+/// positions that are not near the points, so that the tests of edits for self-intersections and the search for missing
+/// parts are limited to a region.
 #[derive(Clone, Debug)]
 pub struct CellSet {
     side: f32,
@@ -12,12 +13,12 @@ pub struct CellSet {
 }
 
 impl CellSet {
-    /// Creates an empty set of cells of edge length `side`.
+    /// Creates an empty set, for a grid of cubic cells with edges of length `side`, in units of the points.
     pub fn new(side: f32) -> Self {
         Self { side, cells: BTreeSet::new() }
     }
 
-    /// Adds the cell that contains a point and its 26 adjacent cells.
+    /// Adds the cell that contains `p` and its 26 adjacent cells to the set.
     pub fn insert_around(&mut self, p: Vec3) {
         let at: [i32; 3] = self.cell(p);
         for k in 0..27 {
@@ -26,7 +27,7 @@ impl CellSet {
         }
     }
 
-    /// Returns whether a point is in a cell of the set; always true within distance `side` of an added point.
+    /// Returns whether `p` is in a cell of the set; always true if an added point is within the edge length of a cell.
     pub fn contains(&self, p: Vec3) -> bool {
         self.cells.contains(&self.cell(p))
     }

@@ -15,13 +15,16 @@ use crate::mesh::{MeshError, TriangleMesh};
 pub struct SurfaceDistance {
     /// The unsigned distance of each vertex of the first mesh from the second surface.
     pub per_vertex: Vec<f64>,
-    /// The mean distance: the average of the two area-weighted one-way means.
+    /// The mean of the distances of the vertices of each mesh from the other surface, weighted by area, then averaged
+    /// over the two meshes.
     pub mean: f64,
-    /// The root mean square distance: the square root of the average of the two area-weighted one-way mean squares.
+    /// The root mean square of the distances: their squares are averaged over the vertices of each mesh, weighted by
+    /// area, then over the two meshes.
     pub rms: f64,
-    /// The larger one of the two area-weighted one-way 95th percentiles.
+    /// The 95th percentile of the distances: the larger of those over the vertices of each mesh, weighted by area.
     pub p95: f64,
-    /// The Hausdorff distance, evaluated at the vertices: the largest one-way distance of a vertex of either mesh.
+    /// The Hausdorff distance, evaluated at the vertices: the largest distance of a vertex of either mesh from the
+    /// other surface.
     pub hausdorff: f64,
 }
 
@@ -61,7 +64,7 @@ fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
     mesh.positions.iter().map(|&p| distance(p)).collect()
 }
 
-/// Statistics of one-way distances, weighted by area.
+/// Statistics of the distances of a mesh's vertices from another surface, weighted by area.
 struct Summary {
     mean: f64,
     mean_square: f64,
@@ -88,8 +91,8 @@ impl Summary {
     }
 }
 
-/// Returns the weight of each vertex: a third of the area of the triangles around it, `None` if it is unused. Uniform
-/// if the total area is 0.
+/// Returns the weight of each vertex in area-weighted statistics: a third of the area of its triangles, `None` if it
+/// has no triangle. All weights are equal if the total area is 0.
 fn weights(mesh: &TriangleMesh) -> Vec<Option<f64>> {
     let mut weights = vec![None; mesh.positions.len()];
     for (triangle, corners) in mesh.triangles.iter().zip(mesh.corners()) {
@@ -163,7 +166,8 @@ mod tests {
         assert_eq!(summaries(&found), [2.0; 4]);
     }
 
-    /// One corner is raised. Its weight is a sixth of the area in one direction and slightly more in the other.
+    /// A square is compared with a copy of which one corner is raised. The weight of this corner is a sixth of the area
+    /// in the flat square, and slightly more in the bent one.
     #[test]
     fn means_are_by_area_and_both_ways() {
         let mut bent = square(0.0);

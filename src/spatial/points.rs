@@ -1,9 +1,9 @@
-//! A hashed grid of points with incremental insertion.
+//! A hashed grid of points for neighbour queries; points can be inserted between queries.
 
 use crate::math::Vec3;
 use crate::math::order::combined_rank;
 
-/// The end of a bucket's list of points.
+/// Marks the end of a linked list of points, of which each hash bucket has one.
 const NONE: u32 = u32::MAX;
 
 /// A hashed grid of points, for fixed-radius and nearest-neighbour queries. Cells are hashed into buckets, so that
@@ -12,27 +12,29 @@ const NONE: u32 = u32::MAX;
 pub struct PointGrid {
     cell: f32,
     points: Vec<Vec3>,
-    /// By bucket, the head of its list: the point inserted last.
+    /// For each hash bucket, the index of the point inserted last, where its linked list begins; [`NONE`] if it is
+    /// empty.
     heads: Vec<u32>,
-    /// By point, the next point in the list of its bucket.
+    /// For each point, the index of the next point in the list of its bucket, or [`NONE`].
     next: Vec<u32>,
 }
 
 impl Default for PointGrid {
-    /// Creates an empty grid with cells of side 1, for a few points.
+    /// Creates an empty grid with cubic cells of side 1, in units of the points, and with buckets for a few points.
     fn default() -> Self {
         Self::new(1.0, 0)
     }
 }
 
 impl PointGrid {
-    /// Creates an empty grid with cells of side `cell`, for about `expected` points.
+    /// Creates an empty grid with cubic cells of side `cell`, in units of the points, and with buckets for about
+    /// `expected` points; queries get slower if it contains many more.
     pub fn new(cell: f32, expected: usize) -> Self {
         let buckets = (2 * expected).next_power_of_two().max(16);
         Self { cell, points: Vec::new(), heads: vec![NONE; buckets], next: Vec::new() }
     }
 
-    /// Creates a grid with cells of side `cell` that contains `points`, identified by their indices.
+    /// Creates a grid with cubic cells of side `cell` that contains `points`; queries return the indices of `points`.
     pub fn of(points: &[Vec3], cell: f32) -> Self {
         let mut grid = Self::new(cell, points.len());
         points.iter().for_each(|&p| grid.insert(p));

@@ -3,12 +3,13 @@
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
-/// Returns the line segments in which the plane through `origin` intersects the surface, in the order of the triangles.
+/// Returns the line segments in which the plane through `origin` perpendicular to `normal` intersects the surface
+/// `mesh`, in the order of its triangles.
 ///
 /// Vertices exactly on the plane count as above it. Triangles with a common edge yield bitwise equal end points on it,
 /// so that the segments of a closed mesh form closed loops. Seen from the side to which `normal` points, the inside is
 /// on the left of each segment. Segments of length 0, where the surface only touches the plane, are omitted. Empty if
-/// `normal` is zero, or if it or `origin` is not finite. Indices must be valid.
+/// `normal` is zero, or if it or `origin` is not finite. The vertex indices of `mesh` must be valid.
 pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Vec3; 2]> {
     let (origin, normal) = (origin.as_dvec3(), normal.as_dvec3());
     if !origin.is_finite() || !normal.is_finite() || normal == DVec3::ZERO {
@@ -26,8 +27,8 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
     segments.filter(|[p, q]| p != q).collect()
 }
 
-/// Returns the index of the corner that is alone on its side of the plane, given whether each is above it; `None` if
-/// all are on the same side.
+/// Returns the index (0 to 2) of the triangle corner that is alone on its side of a plane, given whether each corner is
+/// above the plane; `None` if all three are on the same side.
 fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     match (a == b, b == c) {
         (true, true) => None,
@@ -37,7 +38,8 @@ fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     }
 }
 
-/// Returns the intersection of an edge with the plane; it does not depend on the direction of the edge.
+/// Returns the point at which a plane intersects the edge between two vertices on different sides of it, from the
+/// signed `heights` of all vertices above the plane; bitwise equal for both directions of the edge.
 fn edge_intersection(mesh: &TriangleMesh, heights: &[f64], from: u32, to: u32) -> Vec3 {
     let (low, high) = (from.min(to) as usize, from.max(to) as usize);
     let fraction = heights[low] / (heights[low] - heights[high]);
@@ -60,7 +62,7 @@ mod tests {
         }
     }
 
-    /// Returns whether every segment starts where another ends.
+    /// Returns whether segments form closed loops: every segment starts where another ends.
     fn closes(segments: &[[Vec3; 2]]) -> bool {
         let sorted = |end: usize| {
             let mut points: Vec<_> = segments.iter().map(|s| s[end].to_array().map(f32::to_bits)).collect();
@@ -70,7 +72,8 @@ mod tests {
         sorted(0) == sorted(1)
     }
 
-    /// Returns twice the area to the left of the segments, seen from the side to which `normal` points.
+    /// Returns twice the area that closed loops of segments enclose, times the length of `normal`; positive if the area
+    /// is on the left of the segments, seen from the side to which `normal` points.
     fn doubled_area(segments: &[[Vec3; 2]], normal: Vec3) -> f32 {
         segments.iter().map(|[p, q]| p.cross(*q).dot(normal)).sum()
     }

@@ -6,14 +6,16 @@ use crate::math::{DVec3, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh};
 use std::cell::OnceCell;
 
-/// A static surface for projecting many points, each near the previous one.
+/// A static closed surface onto which many points are projected, each by a walk from the triangle of a nearby
+/// projection; the multiresolution model carries points along its base with it.
 ///
 /// A walk proceeds to adjacent triangles as long as they are closer, so it ends at a local minimum of the distance. If
 /// this may not be the global minimum, use [`Self::closest`], which queries a tree that is built on first use.
 #[derive(Clone, Debug)]
 pub struct SurfaceWalker {
     mesh: TriangleMesh,
-    /// By triangle, the triangles across the edges opposite its corners.
+    /// For each triangle, the indices of its three adjacent triangles, each across the edge opposite the corner of the
+    /// same number.
     across: Vec<[u32; 3]>,
     tree: OnceCell<TriangleTree>,
 }
@@ -30,12 +32,12 @@ impl SurfaceWalker {
         Ok(Self { mesh, across, tree: OnceCell::new() })
     }
 
-    /// Returns the mesh of the surface.
+    /// Returns the mesh that is walked over, as passed to [`Self::new`].
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// Returns the corner positions of a triangle.
+    /// Returns the corner positions of the triangle with the index `triangle`.
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize])
@@ -71,7 +73,8 @@ impl SurfaceWalker {
             .map(|found| self.point(&found))
     }
 
-    /// Returns a local minimum of the distance to `p`, found by walking over the surface from the triangle `start`.
+    /// Returns the point of the surface at which a walk from the triangle with the index `start` towards `p` ends: a
+    /// local minimum of the distance to `p`, usually the closest point.
     pub fn walk(&self, start: u32, p: Vec3) -> SurfacePoint {
         let mut here = self.nearest_on(start, p);
         while let Some(next) = self.step(&here, p) {
@@ -80,8 +83,8 @@ impl SurfaceWalker {
         self.point(&here)
     }
 
-    /// Returns the closest point to `p` on the triangles that share the edge or corner on which `here` lies; `None` if
-    /// it is not strictly closer, or if `here` lies inside a triangle.
+    /// Makes one step of a walk: returns the closest point to `p` on the triangles that share the edge or corner on
+    /// which `here` lies; `None` if it is not strictly closer than `here`, or if `here` lies inside a triangle.
     fn step(&self, here: &TrianglePoint, p: Vec3) -> Option<TrianglePoint> {
         let weights = here.barycentric.to_array();
         let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
@@ -97,7 +100,8 @@ impl SurfaceWalker {
         (best.square < here.square).then_some(best)
     }
 
-    /// Returns the closest point to `p` on the triangles around a corner of the triangle `start`.
+    /// Returns the closest point to `p` on all triangles around one corner (0 to 2) of the triangle with the index
+    /// `start`.
     fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> TrianglePoint {
         let hub = self.mesh.triangles[start as usize][corner];
         let mut best = self.nearest_on(start, p);
@@ -145,7 +149,8 @@ struct TrianglePoint {
     square: f64,
 }
 
-/// Returns for each triangle the triangles across the edges opposite its corners.
+/// Returns for each triangle the indices of its three adjacent triangles, each across the edge opposite the corner of
+/// the same number.
 ///
 /// # Errors
 /// [`MeshError::NotClosed`] if there is no triangle across an edge.
@@ -166,8 +171,8 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     all.collect()
 }
 
-/// Returns the half-edges sorted by start vertex: the index of the first one of each vertex, and all as pairs of end
-/// vertex and triangle.
+/// Returns the half-edges sorted by start vertex, in which the triangle across an edge is looked up: the index of the
+/// first half-edge of each vertex, and for each half-edge its end vertex and triangle.
 fn half_edges_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut first = vec![0_u32; mesh.positions.len() + 1];
     mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);

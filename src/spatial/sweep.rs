@@ -25,8 +25,8 @@ const COLUMN_MARGIN: f64 = 1.001;
 /// distance from the origin, columns are narrower than the spacing of single-precision numbers.
 const MAX_COLUMN: f64 = 1_073_741_824.0;
 
-/// The largest number of columns per ball in the bounding rectangle of the balls, including empty ones, for which a
-/// counting sort is used.
+/// The largest number of columns per ball, empty ones included, in the bounding rectangle of the balls, for which balls
+/// are sorted by a counting sort; with more, its array of counts would be too large.
 const MAX_COLUMNS_PER_BALL: usize = 8;
 
 /// The number of bits of the [`Filter`] per column that it contains; with fewer, more balls of smaller classes pass it
@@ -51,7 +51,8 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// Returns the median radius, but at least the smallest positive normal number; 1 if there are no balls.
+/// Returns the median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
+/// normal number, and 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
     let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.radius).collect();
     let half = sizes.len() / 2;
@@ -62,7 +63,8 @@ fn median_radius(balls: &[VertexBall]) -> f32 {
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
-/// Finds the near pairs within a size class, and those of its balls with balls of smaller classes.
+/// Calls `found` with the pairs of balls that are no farther apart than `near` allows: those within the size class
+/// `class`, and those of one ball of `class` and one of `smaller`, the balls of smaller classes.
 fn sweep_class(
     class: &[VertexBall],
     smaller: &[VertexBall],
@@ -87,7 +89,7 @@ fn sweep_class(
     }
 }
 
-/// The width of columns, stored as its inverse.
+/// The width of the columns into which the xy-plane is divided, stored as its inverse.
 #[derive(Clone, Copy)]
 struct Width(f64);
 
@@ -109,8 +111,8 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// Returns the indices that sort `columns`, which contains the column of each ball. A counting sort, several times as
-/// fast, is used if the columns are as densely occupied as those of a mesh.
+/// Returns the indices that sort balls by column; `columns` contains the column of each ball. A counting sort, several
+/// times as fast, is used if the columns are as densely occupied as those of a mesh.
 fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
         let of_axis = || columns.iter().map(|column| i64::from(column[axis]));
@@ -143,10 +145,11 @@ fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     order
 }
 
-/// Balls sorted by column, then by height (z).
+/// Balls sorted by column, a square cell of the xy-plane, then by height (z), so that balls near each other are found
+/// without testing all pairs.
 struct Columns {
     balls: Vec<VertexBall>,
-    /// The occupied columns in order, each with the index of its first ball, and a sentinel at the end.
+    /// The occupied columns in order, each with the index of its first ball in `balls`, and a sentinel at the end.
     columns: Vec<([i32; 2], usize)>,
 }
 

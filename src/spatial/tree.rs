@@ -4,7 +4,7 @@ use crate::math::triangle::{self, Line, LineHit};
 use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// A bounding volume hierarchy of the triangles of a static mesh.
+/// A bounding volume hierarchy of the triangles of a static mesh, for closest-point, ray and overlap queries.
 #[derive(Clone, Debug)]
 pub struct TriangleTree {
     boxes: BoxTree,
@@ -19,7 +19,7 @@ pub struct SurfacePoint {
     pub triangle: u32,
     /// The barycentric coordinates in the triangle: not negative, with a sum of 1.
     pub barycentric: Vec3,
-    /// The position of the point.
+    /// The position of the point, in the coordinates of the mesh.
     pub point: Vec3,
     /// The distance from the query point, or the signed distance from the origin of the ray or line, negative behind
     /// it, in the length unit of the mesh.
@@ -39,12 +39,12 @@ impl TriangleTree {
         Ok(Self { boxes: BoxTree::new(&bounds), corners })
     }
 
-    /// Creates a tree without triangles.
+    /// Creates a tree without triangles, in which queries find nothing.
     pub(super) fn empty() -> Self {
         Self { boxes: BoxTree::default(), corners: Vec::new() }
     }
 
-    /// Returns the closest point of the surface to `p`; `None` without triangles, or if `p` is not finite.
+    /// Returns the closest point of the surface to `p`; `None` if there are no triangles or `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         if !p.is_finite() {
             return None;
@@ -119,7 +119,7 @@ impl TriangleTree {
         nearest.point(|item| self.corners[item as usize])
     }
 
-    /// Calls `visit` with every triangle whose bounding box intersects `bounds`.
+    /// Calls `visit` with the index of every triangle whose bounding box intersects `bounds`.
     pub fn for_each_overlapping(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
         self.boxes.for_each_overlapping(bounds, visit);
     }
@@ -132,26 +132,29 @@ impl SurfacePoint {
     }
 }
 
-/// Returns the origin and unit direction of a ray; `None` if they are not finite or the direction is zero.
+/// Returns the origin and unit direction of a ray in double precision; `None` if one of them is not finite or the
+/// direction is zero.
 fn normalized_ray(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
     let direction = direction.as_dvec3().try_normalize()?;
     origin.is_finite().then(|| (origin.as_dvec3(), direction))
 }
 
-/// The nearest hit found so far by a ray or line query; among equally near ones, that of the lowest index.
+/// The nearest intersection of a ray or line with triangles found so far in a query; among equally near ones, that of
+/// the triangle with the lowest index.
 pub struct NearestHit {
     max_distance: f64,
     found: Option<(u32, LineHit)>,
 }
 
 impl NearestHit {
-    /// Starts a query for hits at most `max_distance` away.
+    /// Starts a query for intersections at most `max_distance` from the origin of the line, in lengths of its
+    /// direction.
     pub fn within(max_distance: f64) -> Self {
         Self { max_distance, found: None }
     }
 
-    /// Takes a hit of triangle `item` into account, if there is one; returns the absolute distance up to which nearer
-    /// hits remain possible.
+    /// Records `hit`, the intersection of the line with the triangle of index `item`, if there is one and it is nearer
+    /// than the nearest so far; returns the distance from the line's origin beyond which the query may skip triangles.
     #[inline]
     pub fn add(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
         let Some(hit) = hit else { return self.max_distance };
@@ -164,8 +167,8 @@ impl NearestHit {
         self.max_distance
     }
 
-    /// Returns the nearest hit as a surface point, `None` if there is none; `corners` returns the corner positions of a
-    /// triangle.
+    /// Returns the nearest intersection as a point on the surface, `None` if none was found; `corners` returns the
+    /// corner positions of a triangle.
     pub fn point(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
         let (item, hit) = self.found?;
         Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))

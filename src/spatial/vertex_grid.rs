@@ -4,12 +4,12 @@
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 
-/// The number of grid levels, whose cell sizes differ by [`FACTOR`]. Balls up to the size given to [`VertexGrid::new`]
-/// are on the first level. Balls too large for the last are stored there, and queries extend their search radius for
-/// them.
+/// The number of levels of the grid, whose cell sizes differ by [`FACTOR`]. Vertices whose longest edge is at most the
+/// length given to [`VertexGrid::new`] are on the first level. Those whose longest edge is too long for the last level
+/// are stored there, and queries extend their search radius for them.
 const LEVELS: usize = 10;
 
-/// The ratio of the cell sizes of consecutive levels.
+/// The ratio of the cell sizes of consecutive levels of the grid.
 const FACTOR: f32 = 4.0;
 
 /// The side of a cell, as a multiple of the largest ball radius on its level: twice the usual query radius, so that
@@ -19,13 +19,14 @@ const CELL: f32 = 1.5;
 /// The largest mean number of vertices per hash bucket when [`VertexGrid::link_cells`] creates the buckets.
 const LOAD: usize = 2;
 
-/// The level of a vertex that is not in the grid.
+/// The level stored for a vertex that is not in the grid.
 const ABSENT: u32 = u32::MAX;
 
-/// The end of a bucket's list of vertices.
+/// Marks the end of a linked list of vertices, of which each hash bucket has one.
 const NONE: u32 = u32::MAX;
 
-/// A hierarchical hashed grid of vertices; the longest edge at a vertex determines its level.
+/// A hierarchical hashed grid of the vertices of a moving mesh, in which collision handling finds vertices near each
+/// other; the longest edge at a vertex determines its level.
 ///
 /// Vertices are inserted, moved and removed one by one, so that the grid can follow a mesh with few changes. Queries
 /// find all vertices as long as none has moved further than `max_displacement` from the position last set. The order of
@@ -35,23 +36,26 @@ const NONE: u32 = u32::MAX;
 /// [`Self::link_cells`] before the next queries.
 #[derive(Clone, Debug, Default)]
 pub struct VertexGrid {
-    /// The distance by which a vertex may have moved since its position was set in the grid.
+    /// The largest distance by which a vertex may have moved since its position was set in the grid; queries are
+    /// extended by it.
     max_displacement: f32,
-    /// By level, the largest radius of balls stored on it; the last level also stores larger balls.
+    /// For each level, the largest ball radius (longest edge at a vertex) that belongs on it; the last level also
+    /// contains larger balls.
     max_radius: [f32; LEVELS],
-    /// By level, the largest ball radius inserted since the cells were linked.
+    /// For each level, an upper bound of the ball radii (longest edges) on it, from which queries derive their search
+    /// radius.
     largest_radius: [f32; LEVELS],
-    /// By level, the inverse of the cell side.
+    /// For each level, the inverse of the side of its cells.
     inverse_cell: [f32; LEVELS],
-    /// By level, the number of vertices linked into cells.
+    /// For each level, the number of vertices linked into its cells, so that queries skip empty levels.
     counts: [u32; LEVELS],
-    /// The number of buckets, a power of two, minus 1.
+    /// The number of hash buckets, a power of two, minus 1: the bits of a hash that select the bucket.
     mask: u32,
-    /// By bucket, the head of its list: the vertex inserted last.
+    /// For each hash bucket, the vertex linked last, where its linked list begins; [`NONE`] if it is empty.
     heads: Vec<u32>,
-    /// Whether vertices are linked into the buckets of their cells.
+    /// Whether vertices are linked into the buckets of their cells; if not, queries visit all vertices.
     linked: bool,
-    /// By vertex slot, the entry of the vertex.
+    /// The grid level, cell and position of each vertex, by slot of the mesh.
     entries: Vec<Entry>,
 }
 
@@ -60,21 +64,21 @@ pub struct VertexGrid {
 pub struct VertexBall {
     /// The position of the vertex, the centre of the ball.
     pub position: Vec3,
-    /// The length of the longest edge at the vertex, the radius of the ball.
+    /// The length of the longest edge at the vertex, the radius of the ball, in units of the mesh.
     pub radius: f32,
-    /// The id of the vertex.
+    /// The id of the vertex in the mesh.
     pub vertex: VertexId,
 }
 
-/// The entry of a vertex in the grid: its level, and the hash `key` of its cell, whose low bits are the index of the
-/// bucket.
+/// A vertex in the grid: its level, the hash `key` of its cell, whose low bits are the index of the bucket, its
+/// position and its longest edge `radius`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
     level: u32,
     key: u32,
     position: Vec3,
     radius: f32,
-    /// The next vertex in the list of the bucket.
+    /// The next vertex in the linked list of the bucket, or [`NONE`].
     next: u32,
 }
 
@@ -82,16 +86,19 @@ struct Entry {
 /// max(`least`, `margin` + `share` × longer edge).
 #[derive(Clone, Copy, Debug)]
 pub struct Proximity {
-    /// The lower bound of the distance, in units of the mesh.
+    /// The lower bound of the distance up to which two vertices are paired, in units of the mesh.
     pub least: f32,
-    /// The term of the distance that does not depend on edges, in units of the mesh.
+    /// The part of the distance up to which two vertices are paired that does not depend on their edges, in units of
+    /// the mesh.
     pub margin: f32,
-    /// The factor of the longer one of the two longest edges; a number without unit.
+    /// The factor with which the longest edge at the two vertices contributes to the distance up to which they are
+    /// paired; a number without unit.
     pub share: f32,
 }
 
 impl Proximity {
-    /// Returns the distance up to which two vertices with the given longest edges are near each other.
+    /// Returns the distance up to which two vertices are paired whose longest edges have the lengths `radius` and
+    /// `other`.
     #[inline]
     pub fn distance_for(self, radius: f32, other: f32) -> f32 {
         let reach = self.margin + self.share * if other > radius { other } else { radius };
@@ -116,7 +123,7 @@ impl VertexGrid {
         grid
     }
 
-    /// Inserts `v`, or updates its position and the length of its longest edge.
+    /// Inserts `v`, or updates its position and the length `radius` of its longest edge.
     pub fn set(&mut self, v: VertexId, position: Vec3, radius: f32) {
         if v.index() >= self.entries.len() {
             self.entries.resize(v.index() + 1, ABSENT_ENTRY);
@@ -147,7 +154,8 @@ impl VertexGrid {
         self.linked = false;
     }
 
-    /// Links all vertices into their cells, if they are not linked.
+    /// Links all vertices into the hash buckets of their cells, unless they are linked already, so that queries visit
+    /// only vertices in nearby cells.
     pub fn link_cells(&mut self) {
         if self.linked {
             return;
@@ -175,7 +183,7 @@ impl VertexGrid {
         self.linked = true;
     }
 
-    /// Increases the longest edge of `v`, which must be in the grid, to `edge` if that is longer.
+    /// Increases the longest edge stored for `v`, which must be in the grid, to `edge` if that is longer.
     pub fn raise_radius(&mut self, v: VertexId, edge: f32) {
         let Entry { position, radius, .. } = self.entries[v.index()];
         if edge > radius {
@@ -210,7 +218,7 @@ impl VertexGrid {
         }
     }
 
-    /// Unlinks `v` from its bucket, given its entry `old`.
+    /// Removes `v` from the linked list of its hash bucket; `old` is its entry.
     fn unlink(&mut self, v: VertexId, old: Entry) {
         if old.level == ABSENT || !self.linked {
             return;
@@ -231,8 +239,8 @@ impl VertexGrid {
         }
     }
 
-    /// Calls `found` with every vertex whose distance from the box, in each axis, is at most `share` times its longest
-    /// edge, and with some vertices further away.
+    /// Calls `found` with every vertex whose distance from the box `bounds`, in each axis, is at most `share` times its
+    /// longest edge, and with some vertices further away.
     ///
     /// With a share of 1/√3, these include a corner of every triangle that intersects the box: no point of a triangle
     /// is further from its nearest corner, relative to the longest edge.
@@ -265,8 +273,9 @@ impl VertexGrid {
         self.entries[v.index()].key
     }
 
-    /// Calls `found` with every vertex that may be within `radius` of the box, in each axis. `radius` is a function of
-    /// the longest edge; if cells are linked, it is evaluated only for the largest ball of each level.
+    /// Calls `found` with every vertex whose distance from the box `bounds`, in each axis, may be at most `radius`, a
+    /// function of its longest edge; if cells are linked, this function is evaluated only for the largest ball of each
+    /// level.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
         if !self.linked {
@@ -380,8 +389,8 @@ mod tests {
     /// The position and longest edge of each vertex, `None` for removed vertices.
     type Known = Vec<Option<(Vec3, f32)>>;
 
-    /// Inserts, moves and removes vertices at random, with cells linked and unlinked; most edges are ordinary, some
-    /// tiny or huge. Returns the expected contents.
+    /// Inserts, moves and removes vertices of `grid` at random, with cells linked and unlinked; most edges are
+    /// ordinary, some tiny or huge. Returns the expected contents of the grid.
     fn shuffled(grid: &mut VertexGrid, next: &mut impl FnMut() -> f32) -> Known {
         let mut known: Known = vec![None; 600];
         for _ in 0..3000 {
@@ -408,7 +417,7 @@ mod tests {
         (0..known.len()).filter(|&v| known[v].is_some_and(|(p, radius)| near(p, radius))).collect()
     }
 
-    /// Asserts that `found` has no duplicates and contains all `expected` vertices.
+    /// Asserts that `found` has no duplicates and contains all `expected` vertices, both given by index.
     fn assert_complete(mut found: Vec<usize>, expected: &[usize]) {
         found.sort_unstable();
         assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "a vertex is found twice");

@@ -1,10 +1,10 @@
-//! Binning: fewer, larger voxels, each the mean of a block.
+//! Binning of a volume: fewer, larger voxels, each the mean of a block of the original ones.
 
 use super::error::{VolumeError, reserve};
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// Largest binning factor along an axis.
+/// Largest number of voxels along an axis that binning ([`Volume::binned`](super::Volume::binned)) merges into one.
 const MAX_FACTOR: usize = 16;
 
 impl Volume {
@@ -12,8 +12,9 @@ impl Volume {
     /// in every frame. The numeric type is kept, so means are rounded for integers. Incomplete blocks at the far ends
     /// are dropped.
     ///
-    /// Images that were interpolated to pixels smaller than measured, as is common in magnetic resonance, hold the same
-    /// information in fewer voxels, and windows of a fixed number of voxels then cover a larger region.
+    /// Meant for images that were interpolated to pixels smaller than measured, as is common in magnetic resonance:
+    /// fewer voxels hold the same information, and the windows of tracking, a fixed number of voxels wide, then cover a
+    /// larger region.
     ///
     /// # Errors
     /// [`VolumeError::InvalidArgument`] for a factor not in 1..=16 or larger than the number of voxels along its axis,
@@ -54,8 +55,8 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// Returns the mean of the finite stored values in the block of `size` voxels from voxel `first` in the frame that
-    /// begins at index `start`; NaN if there are none.
+    /// Returns the mean of the finite stored values in one block of voxels, for binning: `size` voxels along each axis,
+    /// from voxel `first` of the frame whose values begin at index `start`; NaN if no value is finite.
     fn block_mean(&self, start: usize, first: [usize; 3], size: [usize; 3]) -> f64 {
         let [nx, ny, _] = self.dims();
         let (mut sum, mut count) = (0.0, 0.0);

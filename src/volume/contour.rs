@@ -1,8 +1,8 @@
-//! Iso-surfaces by marching cubes: closed, oriented, 2-manifold and free of self-intersections for any grid.
+//! Iso-surfaces of a grid by marching cubes: closed, oriented, 2-manifold and free of self-intersections for any grid.
 //!
-//! Each grid edge with exactly one end inside has one vertex; [`super::cube_cases`] connects the vertices within a
-//! cube. The grid is treated as if padded by one layer outside, with the surface half a voxel beyond the border voxels,
-//! at the ends of their cells.
+//! Each edge between neighbouring voxels of which exactly one is inside (at or above the iso value) has one vertex;
+//! [`super::cube_cases`] connects the vertices within a cube of eight voxels. The grid is treated as if padded by one
+//! layer of outside voxels; at its border the surface is half a voxel beyond the outermost voxel centres.
 
 use super::cube_cases::{Case, EDGES, FAR_EDGES, cases};
 use super::error::VolumeError;
@@ -11,15 +11,15 @@ use crate::math::{DAffine3, Vec3};
 use crate::mesh::TriangleMesh;
 use std::collections::TryReserveError;
 
-/// Smallest distance of a vertex from the ends of its grid edge, in voxels. At 0, triangles around a voxel that equals
-/// the iso value would have no area; much smaller, and vertices of a large volume coincide in `f32`. It moves the
-/// surface by at most this distance.
+/// Smallest distance of an iso-surface vertex from the ends of the grid edge on which it lies, in voxels: vertices that
+/// would be nearer are moved by at most this distance. At 0, triangles around a voxel that equals the iso value would
+/// have no area; much smaller, and vertices of a large volume coincide in `f32`.
 pub(super) const MARGIN: f32 = 1.0 / 256.0;
 
 /// Extracts the iso-surface of one frame at intensity `iso` by marching cubes, in world space.
 ///
-/// Closed at the volume's border, half a voxel beyond the outermost voxel centres; counter-clockwise seen from the side
-/// where intensities are below `iso`.
+/// The mesh is closed, at the volume's border half a voxel beyond the outermost voxel centres; its triangles are
+/// counter-clockwise seen from the side where intensities are below `iso`.
 ///
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
@@ -29,11 +29,11 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
     Ok(mesh)
 }
 
-/// Extracts the iso-surface of a grid at `iso` by marching cubes, in index coordinates; empty if no value reaches
-/// `iso`.
+/// Extracts the iso-surface of a grid at `iso` by marching cubes, in index coordinates (voxel centres at integers). The
+/// mesh is empty if no value reaches `iso`.
 ///
 /// Values of `iso` and above are inside (NaN is outside); triangles are counter-clockwise seen from outside and have
-/// nonzero area. Inside voxels that share only an edge or a corner stay separate.
+/// nonzero area. Inside voxels that share only an edge or a corner are not connected by the surface.
 ///
 /// # Errors
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
@@ -49,8 +49,8 @@ pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError
     Ok(marching.mesh)
 }
 
-/// Reserves memory for `additional` elements, growing by at least a quarter of the length: doubling the arrays of a
-/// large surface would take more memory than the rest of a run.
+/// Reserves memory for `additional` elements of a mesh array, growing it by at least a quarter of its length: doubling
+/// the arrays of a large surface would take more memory than everything else.
 fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
     if vector.capacity() - vector.len() >= additional {
         return Ok(());
@@ -59,7 +59,8 @@ fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError
     vector.try_reserve_exact(if additional > quarter { additional } else { quarter })
 }
 
-/// Maps positions to world space, and reverses the triangles if the map is a reflection.
+/// Maps a mesh from index to world coordinates, and reverses its triangles if the map is a reflection, so that they
+/// still face outwards.
 fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3) {
     for p in &mut mesh.positions {
         *p = affine.transform_point3(p.as_dvec3()).as_vec3();
@@ -71,20 +72,22 @@ fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3) {
     }
 }
 
-/// State of marching cubes over one grid, processed layer by layer. Nodes are voxels of the padded grid: node (x, y, z)
-/// is voxel (x-1, y-1, z-1).
+/// State of marching cubes over one grid, processed layer by layer along z. Nodes are voxels of the padded grid: node
+/// (x, y, z) is voxel (x-1, y-1, z-1).
 struct MarchingCubes<'a> {
     grid: &'a Grid,
     iso: f32,
     cases: &'static [Case],
-    /// Number of nodes along x and along y.
+    /// Number of nodes (voxels of the padded grid) along x and along y.
     size: [usize; 2],
-    /// For each node of two slices, whether it (bit 0) and the next one along y (bit 1) are inside.
+    /// For each node of the two z slices around the current layer of cubes, whether it (bit 0) and the next node along
+    /// y (bit 1) are inside. Slice z is at index z % 2.
     pairs: [Vec<u8>; 2],
-    /// Marching cubes case of each cube in the current row.
+    /// Marching cubes case (one bit per inside corner) of each cube in the current row along x.
     row: Vec<u8>,
-    /// Index of the mesh vertex on each grid edge, by the node where the edge starts, in five tables: x edges of the
-    /// current even and odd slice, y edges of these, and z edges between the two.
+    /// Index in the mesh of the vertex on each grid edge of the current layer of cubes, by the node where the edge
+    /// starts, in five tables: x edges of the layer's even and odd slice, y edges of these, and z edges between the
+    /// two.
     vertices: Vec<u32>,
     mesh: TriangleMesh,
 }
@@ -105,7 +108,7 @@ impl<'a> MarchingCubes<'a> {
         })
     }
 
-    /// Processes all cubes between node slices `z` and `z + 1`.
+    /// Adds the surface in all cubes between the node slices `z` and `z + 1` to the mesh.
     fn layer(&mut self, z: usize) -> Result<(), VolumeError> {
         self.classify(z + 1);
         let offsets = self.edge_offsets(z);
@@ -137,7 +140,7 @@ impl<'a> MarchingCubes<'a> {
         }
     }
 
-    /// Fills `row` with the cases of the cubes at (.., y, z).
+    /// Fills `row` with the marching cubes cases of the cubes that start at the nodes (.., y, z).
     fn find_cases(&mut self, y: usize, z: usize) {
         let width = self.size[0];
         let low = &self.pairs[z % 2][y * width..(y + 1) * width];
@@ -149,7 +152,8 @@ impl<'a> MarchingCubes<'a> {
         }
     }
 
-    /// Reserves memory for the most that one row of cubes can add: three vertices and five triangles per cube.
+    /// Reserves memory for the most that one row of cubes can add to the mesh: three vertices and five triangles per
+    /// cube.
     fn reserve_row(&mut self) -> Result<(), VolumeError> {
         let (vertices, triangles) = (3 * self.row.len(), 5 * self.row.len());
         let mesh = &mut self.mesh;
@@ -162,7 +166,8 @@ impl<'a> MarchingCubes<'a> {
         grown.map_err(|_| too_large)
     }
 
-    /// Appends the vertices and triangles of one row of cubes.
+    /// Appends the vertices and triangles of the row of cubes that start at the nodes (.., y, z) to the mesh; `offsets`
+    /// are those of [`Self::edge_offsets`].
     fn emit_row(&mut self, y: usize, z: usize, offsets: &[usize; 12]) {
         let row = std::mem::take(&mut self.row);
         for (chunk, cubes) in row.chunks(16).enumerate() {
@@ -194,7 +199,8 @@ impl<'a> MarchingCubes<'a> {
         }
     }
 
-    /// Returns the position of the vertex on an edge of the cube at `origin`.
+    /// Returns the position, in index coordinates, of the vertex on edge number `edge` of the cube that starts at node
+    /// `origin`.
     fn vertex(&self, origin: [usize; 3], edge: usize) -> Vec3 {
         let (axis, offset) = EDGES[edge];
         let from = [0, 1, 2].map(|k| origin[k] + offset[k]);
@@ -208,15 +214,15 @@ impl<'a> MarchingCubes<'a> {
         p
     }
 
-    /// Returns the value at a node, or `None` in the padding.
+    /// Returns the grid's value at a node, or `None` in the padding.
     fn value(&self, node: [usize; 3]) -> Option<f32> {
         let [nx, ny, nz] = self.grid.dims;
         let [x, y, z] = node.map(|k| k.wrapping_sub(1));
         if x < nx && y < ny && z < nz { self.grid.values.get((z * ny + y) * nx + x).copied() } else { None }
     }
 
-    /// Returns, for each edge of a cube, the offset in `vertices` relative to the cube's node, for the layer above
-    /// slice `z`.
+    /// Returns, for each of the twelve edges of a cube between the slices `z` and `z + 1`, its index in `vertices`
+    /// relative to the index of the node where the cube starts.
     fn edge_offsets(&self, z: usize) -> [usize; 12] {
         let plane = self.size[0] * self.size[1];
         EDGES.map(|(axis, [dx, dy, dz])| {
@@ -226,8 +232,8 @@ impl<'a> MarchingCubes<'a> {
     }
 }
 
-/// Returns the fraction of the way from `a` to `b` at which linear interpolation reaches `iso`, kept [`MARGIN`] away
-/// from both ends.
+/// Returns the fraction of the way from a node of value `a` to one of value `b` at which linear interpolation reaches
+/// `iso`, kept [`MARGIN`] away from both ends.
 fn fraction(a: f32, b: f32, iso: f32) -> f32 {
     let t = (iso - a) / (b - a);
     if t > 1.0 - MARGIN {
@@ -275,8 +281,8 @@ mod tests {
         grid
     }
 
-    /// Returns V - E + F, after asserting that the mesh is closed, oriented, 2-manifold and without degenerate
-    /// triangles.
+    /// Returns the Euler characteristic V − E + F, after asserting that the mesh is closed, oriented, 2-manifold and
+    /// without degenerate triangles.
     fn euler(mesh: &TriangleMesh) -> i64 {
         let mut edges = BTreeMap::new();
         let mut links: Vec<BTreeMap<u32, u32>> = vec![BTreeMap::new(); mesh.positions.len()];

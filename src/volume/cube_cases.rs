@@ -1,20 +1,21 @@
-//! The triangles of marching cubes for each of the 256 cases, derived from the geometry of the cube.
+//! The triangles of marching cubes for each of the 256 cases (sets of inside corners of a cube), derived from the
+//! geometry of the cube.
 //!
 //! Corner c of a cube lies at dx = bit 2, dz = bit 1, dy = bit 0 of c, and bit c of a case is set if corner c is
 //! inside. On each face the surface separates every connected run of inside corners from the rest; two inside corners
-//! that are diagonally opposite on a face are separated. The rule depends on one face only, so the two cubes sharing it
-//! always agree, and every cut edge of a cube lies on exactly one closed loop.
+//! that are diagonally opposite on a face are separated. The rule depends on one face only, so the two cubes that share
+//! a face always agree, and every cut edge of a cube (with one end inside) lies on exactly one closed loop.
 //!
 //! Each loop is filled by the triangulation of least area (vertices at the edges' midpoints) among those in which no
 //! diagonal joins two edges of one face. A diagonal within a face could be used by the neighbouring cube, too, and the
 //! edge would then have four triangles. For loops of up to six, any such triangulation is free of self-intersections
-//! wherever the vertices lie on their edges. Of the sixteen for a loop of seven some are not, and that of least area is
-//! free of them; `tests::no_case_intersects_itself` verifies this.
+//! wherever the vertices lie on their edges. Some of the sixteen triangulations of a loop of seven are not, but the one
+//! of least area is; `tests::no_case_intersects_itself` verifies this.
 
 use std::sync::OnceLock;
 
-/// The twelve edges of a cube: the axis of each (0 = x, 1 = y, 2 = z) and its offset [dx, dy, dz] from the cube's
-/// origin.
+/// The twelve edges of a marching cubes cube: the axis of each (0 = x, 1 = y, 2 = z) and the offset [dx, dy, dz] of its
+/// start from the cube's origin.
 pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
     (0, [0, 0, 0]),
     (0, [0, 1, 0]),
@@ -30,19 +31,21 @@ pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
     (2, [1, 1, 0]),
 ];
 
-/// The edges along x, y and z that end in the cube's far corner. When cubes are processed in index order, no earlier
-/// cube contains them, so their vertices are created with this cube.
+/// The edges along x, y and z that end in the cube's far corner, as indices into [`EDGES`]. When cubes are processed in
+/// index order, no earlier cube contains them, so their vertices are created with this cube.
 pub(super) const FAR_EDGES: [usize; 3] = [3, 7, 11];
 
-/// The triangles of one marching cubes case, as edge numbers, counter-clockwise seen from outside.
+/// The part of the surface in a cube of one marching cubes case (set of inside corners).
 pub(super) struct Case {
-    /// The edge numbers of the three vertices of each triangle.
+    /// For each triangle, the three cube edges on which its vertices lie, as indices into [`EDGES`]; counter-clockwise
+    /// seen from outside.
     pub(super) triangles: Vec<[u8; 3]>,
-    /// Bit mask of the [`FAR_EDGES`] that are cut.
+    /// Bit k is set if edge `FAR_EDGES[k]` is cut by the surface, so that this cube creates the vertex on it.
     pub(super) far_cuts: u8,
 }
 
-/// Returns the table of all 256 cases, computed at the first call.
+/// Returns the table of all 256 marching cubes cases, indexed by the inside corners of a cube as bits; computed at the
+/// first call.
 pub(super) fn cases() -> &'static [Case] {
     static CASES: OnceLock<Vec<Case>> = OnceLock::new();
     CASES.get_or_init(|| (0..256).map(derive).collect())
@@ -60,12 +63,14 @@ fn derive(case: usize) -> Case {
     Case { triangles, far_cuts }
 }
 
-/// Returns the number of a cube's corner, 0 to 7, from its offset from the cube's origin.
+/// Returns the number of a cube's corner, 0 to 7, from its offset from the cube's origin. In a marching cubes case, bit
+/// `corner` is set if the corner is inside.
 pub(super) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
     dy | dz << 1 | dx << 2
 }
 
-/// Returns a table of the edge between each pair of adjacent corners; other entries are meaningless.
+/// Returns a table of the edge (index into [`EDGES`]) between each pair of adjacent corners of a cube; entries of other
+/// pairs are meaningless.
 fn edges_between() -> [[usize; 8]; 8] {
     let mut table = [[0; 8]; 8];
     for (edge, &(axis, offset)) in EDGES.iter().enumerate() {
@@ -77,7 +82,7 @@ fn edges_between() -> [[usize; 8]; 8] {
     table
 }
 
-/// Returns the four corners of each face, counter-clockwise seen from outside the cube.
+/// Returns the numbers of the four corners of each face of a cube, counter-clockwise seen from outside the cube.
 fn faces() -> [[usize; 4]; 6] {
     [0, 1, 2, 3, 4, 5].map(|face| {
         let (axis, side) = (face / 2, face % 2);
@@ -90,7 +95,8 @@ fn faces() -> [[usize; 4]; 6] {
     })
 }
 
-/// Returns the closed loops of cut edges of a case, oriented so that their triangles face outwards.
+/// Returns the closed loops of cut edges (indices into [`EDGES`]) of a marching cubes case, oriented so that the
+/// triangles that fill them face outwards.
 fn loops(case: usize) -> Vec<Vec<usize>> {
     let mut next = next_on_loop(case);
     let mut out = Vec::new();
@@ -108,7 +114,8 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// Returns, for each cut edge, the next cut edge on its loop; `None` for edges that are not cut.
+/// Returns, for each of the twelve edges of a cube that is cut in this case, the next cut edge on its loop; `None` for
+/// edges that are not cut.
 fn next_on_loop(case: usize) -> [Option<usize>; 12] {
     let inside = |corner: usize| case >> corner & 1 == 1;
     let between = edges_between();
@@ -130,15 +137,15 @@ fn next_on_loop(case: usize) -> [Option<usize>; 12] {
     next
 }
 
-/// Returns whether two edges of the cube lie on a common face.
+/// Returns whether two edges of the cube lie on a common face, so that no diagonal of a triangulation may join them.
 fn share_face(a: usize, b: usize) -> bool {
     let on = |edge: usize, axis: usize, side: usize| EDGES[edge].0 != axis && EDGES[edge].1[axis] == side;
     (0..3).any(|axis| (0..2).any(|side| on(a, axis, side) && on(b, axis, side)))
 }
 
-/// Triangulates a loop with least area, by dynamic programming over its ranges i..=j: `best[i][j]` is the least area of
-/// a triangulation of the range, closed by the diagonal from i to j, and the vertex k that achieves it. Appends the
-/// triangles to `out`.
+/// Appends the triangulation of least area of a loop of cut edges (`contour`) to `out`. It is found by dynamic
+/// programming over the ranges i..=j of the loop: `best[i][j]` is the least area of a triangulation of the range,
+/// closed by the diagonal from i to j, and the vertex k that achieves it.
 fn triangulate(contour: &[usize], out: &mut Vec<[u8; 3]>) {
     let n = contour.len();
     let mut best = vec![vec![(0.0, 0); n]; n];
@@ -168,13 +175,14 @@ fn collect(contour: &[usize], best: &[Vec<(f64, usize)>], i: usize, j: usize, ou
     out.push([contour[i], contour[k], contour[j]].map(|edge| edge as u8));
 }
 
-/// Returns twice the area of the triangle between the midpoints of three edges of the unit cube.
+/// Returns twice the area of the triangle between the midpoints of three edges of the unit cube, to compare
+/// triangulations.
 fn midpoint_area(edges: [usize; 3]) -> f64 {
     let [a, b, c] = edges.map(|edge| point_on(edge, 0.5));
     (b - a).cross(c - a).length()
 }
 
-/// Returns the point at fraction `t` of an edge, in the unit cube.
+/// Returns the point at fraction `t` of edge number `edge` of the unit cube.
 fn point_on(edge: usize, t: f64) -> crate::math::DVec3 {
     let (axis, offset) = EDGES[edge];
     let mut p = offset.map(|o| o as f64);
@@ -189,7 +197,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns a random fraction in [1/256, 255/256], concentrated at both ends, where intersections are likeliest.
+    /// Returns a random position of a vertex on its cube edge, as a fraction in [1/256, 255/256], concentrated at both
+    /// ends, where self-intersections are likeliest.
     fn random_fraction(state: &mut u64) -> f64 {
         let mut next = || {
             *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -1,4 +1,5 @@
-//! Interpolated slices for volumes with thick slices (dynamic surfaces from 4D cardiac MRI, section 5.2).
+//! Interpolation of further slices in volumes with thick slices, so that the spacing becomes nearly isotropic (dynamic
+//! surfaces from 4D cardiac MRI, section 5.2).
 
 use super::error::{VolumeError, reserve};
 use super::flow::{Flow, Image, symmetric_flow};
@@ -9,15 +10,16 @@ use crate::math::{DAffine3, DVec3};
 /// Interpolation method of [`Volume::enrich_slices`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Enrichment {
-    /// Both neighbouring slices are warped along the optical flow between them, and the results are interpolated
-    /// linearly.
+    /// An interpolated slice is the linear interpolation of the two neighbouring slices, both warped along the optical
+    /// flow between them.
     #[default]
     Flow,
-    /// Linear interpolation between the two neighbouring slices.
+    /// An interpolated slice is the linear interpolation of the two neighbouring slices, without optical flow.
     Linear,
 }
 
-/// Largest factor of slice interpolation: with a larger one, further slices add no information.
+/// Largest factor by which [`Volume::enrich_slices`] multiplies the number of slices: with a larger one, further slices
+/// add no information.
 const MAX_FACTOR: usize = 16;
 
 impl Volume {
@@ -67,7 +69,8 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// Returns the axis of the largest spacing; of equal ones z, otherwise the lowest.
+    /// Returns the axis of the largest spacing, across which slices are interpolated; of equal ones z if it is among
+    /// them, else the lowest.
     fn thick_axis(&self) -> usize {
         let spacing = self.spacing();
         (0..3).fold(2, |axis, other| if spacing[other] > spacing[axis] { other } else { axis })
@@ -80,7 +83,8 @@ impl Volume {
         if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MAX_FACTOR as f64) as usize }
     }
 
-    /// Returns one frame with its interpolated slices, as stored values.
+    /// Returns one frame, as stored values, with `factor` − 1 slices interpolated between each pair of neighbouring
+    /// slices along `axis`.
     fn enriched_frame(
         &self,
         frame: usize,
@@ -123,17 +127,17 @@ impl Volume {
         self.voxels.like(&values)
     }
 
-    /// Converts an intensity on the scale of [`Self::normalised_grid`] to a stored value.
+    /// Converts an intensity on the scale of [`Self::normalised_grid`] (0 to 1) to a stored value.
     fn stored(&self, normalised: f64) -> f64 {
         (self.range[0] + normalised * self.span() - self.intercept) / self.slope
     }
 }
 
-/// Memory layout of the slices perpendicular to one axis.
+/// Memory layout of the slices of a volume perpendicular to one axis, for slice interpolation.
 struct Slices {
-    /// Number of voxels along the lower one of the two axes within a slice.
+    /// Number of voxels along the lower one of the two axes within a slice (in the order x, y, z).
     across: usize,
-    /// Number of voxels along the higher one of these axes.
+    /// Number of voxels along the higher one of the two axes within a slice (in the order x, y, z).
     down: usize,
     /// Memory strides, in voxels, of the lower and the higher axis within a slice and of the axis across slices.
     steps: [usize; 3],
@@ -150,7 +154,7 @@ impl Slices {
         }
     }
 
-    /// Returns the indices of the voxels of a slice within a frame, row by row.
+    /// Returns the indices, within a frame, of the voxels of slice number `slice`, row by row.
     fn voxel_indices(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
         let Self { across, down, steps: [step, row, along] } = *self;
         (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
@@ -163,8 +167,9 @@ impl Slices {
     }
 }
 
-/// Multiplies the flow at each pixel by its confidence: the share of the squared difference between the two images that
-/// warping removes. 1 if the warped images agree, 0 if warping does not reduce the difference.
+/// Multiplies the flow between two images at each pixel by its confidence: the share of the squared difference of the
+/// images, summed over a window, that warping removes (1 if the warped images agree, 0 if warping does not reduce the
+/// difference). Where the flow does not fit, slices are then interpolated without it.
 fn weighted_by_confidence(before: &Image, after: &Image, mut flow: Flow) -> Result<Flow, VolumeError> {
     let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
     let moved = squared_differences(&left, &right)?;
@@ -178,15 +183,16 @@ fn weighted_by_confidence(before: &Image, after: &Image, mut flow: Flow) -> Resu
     Ok(flow)
 }
 
-/// Returns the squared differences of two images, summed over the window around each pixel.
+/// Returns, for each pixel, the squared differences of two images, summed over the least-squares window of the optical
+/// flow around it.
 fn squared_differences(one: &Image, other: &Image) -> Result<Image, VolumeError> {
     let mut values = reserve(one.values.len())?;
     values.extend(one.values.iter().zip(&other.values).map(|(a, b)| (a - b) * (a - b)));
     Image { values, ..*one }.window_sums()
 }
 
-/// Returns the image interpolated at fraction `share` of the way from `before` to `after`, along the flow if there is
-/// one.
+/// Returns the image interpolated at fraction `share` of the way from slice `before` to slice `after`, along the
+/// optical flow if there is one, else pixel by pixel.
 fn in_between(before: &Image, after: &Image, flow: Option<&Flow>, share: f32) -> Result<Image, VolumeError> {
     let mix = |left: &Image, right: &Image| {
         let mut values = reserve(left.values.len())?;
@@ -230,7 +236,7 @@ mod tests {
         (200.0 / (1.0 + libm::exp(away))).round() as u8
     }
 
-    /// Returns the cone sampled with `steps` slices per unit of z.
+    /// Returns a volume of the slanted [`cone`], with `steps` slices per unit of z.
     fn cone_volume(steps: usize) -> Volume {
         let (nx, ny, nz) = (56, 48, 6 * steps + 1);
         let at = |i: usize| {

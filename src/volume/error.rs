@@ -6,9 +6,9 @@ pub enum VolumeError {
     /// An argument out of range, not finite, or of the wrong length.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
-        /// Name of the argument.
+        /// Name of the rejected argument.
         parameter: &'static str,
-        /// The reason, and the accepted values.
+        /// Reason for the rejection, with the accepted values.
         problem: String,
     },
     /// An allocation failed, or a mesh would have more vertices than `u32` can count.
@@ -26,7 +26,8 @@ impl VolumeError {
     }
 }
 
-/// Returns an empty vector with capacity for `count` elements; used for every allocation of the size of a volume.
+/// Returns an empty vector with capacity for `count` elements; used for all arrays as large as a volume, so that a lack
+/// of memory is an error and not a crash.
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`] if the allocation fails.

@@ -1,4 +1,5 @@
-//! Symmetric optical flow between two images: the displacement that warps both to their midpoint.
+//! Symmetric optical flow between two images, for slice interpolation: the displacement that warps both to their
+//! midpoint.
 //!
 //! Local least squares (Lucas and Kanade), coarse to fine. The flow u is defined on the midpoint image, where the
 //! intensities of both images agree: a(x − u/2) = b(x + u/2).
@@ -6,33 +7,38 @@
 use super::error::{VolumeError, reserve};
 use super::sampling::locate;
 
-/// Radius of the least-squares window, in pixels: one flow vector explains all differences within (2 `RADIUS` + 1)²
-/// pixels.
+/// Radius of the least-squares window of the optical flow, in pixels: one flow vector explains all differences within
+/// (2 `RADIUS` + 1)² pixels.
 const RADIUS: usize = 5;
 
-/// Number of rows whose running sums are computed together, which hides the latency of dependent additions.
+/// Number of image rows whose running sums are computed together, which hides the latency of dependent additions.
 const ROWS_AT_ONCE: usize = 4;
 
-/// Least-squares iterations on each level of the pyramid.
+/// Number of least-squares iterations of the optical flow on each level of the image pyramid; see [`FINEST_ITERATIONS`]
+/// for the finest.
 const ITERATIONS: usize = 4;
 
-/// Least-squares iterations on the finest level if there are coarser ones: they take most of the time and change least.
+/// Number of least-squares iterations of the optical flow on the finest level of the image pyramid if there are coarser
+/// ones: they take most of the time and change least.
 const FINEST_ITERATIONS: usize = 2;
 
-/// Largest change of the flow per iteration, in pixels of the level: the gradients are not valid further away.
+/// Largest change of a flow vector per least-squares iteration, in pixels of the pyramid level: image gradients say
+/// nothing about intensities further away.
 const MAX_STEP: f32 = 1.0;
 
-/// Smallest width and height of a coarser level, in pixels: images are halved only while both are at least twice this.
+/// Smallest width and height of a coarser level of the optical flow's image pyramid, in pixels: images are halved only
+/// while both are at least twice this.
 const MIN_IMAGE_SIZE: usize = 24;
 
-/// Largest number of pyramid levels: an iteration on the coarsest moves by up to 4 pixels of the finest.
+/// Largest number of levels of the optical flow's image pyramid: with three, an iteration on the coarsest moves by up
+/// to 4 pixels of the finest.
 const MAX_LEVELS: usize = 3;
 
-/// Regularisation added to the diagonal of the normal equations, relative to the mean squared gradient of the image:
-/// the flow is 0 in regions without contrast.
+/// Regularisation added to the diagonal of the optical flow's normal equations, relative to the mean squared gradient
+/// of the image: the flow is 0 in regions without contrast.
 const REGULARISATION: f32 = 0.2;
 
-/// A 2D image, row-major.
+/// A 2D image, such as a slice of a volume, stored row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Image {
     pub width: usize,
@@ -59,7 +65,7 @@ impl Image {
         self.values.chunks_exact(self.width)
     }
 
-    /// Returns the bilinearly interpolated value at (x, y); the border is replicated.
+    /// Returns the bilinearly interpolated value at (x, y) in pixels; beyond the image its border is replicated.
     #[inline]
     fn at(&self, x: f32, y: f32) -> f32 {
         let (x0, x1, fx) = between(x, self.width);
@@ -106,7 +112,7 @@ impl Image {
         Ok(Self { width, height, values })
     }
 
-    /// Returns the means over the windows of [`Self::window_sums`].
+    /// Returns, for each pixel, the mean over the least-squares window around it; smooths the flow.
     fn window_means(&self) -> Result<Self, VolumeError> {
         let mut means = self.window_sums()?;
         let count = |at: usize, n: usize| (at.min(RADIUS) + (n - 1 - at).min(RADIUS) + 1) as f32;
@@ -118,7 +124,7 @@ impl Image {
         Ok(means)
     }
 
-    /// Returns the sums over windows of (2 `RADIUS` + 1)² pixels, clipped at the border.
+    /// Returns, for each pixel, the sum over the window of (2 `RADIUS` + 1)² pixels around it, clipped at the border.
     pub fn window_sums(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width, self.height);
         let mut along = Self::flat(width, height, 0.0)?;
@@ -152,7 +158,8 @@ impl Image {
     }
 }
 
-/// Computes windowed running sums along `R` rows at once, since each addition depends on the previous one in its row.
+/// Computes, for each pixel of `R` rows, the sum over the 2 `RADIUS` + 1 pixels around it in its row. Each addition
+/// depends on the previous one in the same row, so several rows are processed at once.
 fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
     let width = rows.len() / R;
     let mut sums: [f32; R] = std::array::from_fn(|r| rows[r * width..][..RADIUS.min(width)].iter().sum());
@@ -168,8 +175,8 @@ fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
     }
 }
 
-/// Computes a quarter of the difference between the two neighbours of each pixel, the border replicated: the gradient
-/// along x of the mean of two images, from their sum.
+/// Computes the gradient along x of the mean of two images, from a row of their sum: a quarter of the difference
+/// between the two neighbours of each pixel, the border replicated.
 fn row_gradient(row: &[f32], out: &mut [f32]) {
     let last = row.len() - 1;
     for (slope, pair) in out[1..].iter_mut().zip(row.windows(3)) {
@@ -179,7 +186,8 @@ fn row_gradient(row: &[f32], out: &mut [f32]) {
     out[last] = 0.25 * (row[last] - row[last.saturating_sub(1)]);
 }
 
-/// Returns the two pixels around `x`, clamped to the image, and the fractional position between them.
+/// Returns the indices of the two pixels around coordinate `x` on an axis of `n` pixels, and the fractional position
+/// between them; `x` is clamped to the image.
 #[inline]
 fn between(x: f32, n: usize) -> (usize, usize, f32) {
     let (index, share) = locate(x, n);
@@ -212,7 +220,7 @@ pub(super) fn symmetric_flow(a: &Image, b: &Image) -> Result<Flow, VolumeError> 
     Ok(flow)
 }
 
-/// Performs one least-squares iteration on the flow and smooths it by window means.
+/// Improves the flow between `a` and `b` by one least-squares iteration and smooths it by window means.
 fn iterate(a: &Image, b: &Image, flow: &mut Flow) -> Result<(), VolumeError> {
     let (before, after) = (a.warped(flow, -0.5)?, b.warped(flow, 0.5)?);
     let equations = NormalEquations::of(&before, &after)?;
@@ -227,8 +235,8 @@ fn iterate(a: &Image, b: &Image, flow: &mut Flow) -> Result<(), VolumeError> {
     Ok(())
 }
 
-/// Normal equations of the flow at each pixel, summed over its window: products of gradients (`xx`, `xy`, `yy`), and of
-/// gradients with differences (`xd`, `yd`).
+/// Normal equations of the optical flow at each pixel, summed over its window: products of image gradients (`xx`, `xy`,
+/// `yy`), and of gradients with differences of the two images (`xd`, `yd`).
 struct NormalEquations {
     xx: Image,
     xy: Image,
@@ -269,7 +277,8 @@ impl NormalEquations {
         Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, regularisation })
     }
 
-    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`MAX_STEP`].
+    /// Returns the change of the flow along x and y at pixel number `i`: the solution of its normal equations, limited
+    /// to a length of [`MAX_STEP`].
     #[inline]
     fn step(&self, i: usize) -> (f32, f32) {
         let (xx, yy) = (self.xx.values[i] + self.regularisation, self.yy.values[i] + self.regularisation);

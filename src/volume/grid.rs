@@ -29,7 +29,8 @@ impl Default for CellCache {
     }
 }
 
-/// A vector field: one vector per voxel, x fastest, then y, z. Positions are voxel indices, as in [`Grid`].
+/// A vector field, such as the gradient of an image: one vector per voxel, x fastest, then y, z. Positions are
+/// continuous voxel indices, voxel centres at integers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VectorGrid {
     /// Number of voxels along x, y and z, each at least 1.
@@ -49,8 +50,8 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Returns an error unless the number of values is the product of the dimensions and not 0; used by marching cubes,
-    /// too.
+    /// Returns an error unless the grid has one value per voxel, and at least one; marching cubes calls it, too, since
+    /// the fields of a grid are public.
     pub(super) fn check(&self) -> Result<(), VolumeError> {
         let count = self.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
         if count == Some(self.values.len()) && !self.values.is_empty() {
@@ -60,16 +61,17 @@ impl Grid {
         Err(VolumeError::invalid("values", problem))
     }
 
-    /// Returns the trilinearly interpolated value at `p`; outside the grid the border is replicated.
+    /// Returns the trilinearly interpolated value at `p`, in continuous voxel indices; outside the grid the border is
+    /// replicated.
     #[inline]
     pub fn sample(&self, p: Vec3) -> f32 {
         let cell = Cell::at(self.dims, p);
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `padding` on all
-    /// sides. Faster if `p` is in the same cell as in the previous call with this `cache`, which must only be used with
-    /// one grid.
+    /// Returns the trilinearly interpolated value at `p`, in continuous voxel indices, in the grid padded with voxels
+    /// of value `padding` on all sides. Faster if `p` is in the same cell as in the previous call with this `cache`,
+    /// which must only be used with one grid.
     ///
     /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]
@@ -108,7 +110,8 @@ impl Grid {
         Ok(VectorGrid { dims: self.dims, values })
     }
 
-    /// Computes the 3 × 3 sums in the y-z plane for every x of one row of voxels.
+    /// Computes, for every voxel of the row (0.., y, z), the weighted 3 × 3 sums in the y-z plane from which Sobel
+    /// gradients are composed.
     fn fill_columns(&self, columns: &mut [Columns], y: usize, z: usize) {
         let [_, ny, nz] = self.dims;
         let [y0, y2] = [y.saturating_sub(1), if y + 1 < ny { y + 1 } else { y }];
@@ -129,7 +132,8 @@ impl Grid {
 }
 
 impl VectorGrid {
-    /// Returns the trilinearly interpolated vector at `p`; outside the grid the border is replicated.
+    /// Returns the trilinearly interpolated vector at `p`, in continuous voxel indices; outside the grid the border is
+    /// replicated.
     #[inline]
     pub fn sample(&self, p: Vec3) -> Vec3 {
         let cell = Cell::at(self.dims, p);
@@ -137,8 +141,8 @@ impl VectorGrid {
     }
 }
 
-/// Weighted 3 × 3 sums in the y-z plane at one x, from which Sobel gradients are composed: smoothed along y and z, or
-/// differenced along one and smoothed along the other.
+/// Weighted sums of 3 × 3 voxel values in the y-z plane at one x, from which Sobel gradients are composed: smoothed
+/// along y and z, or differenced along one and smoothed along the other.
 #[derive(Clone, Copy, Default)]
 struct Columns {
     smooth: f32,
@@ -147,7 +151,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// Computes the sums of the 3 × 3 values at `[z][y]`.
+    /// Computes the sums of 3 × 3 voxel values given as `at[z][y]`.
     #[inline]
     fn of(at: [[f32; 3]; 3]) -> Self {
         let smooth_y = at.map(|[a, b, c]| a + 2.0 * b + c);
@@ -173,8 +177,8 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
     }
 }
 
-/// Returns the weight of the grid against its padding along one axis: 1 between the outermost voxel centres, falling to
-/// 0 one voxel beyond.
+/// Returns the weight of a grid's values against those of its padding at coordinate `x` of one axis, in voxel indices:
+/// 1 between the outermost voxel centres (0 and `last`), falling linearly to 0 one voxel beyond.
 #[inline]
 fn padding_weight(x: f32, last: f32) -> f32 {
     let beyond = if x < 0.0 { -x } else { x - last };

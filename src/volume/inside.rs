@@ -1,4 +1,4 @@
-//! Voxelisation: the voxels inside a closed surface.
+//! Voxelisation: which voxels are inside a closed surface.
 
 use crate::math::predicates::orient2d;
 use crate::math::{DVec2, Vec3};
@@ -26,8 +26,8 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     inside
 }
 
-/// Toggles in `crossings_parity`, for each row of voxels along x that the triangle crosses, the first voxel beyond the
-/// triangle.
+/// Processes one triangle of the surface: for each row of voxels along x that it crosses, toggles the bit in
+/// `crossings_parity` of the first voxel at or beyond the triangle.
 fn cross_triangle(
     positions: &[Vec3],
     corners: [u32; 3],
@@ -57,15 +57,15 @@ fn cross_triangle(
     }
 }
 
-/// Returns whether the projection of the triangle along x contains the point (y, z). The point is perturbed
+/// Returns whether the projection of the triangle along x contains the point `at`, (y, z). The point is perturbed
 /// symbolically by an infinitesimal amount along y and a smaller one along z, so that it lies on no edge.
 fn projection_contains(positions: &[Vec3], [a, b, c]: [u32; 3], at: DVec2) -> bool {
     let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| is_left(positions, edge, at));
     ab.is_some() && ab == bc && bc == ca
 }
 
-/// Returns whether a point is to the left of an edge projected along x; `None` if the edge projects to a point.
-/// Consistent for the two triangles that share the edge.
+/// Returns whether the point `at` is to the left of an edge projected along x; `None` if the edge projects to a point.
+/// Consistent for the two triangles that share the edge, so that a ray through it counts once.
 fn is_left(positions: &[Vec3], [from, to]: [u32; 2], at: DVec2) -> Option<bool> {
     let (low, high) = if from < to { (from, to) } else { (to, from) };
     let [p, q] = [low, high].map(|v| {
@@ -113,7 +113,7 @@ mod tests {
         });
     }
 
-    /// A cuboid all of whose rays pass through edges or vertices.
+    /// Tests a cuboid placed so that all rays of the voxelisation pass through its edges or vertices.
     #[test]
     fn rays_along_edges_count_once() {
         let surface = moved(cuboid(Vec3::splat(4.0)), Vec3::splat(3.0));

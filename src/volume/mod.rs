@@ -64,7 +64,7 @@ pub enum Space {
 /// Length of one unit of world coordinates, if the file states it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LengthUnit {
-    /// The file does not state it.
+    /// The file does not state the length of a world unit.
     #[default]
     Unknown,
     /// World coordinates are in metres.
@@ -80,7 +80,7 @@ pub enum LengthUnit {
 pub struct VolumeInit {
     /// Stored values, x fastest, then y, z, t.
     pub voxels: Voxels,
-    /// Number of voxels along x, y, z, and of frames.
+    /// Number of voxels along x, y and z, and number of frames.
     pub dims: [usize; 4],
     /// Map from voxel index to world coordinates.
     pub affine: DAffine3,
@@ -97,8 +97,8 @@ pub struct VolumeInit {
 /// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
 ///
 /// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from ranges and histograms.
-/// When they are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end, so
-/// every sampled intensity is finite.
+/// When intensities are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end,
+/// so every sampled intensity is finite.
 #[derive(Clone, Debug)]
 pub struct Volume {
     voxels: Arc<Voxels>,
@@ -118,9 +118,10 @@ impl Volume {
     ///
     /// # Errors
     /// [`VolumeError::InvalidArgument`] when a dimension is 0, the number of voxels is not the product of the
-    /// dimensions, the affine is not finite, not invertible, has a voxel axis not within 1e-12 to 1e12 or maps a corner
-    /// beyond the range of `f32`, the slope is 0 or not finite, the intercept is not finite, the frame time is negative
-    /// or not finite, no voxel is a finite number, or an intensity exceeds the range of `f32`.
+    /// dimensions, the affine is not finite, not invertible, has a voxel axis whose length in world units is not within
+    /// 1e-12 to 1e12, or maps a corner beyond the range of `f32`, the slope is 0 or not finite, the intercept is not
+    /// finite, the frame time is negative or not finite, no voxel is a finite number, or an intensity exceeds the range
+    /// of `f32`.
     pub fn new(init: VolumeInit) -> Result<Volume, VolumeError> {
         check_dims(init.dims, init.voxels.len())?;
         check_scale(init.slope, init.intercept)?;
@@ -142,7 +143,7 @@ impl Volume {
         })
     }
 
-    /// Sets the length unit of the world coordinates.
+    /// Returns the volume with the length unit of its world coordinates set to `unit`.
     pub fn with_unit(mut self, unit: LengthUnit) -> Volume {
         self.unit = unit;
         self
@@ -289,7 +290,8 @@ impl Volume {
         self.finite(stored * self.slope + self.intercept)
     }
 
-    /// Returns `value` if it is finite, the upper end of the range for +∞, and the lower end for −∞ and NaN.
+    /// Returns an intensity as it is if finite; +∞ becomes the upper end of the volume's intensity range, and −∞ and
+    /// NaN become the lower end.
     fn finite(&self, value: f64) -> f64 {
         if value.is_finite() {
             value
@@ -346,7 +348,8 @@ fn check_frame_seconds(seconds: f64) -> Result<(), VolumeError> {
     ))
 }
 
-/// Inverts the affine map of a volume; an error if it is singular or too ill-conditioned to invert accurately.
+/// Returns the inverse of a volume's affine map from voxel index to world; an error if the map is singular or too
+/// ill-conditioned to be inverted accurately.
 fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
     let error = |problem: &str| Err(VolumeError::invalid("affine", problem));
     if !affine.is_finite() {
@@ -365,7 +368,8 @@ fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
     if inverse.is_finite() { Ok(inverse) } else { error("is not invertible") }
 }
 
-/// Checks that all corners of the volume lie within the range of `f32`, since surface positions are stored in `f32`.
+/// Returns an error unless all corners of the volume lie within the range of `f32`, in which surface positions are
+/// stored.
 fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> {
     let far = DVec3::new(dims[0] as f64, dims[1] as f64, dims[2] as f64);
     let corners = (0..8).map(|i| far * DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1))));
@@ -377,10 +381,10 @@ fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> 
     Err(VolumeError::invalid("affine", problem))
 }
 
-/// Smallest accepted voxel spacing, in world units. Spacings outside this range come from broken headers only; the
-/// product of three spacings within it is far from overflow.
+/// Smallest accepted voxel spacing, in world units. Spacings below it or above [`MAX_SPACING`] come from broken headers
+/// only; the product of three accepted spacings is far from overflow.
 const MIN_SPACING: f64 = 1e-12;
-/// Largest accepted voxel spacing, in world units; see [`MIN_SPACING`].
+/// Largest accepted voxel spacing, in world units: larger ones come from broken headers only.
 const MAX_SPACING: f64 = 1e12;
 /// Smallest accepted volume of the parallelepiped spanned by the normalised voxel axes. Sheared gantry scans stay above
 /// 0.5; below this, inversion loses half of the digits of `f64` or more.

@@ -2,9 +2,9 @@
 //!
 //! Section 4.2 and appendix A of Lachaud & Montanvert, with errors of the appendix corrected: the level index
 //! increases, sizes are derived level by level, and all three axes are reduced. Level h + 1 has ⌊M/ρ⌋ voxels where
-//! level h has M; the world box is kept. Each of its voxels is the [1 4 6 4 1]/16 mean of five samples of level h, one
-//! unit apart along each axis. The unit U is the smallest voxel side at level 0 and grows by ρ per level. Samples
-//! between voxels are interpolated linearly; the border is replicated.
+//! level h has M; the world box is kept. Each voxel of level h + 1 is the [1 4 6 4 1]/16 mean of five samples of level
+//! h, U apart along each axis. U is the smallest voxel side at level 0 and grows by ρ per level. Samples between voxels
+//! are interpolated linearly; the border is replicated.
 
 use super::error::{VolumeError, reserve};
 use super::sampling::locate_f64;
@@ -12,7 +12,7 @@ use super::voxels::Voxels;
 use super::{Grid, Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// The five weights of the Gaussian-like kernel by which pyramid levels are reduced.
+/// The five weights of the Gaussian-like kernel by which each pyramid level is reduced to the next.
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
 impl Volume {
@@ -46,8 +46,8 @@ impl Volume {
         Ok(out)
     }
 
-    /// Returns the largest number of levels, this volume included, of a pyramid with this factor in which every axis
-    /// has at least 2 voxels; 1 if this volume has an axis with fewer.
+    /// Returns the largest number of levels, this volume included, of a pyramid with the reduction factor `factor` in
+    /// which every axis has at least 2 voxels; 1 if this volume has an axis with fewer.
     ///
     /// # Errors
     /// `factor` not in (1, 2].
@@ -133,8 +133,8 @@ impl Grid {
         Ok(Grid { dims: [nx, self.dims[1], self.dims[2]], values })
     }
 
-    /// Resamples to `count` voxels along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at
-    /// once.
+    /// Resamples the grid to `count` voxels along y (`axis` 1) or z (`axis` 2) with the weights `taps`, blending whole
+    /// runs of contiguous values at once.
     fn resample_rows(
         &self,
         taps: &ResamplingWeights,
@@ -167,17 +167,17 @@ fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// Resampling weights along one axis: for each output voxel, the range of source voxels and their weights, which sum to
-/// 1.
+/// Weights that reduce a grid along one axis to the next pyramid level: for each output voxel, the range of source
+/// voxels and their weights, which sum to 1.
 struct ResamplingWeights {
-    /// Per output voxel: the first source voxel, and start and end of its range in `weights`.
+    /// Per output voxel: the index of the first source voxel, and start and end of its weights in `weights`.
     spans: Vec<(usize, usize, usize)>,
     weights: Vec<f32>,
 }
 
 impl ResamplingWeights {
-    /// Computes the weights that reduce `source` voxels to `count`; `unit` is the distance between samples of the
-    /// kernel, in source voxels.
+    /// Computes the weights that reduce `source` voxels to `count`; `unit` is the distance between neighbouring samples
+    /// of the kernel, in source voxels.
     fn new(source: usize, count: usize, unit: f64) -> Self {
         let mut taps = Self { spans: Vec::with_capacity(count), weights: Vec::new() };
         let mut dense = vec![0.0f64; source];
@@ -188,8 +188,8 @@ impl ResamplingWeights {
         taps
     }
 
-    /// Adds the kernel at `centre` to the zeroed buffer `dense`, stores its nonzero range as the weights of the next
-    /// output voxel, and zeroes the buffer again.
+    /// Adds the weights of the next output voxel: those of the kernel centred at source coordinate `centre`, with its
+    /// samples `unit` apart. `dense` is a buffer of zeros, one per source voxel, and is zeroed again.
     fn push(&mut self, dense: &mut [f64], centre: f64, unit: f64) {
         let (mut low, mut high) = (usize::MAX, 0);
         for (k, weight) in KERNEL.iter().enumerate() {
@@ -218,7 +218,7 @@ fn check_factor(factor: f64) -> Result<(), VolumeError> {
     Err(VolumeError::invalid("factor", format!("must be > 1 and <= 2, got {factor}")))
 }
 
-/// Returns ⌊n/factor⌋ for each dimension, at least 1.
+/// Returns the number of voxels of the next pyramid level along each axis: ⌊n/factor⌋, at least 1.
 fn reduced_dims(dims: [usize; 3], factor: f64) -> [usize; 3] {
     dims.map(|n| {
         let reduced = (n as f64 / factor) as usize;

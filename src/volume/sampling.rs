@@ -12,7 +12,8 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// Returns the cell around `p`, clamped to the border if `p` is outside (and to the first voxel if it is NaN).
+    /// Returns the cell around `p`, in continuous voxel indices, clamped to the border if `p` is outside (and to the
+    /// first voxel if it is NaN).
     #[inline]
     pub(super) fn at(dims: [usize; 3], p: Vec3) -> Self {
         let (x, fx) = locate(p.x, dims[0]);
@@ -36,7 +37,7 @@ impl Cell {
         self.base
     }
 
-    /// Evaluates `value` at the indices of the eight voxels, x fastest.
+    /// Evaluates `value` at the indices of the cell's eight voxels, x fastest.
     #[inline]
     pub(super) fn corners<T>(&self, value: impl Fn(usize) -> T) -> [T; 8] {
         let [sx, sy, sz] = self.step;
@@ -44,7 +45,7 @@ impl Cell {
         [a, a + sx, a + sy, a + sx + sy, b, b + sx, b + sy, b + sx + sy].map(value)
     }
 
-    /// Interpolates between the eight values returned by [`Self::corners`].
+    /// Interpolates at the cell's point between the eight values returned by [`Self::corners`].
     #[inline]
     pub(super) fn blend<T>(&self, corners: &[T; 8]) -> T
     where
@@ -61,9 +62,9 @@ fn mix<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(a: T,
     a + (b - a) * fraction
 }
 
-/// Returns the voxel at or below `x` on an axis of `n` voxels and the fractional position from it to the next one, with
-/// `x` clamped to [0, n-1]. Written with comparisons: `f32::clamp` with variable bounds becomes two function calls in
-/// wasm.
+/// Returns the index of the voxel at or below coordinate `x` on an axis of `n` voxels and the fractional position from
+/// it to the next one, with `x` clamped to [0, n-1]. Written with comparisons: `f32::clamp` with variable bounds
+/// becomes two function calls in wasm.
 #[inline]
 pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     let last = (n - 1) as f32;
@@ -73,8 +74,8 @@ pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     (index, x - index as f32)
 }
 
-/// Interpolates trilinearly at `p`, in voxel indices, in `f64`; `value` returns the value of a voxel by its index.
-/// Outside, the border is replicated.
+/// Returns the value trilinearly interpolated at `p`, in continuous voxel indices, in `f64`; `value` returns the value
+/// of a voxel by its index in the frame. Outside the grid the border is replicated.
 pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
     let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
     let at = |corner: [usize; 3]| {
@@ -87,8 +88,8 @@ pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64
     mix(along_xy(0), along_xy(1), 2)
 }
 
-/// Returns the two voxels around `x` on an axis of `n` voxels and the fractional position between them, with `x`
-/// clamped to [0, n-1].
+/// Returns the indices of the two voxels around coordinate `x` on an axis of `n` voxels and the fractional position
+/// between them, with `x` clamped to [0, n-1].
 pub(super) fn locate_f64(x: f64, n: usize) -> ([usize; 2], f64) {
     let last = (n - 1) as f64;
     let x = if x > 0.0 { x } else { 0.0 };

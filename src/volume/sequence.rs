@@ -5,19 +5,20 @@ use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::DVec3;
 
-/// Largest accepted distance between corresponding corners of two frames, in voxels: allows for rounding in file
-/// headers only.
+/// Largest accepted distance between corresponding corners of two frames of a sequence, in voxels: allows for rounding
+/// in file headers only.
 const GRID_TOLERANCE: f64 = 1e-3;
 
 impl Volume {
     /// Concatenates volumes on one grid, in order, into the frames of a 4D volume. A 4D volume contributes all its
     /// frames.
     ///
-    /// If `frame_seconds` is `None`, that of the first volume is used. The affine is that of the first volume.
+    /// If `frame_seconds`, the time between frames, is `None`, that of the first volume is used. The affine is that of
+    /// the first volume.
     ///
     /// # Errors
-    /// No frame; a frame whose dimensions, space or unit differ from those of the first, or its position by more than a
-    /// thousandth of a voxel; a time that is negative or not finite; [`VolumeError::TooLarge`].
+    /// No volumes; a volume whose dimensions, space or unit differ from those of the first, or its position by more
+    /// than a thousandth of a voxel; a `frame_seconds` that is negative or not finite; [`VolumeError::TooLarge`].
     pub fn from_frames(frames: &[Volume], frame_seconds: Option<f64>) -> Result<Volume, VolumeError> {
         let Some(first) = frames.first() else {
             return Err(VolumeError::invalid("frames", "must contain at least one volume"));
@@ -41,8 +42,8 @@ impl Volume {
     }
 }
 
-/// Returns the stored values of all frames, and their common slope and intercept; if frames differ in these or in their
-/// type, the intensities as `f32`, slope 1 and intercept 0.
+/// Returns the stored values of all frames of the volumes, and their common slope and intercept; if the volumes differ
+/// in these or in their numeric type, the intensities as `f32`, slope 1 and intercept 0.
 fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
     let (slope, intercept) = (frames[0].slope, frames[0].intercept);
     if frames.iter().all(|f| f.slope == slope && f.intercept == intercept) {

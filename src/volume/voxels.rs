@@ -23,7 +23,7 @@ pub enum Voxels {
     F64(Vec<f64>),
 }
 
-/// Evaluates an expression with `$values` bound to the typed vector of `$voxels`, whatever its type.
+/// Evaluates an expression with `$values` bound to the typed vector inside `$voxels`, whatever its numeric type.
 macro_rules! each {
     ($voxels:expr, $values:ident => $body:expr) => {
         match $voxels {
@@ -56,12 +56,12 @@ impl Voxels {
         each!(self, values => number_at(values, index))
     }
 
-    /// Returns the smallest and largest finite value, or `None` if there is none.
+    /// Returns the smallest and largest finite stored value, or `None` if no value is finite.
     pub(crate) fn finite_range(&self) -> Option<[f64; 2]> {
         each!(self, values => finite_range(values))
     }
 
-    /// Converts `values` to the voxel type of `self`; for integer types they are rounded and clamped to the range of
+    /// Converts `values` to the voxel type of `self`; for integer types, values are rounded and clamped to the range of
     /// the type, and NaN becomes 0.
     ///
     /// # Errors
@@ -125,8 +125,8 @@ impl Voxels {
         })
     }
 
-    /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ or there are
-    /// none.
+    /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ or `parts` is
+    /// empty.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].

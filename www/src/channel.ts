@@ -1,7 +1,10 @@
 import type { Failure } from './protocol';
 import { text } from './texts';
 
-/** A request that a worker could not fulfil. `code` is that of a VesicleError, or 'internal' if the engine broke. */
+/**
+ * Error of a request that a lab's worker could not fulfil. `code` is that of a VesicleError, or 'internal' if the
+ * engine (the worker's WebAssembly module) broke.
+ */
 export class RequestError extends Error {
   readonly code: string;
 
@@ -12,7 +15,10 @@ export class RequestError extends Error {
   }
 }
 
-/** Converts any thrown value to a `Failure`; an error that is no `RequestError` gets the code 'page'. */
+/**
+ * Converts any thrown value to a `Failure`, the error code and message that the page displays; an error that is no
+ * `RequestError` gets the code 'page'.
+ */
 export function toFailure(error: unknown): Failure {
   if (error instanceof RequestError) return { code: error.code, message: error.message };
   return { code: 'page', message: error instanceof Error ? error.message : String(error) };
@@ -28,11 +34,14 @@ type RequestTable<Requests> = { [K in keyof Requests]: { body: unknown; reply: u
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
-/** Worker started before its channel exists; see {@link preloadWorker}. */
+/**
+ * Worker that {@link preloadWorker} has started and no {@link Channel} has taken over yet; undefined if there is none.
+ */
 let preloaded: { spawn: () => Worker; worker: Worker } | undefined;
 
 /**
- * Starts a worker for the next channel with the same `spawn`, so that it loads in parallel with the page's own code.
+ * Starts a lab's worker before the lab's own code is loaded, so that both load in parallel. The next {@link Channel}
+ * created with the same `spawn` takes the worker over.
  */
 export function preloadWorker(spawn: () => Worker): void {
   if (preloaded?.spawn === spawn) return;
@@ -53,7 +62,7 @@ function takeWorker(spawn: () => Worker): Worker {
   return worker;
 }
 
-/** The page's connection to a worker: requests return promises, events go to one listener. */
+/** The page's connection to a lab's worker: requests return promises, events go to one listener. */
 export class Channel<Requests extends RequestTable<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
@@ -82,12 +91,15 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     });
   }
 
-  /** Posts a message to the worker that has no reply. */
+  /** Posts a message that has no reply to the worker. */
   protected post(message: { kind: string }, transfer: Transferable[] = []): void {
     this.#worker.postMessage(message, transfer);
   }
 
-  /** Replaces the worker by a new one. Requests still pending at the old one are rejected with `failure`. */
+  /**
+   * Replaces the worker by a new one, after it broke or to cancel its work. Requests still pending at the old one are
+   * rejected with `failure`.
+   */
   restart(failure: Failure): void {
     this.#worker.terminate();
     this.#fail(failure);

@@ -7,13 +7,16 @@ export { RequestError, toFailure } from './channel';
 export const spawnExtract = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle' });
 
-/** The page's client of the Extract lab's worker. */
+/** The page's connection to the Extract lab's worker. */
 export class Client extends Channel<Requests, WorkerEvent> {
   constructor(onEvent: (event: WorkerEvent) => void) {
     super(spawnExtract, onEvent);
   }
 
-  /** Returns the buffers of a snapshot to the worker, which also tells it that the page is ready for the next one. */
+  /**
+   * Returns to the worker, for reuse, the arrays of a surface that is no longer drawn, which also tells it that the
+   * page is ready for the next surface.
+   */
   returnBuffers({ positions, normals, indices }: SurfaceBuffers): void {
     const message: ReturnMessage = { kind: 'return', buffers: { positions, normals, indices } };
     this.post(message, [positions.buffer, normals.buffer, indices.buffer]);

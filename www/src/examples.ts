@@ -5,16 +5,19 @@ import { text } from './texts';
 /** Unit of lengths in world space; empty if the file does not state one. */
 export type Unit = 'mm' | 'µm' | '';
 
-/** An example volume, with suitable settings and credits. */
+/** An example volume of the Extract lab, with suitable settings and credits. */
 export interface Example {
   id: string;
   name: string;
-  /** A file served with the page, or a computed shape. */
+  /** Source of the voxels: a file served with the page, or a shape that the worker computes. */
   source: { file: string } | { shape: Shape };
-  /** Unit of lengths in world space; empty if the file does not state one. */
+  /** Unit of lengths in the volume's world space; empty if the file does not state one. */
   unit: Unit;
   levels: number;
-  /** Target edge length on the finest level, in world units; if undefined, the model derives it from the voxel size. */
+  /**
+   * Target edge length of the surface on the finest pyramid level, in world units; if undefined, the model derives it
+   * from the voxel size.
+   */
   edge?: number;
   params: ParamValues & { iso: number };
   credit: string;
@@ -23,7 +26,7 @@ export interface Example {
 const HEAD_CREDIT = text('extractPresets.headCredit');
 const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
-/** The example volumes. The first one opens by default. */
+/** The example volumes of the Extract lab. The first one opens by default. */
 export const EXAMPLES: [Example, ...Example[]] = [
   {
     id: 'head-bone',

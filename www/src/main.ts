@@ -11,7 +11,10 @@ import { spawnSculpt } from './sculpt/client';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
-/** The labs, in the order of the navigation. If none is open yet, an empty or unknown address opens the first one. */
+/**
+ * The labs (the app's four pages), in the order of the navigation. If none is open yet, an empty or unknown address
+ * opens the first one.
+ */
 const LABS: [LabKind, ...LabKind[]] = [
   {
     id: 'extract',
@@ -48,7 +51,8 @@ const LABS: [LabKind, ...LabKind[]] = [
 ];
 
 /**
- * Switches between the labs on the page: one is open at a time; of the others only the address is kept, in its link.
+ * Opens and closes the labs on the page: one is open at a time. The address of a closed lab, which contains its
+ * settings, is kept in its link in the navigation.
  */
 class Labs {
   readonly #root: HTMLElement;
@@ -57,8 +61,8 @@ class Labs {
   #kind: LabKind | undefined;
   #lab: Lab | undefined;
   /**
-   * Number of times a lab was opened: tells whether another was opened while the code of one was loading, which is then
-   * dropped.
+   * Number of times a lab was opened. If it has increased by the time a lab's code is loaded, another lab was opened
+   * meanwhile, and that code is not used.
    */
   #turn = 0;
 

@@ -1,10 +1,13 @@
-/** Presets of the Extract lab: the paper's figures, on volumes that are served with the page or computed in it. */
+/**
+ * Presets of the Extract lab: figures of the paper by Lachaud and Montanvert, on volumes that are served with the page
+ * or computed in it.
+ */
 
 import { EXAMPLES, type Example } from './examples';
 import type { ParamValues } from './protocol';
 import { text } from './texts';
 
-/** Expected result of a converged run of a variant; tests run the variant and compare. */
+/** Expected result of running a variant of a figure until the model converges; tests run the variant and compare. */
 export interface Outcome {
   iterations: number;
   vertices: number;
@@ -12,13 +15,15 @@ export interface Outcome {
   genus: number;
 }
 
-/** One picture of a figure: the preset's volume with other parameters. */
+/**
+ * One picture of a figure of the paper, which a button selects: the preset's volume, with the picture's own parameters.
+ */
 export interface Variant {
   id: string;
-  /** Label of its button. */
+  /** Label of the button that selects the variant. */
   name: string;
   params: ParamValues;
-  /** Result in this app, as a sentence. */
+  /** Result of the variant in this app, as a sentence; displayed below the result reported in the paper. */
   ourResult: string;
   expected: Outcome;
 }
@@ -26,7 +31,7 @@ export interface Variant {
 /** A figure of the paper, as an example of the Extract lab. */
 export interface Preset extends Example {
   start: { kind: 'enclosing' } | { kind: 'bubbles'; bubbles: number } | { kind: 'isosurface' };
-  /** Result reported in the paper, as a sentence. */
+  /** Result of the figure reported in the paper, as a sentence to display. */
   paperResult: string;
   /** The pictures of the figure; the preset opens with the first. */
   variants: [Variant, ...Variant[]];
@@ -35,7 +40,7 @@ export interface Preset extends Example {
    * parameters.
    */
   startsOver?: boolean;
-  /** Advice on what to look at next, such as a panel of the page. */
+  /** Advice to the user on what to look at next, such as a panel of the page; displayed with the figure. */
   hint?: string;
   /** Whether the figure compares a direct with a coarse-to-fine run; if so, the panel of that comparison is opened. */
   compares?: boolean;
@@ -44,7 +49,7 @@ export interface Preset extends Example {
 const ENCLOSING = { kind: 'enclosing' } as const;
 const COMPUTED = text('extractPresets.computedHere');
 const CONTOUR = { kind: 'contour' } as const;
-/** Parameters of the method as published: one sampling distance everywhere, and Euler steps. */
+/** Parameters with which the deformable model works as published: one sampling distance everywhere, and Euler steps. */
 export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
 /** Base parameters of the presets: the iso force alone, so that each preset lists every other force that acts. */
 const BARE = { ...PAPER, isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
@@ -273,7 +278,7 @@ export const PRESETS: Preset[] = [
   },
 ];
 
-/** Returns the example or preset with this id. */
+/** Returns the example or preset of the Extract lab with this id, undefined if there is none. */
 export function exampleById(id: string): Example | undefined {
   return [...EXAMPLES, ...PRESETS].find((one) => one.id === id);
 }
@@ -283,8 +288,8 @@ export function isPreset(example: Example | undefined): example is Preset {
 }
 
 /**
- * Returns the first variant of a figure whose parameters, with those of the figure, are all in force; undefined if
- * there is none. Other parameters are ignored.
+ * Returns the first variant of `preset` whose parameters, together with the preset's, all have the same values in
+ * `params`, to highlight its button; undefined if there is none. Other parameters are ignored.
  */
 export function variantInForce(preset: Preset, params: ParamValues): Variant | undefined {
   return preset.variants.find((one) =>
@@ -292,7 +297,10 @@ export function variantInForce(preset: Preset, params: ParamValues): Variant | u
   );
 }
 
-/** Returns the start shape to use for an example: a preset's own; the contour for other examples and for files. */
+/**
+ * Returns the initial surface that is used by default: a preset's own, or the contour for other examples and, with
+ * undefined, for the user's files.
+ */
 export function defaultStart(example: Example | undefined): Preset['start'] | typeof CONTOUR {
   return isPreset(example) ? example.start : CONTOUR;
 }

@@ -28,7 +28,7 @@ export interface NamedBytes {
   bytes: Uint8Array;
 }
 
-/** Start shape of the surface. Lengths and positions are in world coordinates. */
+/** Initial surface of the deformable model. Lengths and positions are in world coordinates. */
 export type StartShape =
   | { kind: 'contour' }
   | { kind: 'enclosing' }
@@ -39,19 +39,25 @@ export type StartShape =
 /** Source of a volume: its files (one, a header and its data, or a DICOM or TIFF series), or a computed shape. */
 export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 
-/** All that a model is built from, besides the volume. */
+/** All that the worker builds a deformable model from, besides the volume. */
 export interface Setup {
   start: StartShape;
-  /** Number of coarser pyramid levels that the run starts with, besides the volume itself. */
+  /** Number of pyramid levels coarser than the volume; the run starts on the coarsest and ends on the volume itself. */
   levels: number;
-  /** Target edge length on the finest level, in world units; if undefined, the model derives it from the voxel size. */
+  /**
+   * Target edge length of the surface on the finest pyramid level, in world units; if undefined, the model derives it
+   * from the voxel size.
+   */
   edge: number | undefined;
   /** Parameters that differ from the defaults; without `iso` the worker chooses an iso value from the histogram. */
   params: ParamValues;
   attractors: Attractor[];
 }
 
-/** One coarser level of the volume's pyramid, reduced to 8 bits for display like the volume itself. */
+/**
+ * Voxels of one coarser level of the volume's pyramid or, in the Track lab, of one frame, reduced to 8 bits for display
+ * like the volume itself.
+ */
 export interface LevelView {
   dims: Vec3;
   voxels: Uint8Array;
@@ -77,14 +83,14 @@ export interface VolumeView {
   /** 4 × 4 affine matrix from voxel indices to world coordinates, column-major. */
   affine: Float64Array;
   space: 'RAS' | 'LPS';
-  /** Smallest and largest intensity. */
+  /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
-  /** The intensities displayed as black and as white. */
+  /** Intensities of the volume that are displayed as black and as white. */
   window: [number, number];
   /**
-   * Grey values, x fastest: 0 = black, 255 = white. Frame after frame if all frames were requested, else only the
-   * first.
+   * Grey values of the voxels for display, x fastest: 0 = black, 255 = white. Frame after frame if all frames were
+   * requested, else only the first.
    */
   voxels: Uint8Array;
 }
@@ -95,8 +101,8 @@ export interface Plane {
 }
 
 /**
- * Arrays of a surface that are transferred to the page and, in the Extract lab, back, so that none is allocated for
- * each surface sent. They may be longer than the part in use.
+ * Arrays of a surface that the worker transfers to the page and, in the Extract lab, the page transfers back for reuse,
+ * so that none is allocated for each surface sent. They may be longer than the part in use.
  */
 export interface SurfaceBuffers {
   positions: Float32Array;
@@ -104,17 +110,17 @@ export interface SurfaceBuffers {
   indices: Uint32Array;
 }
 
-/** A surface to draw. */
+/** A triangle mesh that a lab's worker sends to the page for drawing. */
 export interface Surface extends SurfaceBuffers {
   /** Number of vertices in use; the buffers may be longer. */
   vertices: number;
-  /** Number of triangles in use. */
+  /** Number of triangles in use; `indices` may be longer. */
   triangles: number;
   /** One value per vertex to colour the surface by, if a quantity was requested. */
   values?: Float32Array;
   /** Colours of the vertices, rgb in 0..1, if the mesh has them. */
   colors?: Float32Array;
-  /** Texture coordinates of the vertices, if a textured surface was requested. */
+  /** Texture coordinates of the vertices, packed uv, if a textured surface was requested. */
   uvs?: Float32Array;
 }
 
@@ -127,14 +133,17 @@ export interface Measures {
   report?: MeshReport;
 }
 
-/** Reply about a newly built model, before its first step. */
+/** Reply of the worker when it has built or restored a model. */
 export interface Ready {
   params: ParamValues;
-  /** Sampling distance δ of the model, in world units: edges are between δ and 2.5 δ long. */
+  /**
+   * Sampling distance δ of the model on its present pyramid level, in world units: unless the model adapts them
+   * locally, edges are between δ and 2.5 δ long.
+   */
   delta: number;
 }
 
-/** How much of the iso-surface the surface covers, and the iteration at which it was measured. */
+/** How much of the iso-surface the extracted surface covers, and the iteration at which it was measured. */
 export interface MeasuredCoverage extends Coverage {
   iteration: number;
 }
@@ -142,9 +151,9 @@ export interface MeasuredCoverage extends Coverage {
 /** Result and cost of one of the two runs of a comparison, direct or coarse to fine. */
 export interface ExtractionRun {
   levels: number;
-  /** Number of iterations, and total milliseconds of each part of a step, for each level; the coarsest first. */
+  /** Number of iterations, and total milliseconds of each part of a step, on each pyramid level; the coarsest first. */
   byLevel: { level: number; iterations: number; times: Record<string, number> }[];
-  /** Report of the last iteration. */
+  /** Report of the run's last iteration. */
   report: StepReport;
   info: MeshInfo;
 }
@@ -153,43 +162,53 @@ export interface Loaded extends Ready {
   volume: VolumeView;
 }
 
-/** Requests of the page: the body of each and its reply. */
+/** Requests of the page to the Extract lab's worker: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
   load: { body: { name: string; source: VolumeSource; setup: Setup }; reply: Loaded };
-  /** Builds a new model of the same volume. On failure, the previous model stays. */
+  /** Builds a new model of the open volume. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
-  /** Changes the given parameters of the live model; replies with all parameters in force. */
+  /** Changes the given parameters of the present model, also during a run; replies with all parameters in force. */
   setParams: { body: ParamValues; reply: ParamValues };
-  /** Sets the planes whose cross-sections with the surface are sent from now on. */
+  /** Sets the planes whose cross-sections with the surface are sent from now on, for the outlines on the slices. */
   planes: { body: Plane[]; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
-  /** Replies with `levels` coarser levels of the volume's pyramid, the finest first. */
+  /** Replies with `levels` coarser levels of the volume's pyramid for display, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
-  /** Sets the quantity whose values at the vertices are sent with the surface from now on; none if undefined. */
+  /**
+   * Sets the quantity whose values at the vertices are sent with the surface from now on, to colour it; none if
+   * undefined.
+   */
   quantity: { body: VertexQuantity | undefined; reply: undefined };
   /** Saves the present state of the run, also while it is running. */
   save: { body: undefined; reply: SavedRun };
   /** Restores a saved run of the same volume. */
   restore: { body: SavedRun; reply: Ready };
-  /** Runs the same extraction twice, direct and coarse to fine; undefined if cancelled. */
+  /**
+   * Runs the same extraction twice, direct and coarse to fine, to compare results and times; replies with undefined if
+   * cancelled.
+   */
   compare: { body: Setup; reply: { direct: ExtractionRun; coarseToFine: ExtractionRun } | undefined };
   cancelCompare: { body: undefined; reply: undefined };
-  /** Measures how much of the iso-surface the surface covers, also during a run; undefined if cancelled. */
+  /**
+   * Measures how much of the iso-surface the surface covers, also during a run; replies with undefined if cancelled.
+   */
   coverage: { body: undefined; reply: MeasuredCoverage | undefined };
   cancelCoverage: { body: undefined; reply: undefined };
-  /** Adds the components and cavities of the object that the surface misses; replies with their number. */
+  /** Adds to the surface the components and cavities of the object that it misses; replies with their number. */
   seed: { body: undefined; reply: number };
 }
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Returns buffers to the worker when the page no longer draws them; has no reply. */
+/**
+ * Message that returns to the worker, for reuse, the arrays of a surface that the page no longer draws; has no reply.
+ */
 export interface ReturnMessage {
   kind: 'return';
   buffers: SurfaceBuffers;
@@ -198,8 +217,8 @@ export type ToWorker = RequestMessage | ReturnMessage;
 
 export interface Failure {
   /**
-   * Code of a VesicleError; 'internal' if the engine broke and has to be restarted, 'page' for an error of the page
-   * itself.
+   * Code of a VesicleError; 'internal' if the engine (the worker's WebAssembly module) broke and has to be restarted,
+   * 'page' for an error of the page itself.
    */
   code: string;
   message: string;
@@ -211,13 +230,19 @@ export interface SnapshotEvent {
   surface: Surface;
   /** Pyramid level of the model at present; 0 is the finest. */
   level: number;
-  /** Cross-sections of the surface with the requested planes, each as segments: pairs of world points, packed xyz. */
+  /**
+   * Cross-sections of the surface with the planes set by the request `planes`, each as segments: pairs of world points,
+   * packed xyz.
+   */
   sections: Float32Array[];
   /** One report per step since the last snapshot or progress event. */
   reports: StepReport[];
   measures?: Measures;
 }
-/** Reports of steps without a snapshot, sent in batches when steps come faster than the page draws. */
+/**
+ * Event with the reports of steps for which no snapshot was sent, in batches, when steps come faster than the page
+ * draws.
+ */
 export interface ProgressEvent {
   event: 'progress';
   reports: StepReport[];
@@ -227,8 +252,8 @@ export interface SectionsEvent {
   sections: Float32Array[];
 }
 /**
- * State of the run: sent when a run starts and, after its last results, when it is done or was stopped; also after
- * single steps, in the Extract lab after seeding or restoring, and in the Track lab on request.
+ * Event with the state of a lab's run: sent when a run starts and, after its last results, when it is done or was
+ * stopped; also after single steps, in the Extract lab after seeding or restoring, and in the Track lab on request.
  */
 export interface StateEvent {
   event: 'state';
@@ -238,13 +263,16 @@ export interface FailureEvent {
   event: 'failure';
   failure: Failure;
 }
-/** Progress of a comparison: the report of a step of one of its runs. Not sent for each step. */
+/**
+ * Progress of the comparison of a direct with a coarse-to-fine run: the report of a step of one of the two runs. Sent
+ * for some steps only.
+ */
 export interface ComparisonProgressEvent {
   event: 'comparing';
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
-/** Progress of a coverage measurement, from 0 to 1. */
+/** Progress of a coverage measurement: `share` is from 0 to 1. */
 export interface CoverageProgressEvent {
   event: 'covering';
   share: number;

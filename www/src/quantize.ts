@@ -1,6 +1,6 @@
 /**
- * Writes `values` as bytes into `out` from `offset` on: linear from 0 at `window[0]` and below to 255 at `window[1]`
- * and above. NaN becomes 0; so do all values if the window is empty.
+ * Converts intensities to grey values for display: writes `values` as bytes into `out` from `offset` on, linear from 0
+ * at `window[0]` and below to 255 at `window[1]` and above. NaN becomes 0; so do all values if the window is empty.
  */
 export function quantize(values: Float32Array, window: [number, number], out: Uint8Array, offset: number): void {
   const [low, high] = window;

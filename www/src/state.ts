@@ -1,7 +1,7 @@
 /** State of a lab; set as `data-state` on the lab's element. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
-/** A value with subscribers. Setting an equal value notifies nobody. */
+/** A value with subscribers, which are called when it changes. Setting an equal value calls none. */
 export class Observable<T> {
   #value: T;
   readonly #subscribers = new Set<(value: T) => void>();

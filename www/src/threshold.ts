@@ -48,7 +48,10 @@ function variance(below: number, belowSum: number, count: number, sum: number): 
   return below * above * difference * difference;
 }
 
-/** Returns the quantiles of the intensities at the given fractions, up to half a bin, from a histogram over `range`. */
+/**
+ * Returns the quantiles of intensities at the given fractions (0 to 1), accurate to half a bin, from their histogram
+ * over `range`; used to choose the intensities displayed as black and as white.
+ */
 export function quantiles(histogram: ArrayLike<number>, range: [number, number], fractions: number[]): number[] {
   const { count } = totals(histogram);
   return fractions.map((fraction) => {

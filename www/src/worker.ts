@@ -31,8 +31,8 @@ import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
 /**
- * Sets of surface buffers: one on the screen, one in transit or being filled. With more, surfaces would be made that
- * are never drawn.
+ * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit
+ * or being filled. With more, surfaces would be made that are never drawn.
  */
 const BUFFER_SETS = 2;
 /**
@@ -63,12 +63,11 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
 class Session {
   #volume: Volume | undefined;
   #model: DeformableModel | undefined;
-  /** The intensities displayed as black and as white. */
+  /** Intensities of the volume that are displayed as black and as white. */
   #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
   #quantity: VertexQuantity | undefined;
   #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyArrays);
-  /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
@@ -184,8 +183,8 @@ class Session {
   }
 
   /**
-   * Sends the reports if there are enough for a batch, while snapshots are skipped: a thousand reports in one message
-   * cost the page a tenth of a second.
+   * Sends the step reports not sent yet if they fill a batch; called after steps without a snapshot. A thousand reports
+   * in one message cost the page a tenth of a second.
    */
   #flushReports(): void {
     if (this.#reports.length < MOST_REPORTS) return;
@@ -247,8 +246,8 @@ class Session {
   }
 
   /**
-   * Restores a saved run. Its state fits only a model with the same number of levels; if necessary, such a model is
-   * built, whose own start is replaced at once.
+   * Restores a saved run. Its state fits only a model with the same number of pyramid levels; if the present model has
+   * another number, one that fits is built first, and its own initial surface is replaced at once.
    */
   async #restore({ state, levels, iteration, done }: SavedRun): Promise<Ready> {
     await this.#pause();

@@ -17,7 +17,7 @@ use crate::volume::{LengthUnit, Space};
 /// The axes of an NRRD, in the order of the file, with the transform to world space.
 pub(super) struct Axes {
     axes: Vec<Axis>,
-    /// Index of the axis that counts frames, if there is one.
+    /// Index of the axis that counts frames; `None` if no axis does.
     frames: Option<usize>,
     world: World,
     affine: DAffine3,
@@ -25,7 +25,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// Reads the axes from the header and determines which one counts frames.
+    /// Reads the axes of an NRRD from its header and determines which one counts frames.
     pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
         let world = World::read(fields)?;
         let axes = axes(fields, &world)?;
@@ -53,7 +53,8 @@ impl Axes {
         dims
     }
 
-    /// Returns how many consecutive numbers in the file belong to the same frame.
+    /// Returns the number of consecutive numbers in the file that belong to the same frame, for reordering the voxels
+    /// frame by frame.
     pub(super) fn run(&self) -> usize {
         let faster = self.frames.unwrap_or(self.axes.len());
         self.axes[..faster].iter().map(|axis| axis.size).fold(1, usize::saturating_mul)
@@ -68,7 +69,8 @@ impl Axes {
         self.world.space
     }
 
-    /// Returns the unit of length that all spatial axes share; unknown if they differ.
+    /// Returns the unit of length that all spatial axes share; unknown if they differ, or if it is not metres,
+    /// millimetres or micrometres.
     pub(super) fn unit(&self) -> LengthUnit {
         let axes = in_space(&self.axes, self.frames);
         let units: Vec<&str> = match self.space_units[..] {
@@ -104,12 +106,12 @@ impl Axes {
     }
 }
 
-/// Returns the spatial axes, in the order of the file.
+/// Returns the spatial axes in the order of the file: all but the one with index `frames`, which counts frames.
 fn in_space(axes: &[Axis], frames: Option<usize>) -> impl Iterator<Item = &Axis> {
     axes.iter().enumerate().filter(move |&(i, _)| Some(i) != frames).map(|(_, axis)| axis)
 }
 
-/// Returns the index of the axis without a direction in space, which counts frames, if there is one.
+/// Returns the index of the axis without a direction in space, which counts frames; `None` if all axes are spatial.
 fn frame_axis_by_direction(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let mut frames = Vec::new();
     for (i, axis) in axes.iter().enumerate() {
@@ -132,8 +134,8 @@ fn frame_axis_by_direction(field: &Field<'_>, axes: &[Axis]) -> Result<Option<us
     }
 }
 
-/// Returns the index of the axis that counts frames according to kinds, units and spacings, if there is one; used if
-/// the file has no directions.
+/// Returns the index of the axis that counts frames according to kinds, units and spacings, `None` if all axes are
+/// spatial; used if the file has no directions.
 fn frame_axis_by_kind(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let signs = |axis: &Axis| (axis.kind, seconds(&axis.unit).is_some(), axis.spacing.is_nan());
     let Some(most) = axes.iter().map(signs).max() else { return Ok(None) };
@@ -151,7 +153,7 @@ fn frame_axis_by_kind(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     }
 }
 
-/// Returns the number of seconds in a unit of time; `None` if it is not one.
+/// Returns the number of seconds in a unit of time; `None` if `unit` is no known unit of time.
 fn seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "second" | "seconds" => Some(1.0),
@@ -161,8 +163,8 @@ fn seconds(unit: &str) -> Option<f64> {
     }
 }
 
-/// Returns the columns of the affine from one to three directions; missing axes get unit vectors perpendicular to the
-/// others.
+/// Returns the columns of the affine map from voxel index to world, from the directions of one to three spatial axes;
+/// missing axes get unit vectors perpendicular to the others.
 fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
     let directions: Vec<DVec3> = axes.iter().filter_map(|axis| axis.direction).map(|v| v.space).collect();
     match directions[..] {
@@ -176,8 +178,9 @@ fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
     }
 }
 
-/// Returns the columns of the affine of a file without directions: along the world axes, with the lengths in
-/// `spacings`, or 1 if those are missing or NaN. An error if the file gives the ends of axes instead.
+/// Returns the columns of the affine map from voxel index to world for a file without directions: along the world axes,
+/// with the lengths in `spacings`, or 1 if those are missing or NaN. An error if the file gives the ends of axes
+/// instead.
 fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     let Some(field) = fields.get("spacings") else {
         return match fields.get("axismaxs") {
@@ -198,8 +201,8 @@ fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], 
     Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
 }
 
-/// Returns the affine of the given columns and the file's origin, 0 if it has none; x is flipped if that converts the
-/// file's space to RAS or LPS.
+/// Returns the affine map from voxel index to world with the given columns and the file's origin, 0 if the file has
+/// none; x is flipped if that converts the file's space to RAS or LPS.
 fn affine_of(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
     let origin = fields.get("spaceorigin").map(|field| world.vector(&field, field.text)).transpose()?;
     let origin = origin.flatten().map(|v| v.space).filter(|v| !v.is_nan()).unwrap_or(DVec3::ZERO);

@@ -1,4 +1,4 @@
-//! Reading of the header's fields about each axis.
+//! Reading of the fields of an NRRD header that describe its axes.
 
 use super::FORMAT;
 use super::fields::Fields;
@@ -6,7 +6,7 @@ use super::world::{Vector, World};
 use crate::io::FormatError;
 use crate::io::text::Field;
 
-/// Supported kinds of axes, listed in error messages.
+/// Supported kinds of axes of an NRRD, listed in error messages.
 pub(super) const KINDS: &str = "domain or space for axes in space, list or time for the frame axis";
 
 /// One axis of an NRRD, as described by the header.
@@ -20,7 +20,7 @@ pub(super) struct Axis {
     pub(super) direction: Option<Vector>,
 }
 
-/// Kind of an axis; the later a kind is in this order, the less likely is the axis to be spatial.
+/// Kind of an NRRD axis; the later a kind is in this order, the less likely is the axis to be spatial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum AxisKind {
     Space,
@@ -37,7 +37,7 @@ impl AxisKind {
     }
 }
 
-/// Reads all axes, in the order of the file.
+/// Reads all axes of an NRRD from its header, in the order of the file.
 pub(super) fn axes(fields: &Fields, world: &World) -> Result<Vec<Axis>, FormatError> {
     let rank = rank(&fields.need("dimension")?)?;
     let sizes = fields.need("sizes")?.sizes(rank)?;
@@ -55,7 +55,7 @@ pub(super) fn axes(fields: &Fields, world: &World) -> Result<Vec<Axis>, FormatEr
     Ok(sizes.into_iter().enumerate().map(axis).collect())
 }
 
-/// Returns the number of axes, 1 to 4.
+/// Returns the number of axes of an NRRD from the field `dimension`; an error unless it is 1 to 4.
 fn rank(field: &Field<'_>) -> Result<usize, FormatError> {
     match field.integer(1)? {
         n @ 1..=4 => Ok(n as usize),
@@ -63,7 +63,7 @@ fn rank(field: &Field<'_>) -> Result<usize, FormatError> {
     }
 }
 
-/// Returns the double-quoted words of a field; none if it is missing.
+/// Returns the double-quoted words of the field `key`; none if the header lacks the field.
 pub(super) fn words(fields: &Fields, key: &'static str) -> Vec<String> {
     let text = fields.get(key).map_or("", |field| field.text);
     text.split('"').skip(1).step_by(2).map(|word| word.trim().to_owned()).collect()
@@ -121,12 +121,12 @@ fn directions(
 }
 
 /// Returns whether a zero direction marks an axis of this kind as not spatial, in a file of `rank` axes. With three
-/// axes it may also mean that the distance of the slices was unknown; such a file has no position in world space.
+/// axes, zero may also mean that the distance of the slices was unknown; such a file has no position in world space.
 fn zero_means_none(kind: AxisKind, rank: usize) -> bool {
     kind.counts_frames() || rank == 4 && kind != AxisKind::Space
 }
 
-/// Reads the vectors of a field, one per axis; `None` for the word `none`.
+/// Reads the vectors of a header field, one per axis; `None` for an axis with the word `none`.
 fn vectors(field: &Field<'_>, world: &World) -> Result<Vec<Option<Vector>>, FormatError> {
     // Spaces inside the parentheses are allowed: a vector ends at its ')'.
     let mut entries = Vec::new();

@@ -4,7 +4,8 @@ use super::FORMAT;
 use crate::io::FormatError;
 use crate::io::text::{Field, Lines};
 
-/// Fields of the standard, without spaces in their names. Any other is an error, as the standard requires.
+/// Names of the fields of the NRRD standard, in lower case without spaces. A header with any other is an error, as the
+/// standard requires.
 const KNOWN: [&str; 31] = [
     "content",
     "number",
@@ -45,7 +46,7 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    /// Reads the fields up to the blank line, or to the end of a detached header.
+    /// Reads the header fields up to the blank line, or to the end of a detached header.
     pub(super) fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
         let magic = lines.next_line().unwrap_or_default();
         if !matches!(magic.as_str(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
@@ -94,13 +95,13 @@ impl Fields {
         Ok(files)
     }
 
-    /// Returns the field with that name, if the header has it.
+    /// Returns the header field with the name `key`; `None` if it is missing.
     pub(super) fn get(&self, key: &'static str) -> Option<Field<'_>> {
         let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
         Some(Field { format: FORMAT, name: key, text })
     }
 
-    /// Returns the field with that name; an error if it is missing.
+    /// Returns the header field with the name `key`; an error if it is missing.
     pub(super) fn need(&self, key: &'static str) -> Result<Field<'_>, FormatError> {
         self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
     }

@@ -1,4 +1,4 @@
-//! Reordering of the voxels of an NRRD whose frame axis is not the slowest.
+//! Reordering of the voxels of an NRRD in which the voxels of a frame are not consecutive.
 
 use super::DATA;
 use crate::io::FormatError;

@@ -1,11 +1,11 @@
-//! Reader of NRRD versions 1 to 5: header and voxels in one file, or separate with the voxels as detached payload.
+//! Reader of NRRD versions 1 to 5: header and voxels in one file, or the voxels in a data file of their own.
 //!
 //! Up to three axes are spatial; one more, at any position among them, may count frames. Vectors and colours per voxel
 //! are rejected. Encodings: raw, text, hex, gzip. The space left-posterior-superior stays LPS; right-anterior-superior
-//! is RAS; left-anterior-superior becomes RAS by the sign of x; other spaces, and no space at all, keep their
-//! coordinates and are treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions,
-//! axes have the lengths in `spacings`, or 1 if those are unknown, too. The files of a list of data files are
-//! concatenated in order.
+//! is RAS; left-anterior-superior becomes RAS by the sign of x; in other spaces, or if none is named, coordinates are
+//! kept and treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions, axes have
+//! the lengths in `spacings`, or 1 if `spacings` are unknown, too. The files of a list of data files are concatenated
+//! in order.
 
 mod axes;
 mod axis;
@@ -33,10 +33,10 @@ pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD")
 }
 
-/// Reads an NRRD volume; `detached` is the payload if the header refers to a data file.
+/// Reads an NRRD volume; `detached` is the content of the data file, if the header refers to one.
 ///
 /// # Errors
-/// [`FormatError`] naming the header field.
+/// [`FormatError`] that names the header field at fault.
 pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     let mut lines = Lines::new(bytes);
     let fields = Fields::read(&mut lines)?;
@@ -51,7 +51,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source)
 }
 
-/// Encoding of the voxels in the file.
+/// Encoding of the voxels in an NRRD.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     Raw,
@@ -60,17 +60,17 @@ enum Encoding {
     Gzip,
 }
 
-/// A header that has been checked for consistency.
+/// The content of an NRRD header, checked for consistency.
 struct Header {
     scalar: Scalar,
     /// Number of voxels along x, y and z, and of frames.
     dims: [usize; 4],
-    /// Number of consecutive numbers in the file that belong to the same frame.
+    /// Number of consecutive numbers in the file that belong to the same frame; the voxels are reordered by it.
     run: usize,
     encoding: Encoding,
     big: bool,
     line_skip: usize,
-    /// Number of bytes before the voxels; `None` (-1 in the file) if the voxels are the last bytes.
+    /// Number of bytes to skip before the voxels; `None` (-1 in the file) if the voxels are the last bytes.
     byte_skip: Option<usize>,
     affine: DAffine3,
     space: Space,
@@ -79,7 +79,7 @@ struct Header {
 }
 
 impl Header {
-    /// Reads and checks all fields of the header.
+    /// Converts all fields of the header and checks them for consistency.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         let scalar = scalar(&fields.need("type")?)?;
         let encoding = encoding(&fields.need("encoding")?)?;
@@ -99,7 +99,8 @@ impl Header {
         })
     }
 
-    /// Returns the volume, with its voxels read from `source`.
+    /// Returns the volume that the header describes, with its voxels read from `source`: the bytes after the header, or
+    /// the data file.
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let voxels = self.voxels(self.after_lines(source)?)?;
         let volume = Volume::new(VolumeInit {
@@ -114,7 +115,7 @@ impl Header {
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 
-    /// Returns the bytes of `source` after the first `line_skip` lines.
+    /// Returns the bytes of `source` after the number of lines that the header says to skip (`line skip`).
     fn after_lines<'a>(&self, source: &'a [u8]) -> Result<&'a [u8], FormatError> {
         let mut rest = source;
         for _ in 0..self.line_skip {
@@ -126,7 +127,7 @@ impl Header {
         Ok(rest)
     }
 
-    /// Decodes the voxels in the bytes after the skipped lines.
+    /// Decodes the voxels from `source`, the bytes after the lines that the header says to skip.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         let count = size / self.scalar.size();
@@ -141,20 +142,22 @@ impl Header {
         }
     }
 
-    /// Decodes binary voxels, after the bytes to skip; `size` is their number of bytes.
+    /// Decodes the voxels from binary data, after skipping the bytes that the header says to skip (in hex, they were
+    /// skipped before conversion to binary); `size` is the number of bytes of the voxels.
     fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
         let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
         decode(DATA, payload(DATA, skipped, size)?, self.scalar, self.big)
     }
 
-    /// Returns the bytes after the first `byte_skip` ones; if the header gives -1, the last `size` bytes.
+    /// Returns the bytes after the number of bytes that the header says to skip (`byte skip`); if that is -1, the last
+    /// `size` bytes.
     fn after_bytes<'a>(&self, bytes: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.byte_skip.unwrap_or_else(|| bytes.len().saturating_sub(size));
         bytes.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "byte skip", skip, bytes.len()))
     }
 }
 
-/// Returns the number type that the field `type` names.
+/// Returns the number type of the voxels, which the field `type` names.
 fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     let words: Vec<&str> = field.text.split_whitespace().collect();
     Ok(match words.join(" ").as_str() {
@@ -197,7 +200,8 @@ fn encoding(field: &Field<'_>) -> Result<Encoding, FormatError> {
     }
 }
 
-/// Returns whether numbers are big-endian; false if the byte order does not matter, as for bytes and text.
+/// Returns whether the voxels in the file are big-endian; false if the byte order does not matter, as for 8-bit numbers
+/// and text.
 fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<bool, FormatError> {
     if scalar.size() == 1 || encoding == Encoding::Text {
         return Ok(false);

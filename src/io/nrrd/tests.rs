@@ -10,8 +10,8 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 const DIRECTED: &str = "space directions: (2,0,0) (0,3,0) (0,0,4)";
 
-/// Returns a file of 2 × 3 × 4 voxels in 2 frames whose frame axis has index `frames`. Each voxel's value is its index
-/// in the volume after reading: x fastest, then y, z and frames.
+/// Returns an NRRD file of 2 × 3 × 4 voxels in 2 frames whose frame axis has index `frames`. Each voxel's value is its
+/// index in the volume after reading: x fastest, then y, z and frames.
 fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     let mut sizes = vec![2, 3, 4];
     sizes.insert(frames, 2);
@@ -32,8 +32,8 @@ fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     [header.into_bytes(), (0..48).map(number).collect()].concat()
 }
 
-/// Returns a header field with one word per axis: `own` for the frame axis, whose index is `frames`, and `others` for
-/// the spatial axes.
+/// Returns an NRRD header field with one word per axis: `own` for the frame axis, whose index is `frames`, and `others`
+/// for the spatial axes.
 fn with(frames: usize, name: &str, others: [&str; 3], own: &str) -> String {
     let mut words = others.to_vec();
     words.insert(frames, own);
@@ -133,7 +133,7 @@ fn frames_by_kinds_units_and_spacings() {
     assert_eq!(volume.unit(), LengthUnit::Millimetre);
 }
 
-/// Reads a file of 24 numbers with the given header fields; returns its dimensions, its number of frames and the
+/// Reads an NRRD file of 24 numbers with the given header fields; returns its dimensions, its number of frames and the
 /// seconds between them.
 fn grid(fields: &[&str]) -> Result<([usize; 3], usize, f64), FormatError> {
     let fields = fields.join("\n");

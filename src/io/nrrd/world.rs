@@ -1,4 +1,5 @@
-//! The world space of an NRRD: its name, and vectors with as many numbers as it has dimensions.
+//! The world space of an NRRD: its name, and the vectors in the header, with as many components as the space has
+//! dimensions.
 
 use super::FORMAT;
 use super::fields::Fields;
@@ -15,13 +16,13 @@ pub(super) struct World {
     pub(super) space: Space,
     /// Whether the sign of x must be flipped to convert the file's coordinates to `space`.
     pub(super) flip_x: bool,
-    /// Whether the name of the space declares time as fourth dimension.
+    /// Whether the name of the space declares time as its fourth dimension.
     pub(super) has_time: bool,
-    /// Number of components of each vector in the header, if the header gives it.
+    /// Number of components that each vector in the header must have, if the header tells.
     dimension: Option<usize>,
 }
 
-/// A vector in world space and time; components that the file does not give are 0.
+/// A vector of an NRRD header in world space and time; components that the file does not give are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vector {
     pub(super) space: DVec3,
@@ -29,7 +30,7 @@ pub(super) struct Vector {
 }
 
 impl World {
-    /// Reads the world space from the header; RAS if it names none.
+    /// Reads the world space of an NRRD from the header; RAS if the header names none.
     pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
         match fields.get("space") {
             Some(field) => parse_space(&field),
@@ -40,7 +41,8 @@ impl World {
         }
     }
 
-    /// Parses a vector of two to four numbers such as `(x,y,z)` or `(x,y,z,t)`; `None` for `none`.
+    /// Parses a vector of two to four numbers such as `(x,y,z)` or `(x,y,z,t)`; `None` for the word `none`, which
+    /// stands for a missing vector.
     pub(super) fn vector(&self, field: &Field<'_>, text: &str) -> Result<Option<Vector>, FormatError> {
         let text = text.trim();
         if text == "none" {
@@ -66,7 +68,7 @@ impl World {
 }
 
 impl Vector {
-    /// Returns whether the spatial components are all NaN, which means the same as `none`.
+    /// Returns whether the spatial components are all NaN, which means the same as the word `none`: a missing vector.
     pub(super) fn is_unknown(&self) -> bool {
         self.space.is_nan_mask().all()
     }
@@ -76,7 +78,8 @@ impl Vector {
     }
 }
 
-/// Parses the name of a space. It may have spaces or nothing in place of hyphens, or be abbreviated like RAST.
+/// Parses the name of an NRRD world space. It may have spaces or nothing in place of hyphens, or be abbreviated, as
+/// RAST for right-anterior-superior-time.
 fn parse_space(field: &Field<'_>) -> Result<World, FormatError> {
     let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
     let name: String = letters.flat_map(char::to_lowercase).collect();
@@ -95,7 +98,7 @@ fn parse_space(field: &Field<'_>) -> Result<World, FormatError> {
     Ok(World { space, flip_x, has_time, dimension: Some(if has_time { 4 } else { 3 }) })
 }
 
-/// Returns the dimension of the space, 2 to 4.
+/// Returns the dimension of the world space from the field `space dimension`; an error unless it is 2 to 4.
 fn dimension(field: &Field<'_>) -> Result<usize, FormatError> {
     match field.integer(1)? {
         n @ 2..=4 => Ok(n as usize),

@@ -1,34 +1,38 @@
-//! Sleeping vertices: settled parts of the surface cost no computation.
+//! Sleeping vertices: settled parts of the surface are skipped, which saves computation.
 //!
-//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a
-//! level ends, the forces on all vertices are evaluated once, and vertices that have not settled wake.
+//! A vertex falls asleep after several iterations in a row with hardly any motion, and wakes when a neighbour moves or
+//! an edit reaches it. Before a pyramid level ends, the forces on all vertices are evaluated once, and vertices that
+//! have not settled wake.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// The count of still iterations in a row, those in which a vertex is slower than [`stillness`], from which on the
-/// vertex sleeps: it is left out, except when all vertices are processed, until something wakes it.
+/// The number of still iterations in a row, those in which a vertex is slower than [`stillness`], after which the
+/// vertex sleeps: it is skipped, except when all vertices are processed, until a neighbour moves fast or an edit
+/// reaches it. An implicit step counts twice.
 pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
-/// The speed below which a vertex is still, as a share of the speed at which all vertices would move if they were
-/// equally fast and their mean energy were the tolerance.
+/// The speed below which a vertex is still and may fall asleep, as a share of the common speed of all vertices at which
+/// their mean kinetic energy would equal the tolerance of convergence.
 const STILLNESS: f64 = 0.5;
 
-/// The share of sleeping vertices below which all vertices are processed, which takes no longer.
+/// The share of sleeping vertices below which all vertices are processed, asleep or not; this takes no longer than
+/// skipping so few.
 const FEW_ASLEEP: f64 = 0.25;
 
-/// The vertices awake in an iteration; buffers are kept between iterations.
+/// The vertices that one iteration of the deformable model processes; sleeping ones are skipped. Buffers are kept
+/// between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Awake {
-    /// The vertices processed in this iteration: those awake, or all.
+    /// The vertices processed in this iteration: those awake, or all if few sleep or all are to be examined.
     pub(super) moving: Vec<VertexId>,
-    /// The moving vertices and their neighbours, whose normals and L(x) the forces need.
+    /// The vertices in `moving` and their neighbours, whose normals and Laplacians L(x) the forces need.
     pub(super) with_neighbours: Vec<VertexId>,
     is_included: Vec<bool>,
 }
 
 impl Awake {
-    /// Collects the vertices with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, or all vertices if `all` is set
-    /// or fewer than [`FEW_ASLEEP`] of them sleep.
+    /// Selects the vertices to process: those with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, counted by the
+    /// attribute `still`, or all vertices if `all` is set or the share of sleeping ones is below [`FEW_ASLEEP`].
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();
@@ -54,7 +58,8 @@ impl Awake {
     }
 }
 
-/// Returns the speed along the normal, in δ per unit of time, below which a vertex is still.
+/// Returns the speed along the normal, in δ per unit of time, below which a vertex is still and may fall asleep; δ is
+/// the lower bound of the edge length.
 pub(super) fn stillness(mass: f64, energy_tolerance: f64) -> f32 {
     (STILLNESS * (2.0 * energy_tolerance / mass).sqrt()) as f32
 }

@@ -1,61 +1,67 @@
-//! Adjustments on coarse levels of the pyramid, which need a surface near the result quickly, not an exact one; and the
-//! amplification of α_I in faint images.
+//! Adjustments of the iso value π_I and of α_I, the strength of the image force, on coarse levels of the image pyramid,
+//! which need a surface near the result quickly, not an exact one; and the amplification of α_I in faint images.
 
 use super::image::Pyramid;
 use super::{DeformableParams, Integrator};
 
-/// The offset of the iso value from π_I, towards the background, on coarse levels of runs that do not seed, as a share
-/// of the difference between π_I and the mean intensity of the background.
+/// The offset of the iso value from π_I towards the background, on coarse pyramid levels of runs that do not seed
+/// missing parts, as a share of the difference between π_I and the mean intensity of the background.
 ///
-/// A wall thinner than the contact distance of a coarse level is pierced and eroded from there, and rigidity keeps it
-/// from growing back on a finer one. At an iso value a little outside, where the blurred wall is thicker, it is kept;
-/// the finer level removes the excess, since the surface comes from outside anyway. On computed tomographies the area
-/// found through one coarse level was 1.2 % to 15 % too small without the offset, and is up to 0.9 % off with it; with
-/// 0.4 and more the finest level takes many iterations.
+/// A wall thinner than the contact distance of a coarse level is pierced and eroded from the hole, and rigidity keeps
+/// it from growing back on a finer level. At an iso value nearer to the background the blurred wall is thicker and is
+/// kept; the finer level removes the excess, since the surface comes from outside anyway. On computed tomographies the
+/// area found through one coarse level was 1.2 % to 15 % too small without the offset, and is up to 0.9 % off with it;
+/// with 0.4 and more the finest level takes many iterations.
 ///
-/// This is right for images of two classes only: in a computed tomography all soft tissue then counts as bone. The mean
-/// intensity next to the boundary was tried instead; it loses 1.7 % of the area of a skull. Runs that seed have no
-/// offset, since parts lost on a coarse level come back.
+/// The offset is right for images of two classes only: in a computed tomography all soft tissue then counts as bone.
+/// The mean intensity next to the boundary was tried instead of that of all background; it loses 1.7 % of the area of a
+/// skull. Runs that seed have no offset, since parts lost on a coarse level come back.
 const MARGIN: f32 = 0.35;
 
-/// The largest factor on the strength of the image force, α_I, on coarse levels with [`Integrator::Euler`] and
-/// [`Integrator::RungeKutta`].
+/// The largest factor by which coarse pyramid levels multiply α_I, the strength of the image force, with
+/// [`Integrator::Euler`] and [`Integrator::RungeKutta`].
 ///
-/// Where the image hardly differs from π_I, as in the soft tissue around bone, the surface creeps: with α_I unchanged
-/// it took 2,500 iterations of 3,000 to cross a head. The finest level undoes the effect of the factor in a few
-/// iterations; area and volume are the same within 0.1 %.
+/// Where the image hardly differs from the iso value π_I, as in the soft tissue around bone, the surface creeps: with
+/// α_I unchanged it took 2,500 iterations of 3,000 to cross a head. The finest level undoes the effect of the factor in
+/// a few iterations; area and volume of the result are the same within 0.1 %.
 const MAX_GAIN: f32 = 8.0;
 
-/// The smallest ratio of the rigidity α_c to the factor on α_I, unless that factor is 1, on coarse levels with
-/// [`Integrator::Euler`] and [`Integrator::RungeKutta`]. With less, the surface is drawn into holes that a coarse mesh
-/// cannot follow, and splits and merges there for ever.
+/// The smallest ratio of the rigidity α_c to the factor by which coarse pyramid levels multiply α_I, the strength of
+/// the image force, with [`Integrator::Euler`] and [`Integrator::RungeKutta`]; it limits that factor, but not to less
+/// than 1. With a smaller ratio, the surface is drawn into holes that a coarse mesh cannot follow, and splits and
+/// merges there for ever.
 const MIN_RIGIDITY: f32 = 0.025;
 
 /// The largest stiffness of the amplified image force, its change over one voxel of the finest level where the image is
-/// steep, in units of m/Δt². With more, the surface oscillates. It limits the factor on α_I on coarse levels with
-/// [`Integrator::Euler`] and [`Integrator::RungeKutta`].
+/// steep, in units of m/Δt², with m the mass of a vertex and Δt the time step. With more, the surface oscillates. It
+/// limits the factor on α_I, the strength of the image force, on coarse pyramid levels with [`Integrator::Euler`] and
+/// [`Integrator::RungeKutta`].
 const MAX_STIFFNESS: f32 = 1.0;
 
-/// The least steepness of the image at π_I: the difference between neighbouring voxels on opposite sides of it, as a
-/// share of the volume's intensity range, per voxel of the finest level. If the median is smaller, α_I is amplified by
-/// the ratio in runs with the implicit integrator that adapt to the image. A few voxels much brighter than all others
-/// make the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1
-/// to 0.6.
+/// The least steepness of the image at the iso value π_I: the difference between neighbouring voxels on opposite sides
+/// of π_I, as a share of the volume's intensity range, per voxel of the finest level.
+///
+/// If the median of these differences is smaller, the image is faint, as when a few voxels are much brighter than all
+/// others; rigidity would then pull the surface off its contour, slowly. In runs with the implicit integrator that
+/// adapt to the image, α_I, the strength of the image force, is therefore amplified by the ratio of this value to the
+/// median. Computed tomographies have 0.1 to 0.6.
 const MIN_STEEPNESS: f32 = 0.1;
-/// The largest factor by which α_I is amplified in faint images.
+/// The largest factor by which α_I, the strength of the image force, is amplified in images fainter than
+/// [`MIN_STEEPNESS`].
 const MAX_AMPLIFICATION: f32 = 1e4;
 
-/// The number of iterations of a level with the full factor on α_I, with [`Integrator::Euler`] and
-/// [`Integrator::RungeKutta`]. A head takes 300. If the factor did not decay then, a vertex where the image is steeper
-/// than usual could oscillate for ever: one on a tooth did, at an iso value at which the model converges with a factor
-/// of 4.
+/// The number of iterations for which a coarse pyramid level keeps its full factor on α_I, the strength of the image
+/// force, with [`Integrator::Euler`] and [`Integrator::RungeKutta`]. A head takes 300. If the factor did not decay
+/// after that, a vertex where the image is steeper than usual could oscillate for ever: one on a tooth did, at an iso
+/// value at which the model converges with a factor of 4.
 const FULL_GAIN_ITERATIONS: u32 = 600;
-/// The number of iterations between halvings of the factor on α_I that a level began with, the first of which follows
-/// [`FULL_GAIN_ITERATIONS`].
+/// The number of iterations between halvings of the factor by which a coarse pyramid level multiplies α_I, the strength
+/// of the image force; the first follows [`FULL_GAIN_ITERATIONS`].
 const HALVING_ITERATIONS: u32 = 100;
 
-/// Returns the normalised π_I of a level in runs without seeding, moved by [`MARGIN`] towards the background on coarse
-/// levels. In all runs the enclosing start surface is made around the voxels brighter than it.
+/// Returns the iso value π_I, normalised to the volume's intensity range, that a pyramid level uses in runs without
+/// seeding: on coarse levels it is moved by [`MARGIN`] towards the background. In all runs the enclosing start surface
+/// is made around the voxels brighter than this value.
 pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) -> f32 {
     let iso = pyramid.normalised(params.iso);
     let outside =
@@ -63,10 +69,10 @@ pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) ->
     outside.map_or(iso, |outside| iso + MARGIN * (outside - iso))
 }
 
-/// Returns the factor, at least 1, by which the strength of the image force, α_I, is multiplied on a level, for the
-/// normalised π_I `iso` and the δ `delta` of that level. With the implicit integrator it makes up for faint images on
-/// all levels if the model adapts to the image, and is 1 otherwise; with the others it speeds up coarse levels, and is
-/// 1 on the finest.
+/// Returns the factor, at least 1, by which a pyramid level multiplies α_I, the strength of the image force; `iso` is
+/// the normalised π_I of the level, `delta` its δ in voxels of the finest level. With the implicit integrator the
+/// factor makes up for faint images on all levels if the model adapts to the image, and is 1 otherwise; with the others
+/// it speeds up coarse levels, and is 1 on the finest.
 pub(super) fn gain(
     pyramid: &Pyramid,
     params: &DeformableParams,
@@ -86,8 +92,9 @@ pub(super) fn gain(
     [by_stiffness / stiffness, by_rigidity].into_iter().fold(MAX_GAIN, f32::min).max(1.0)
 }
 
-/// Returns the factor on α_I, at least 1, that is left of a level's `gain` after a number of iterations on that level;
-/// used with [`Integrator::Euler`] and [`Integrator::RungeKutta`].
+/// Returns the factor on α_I, the strength of the image force, that is left of a level's initial factor `gain` after a
+/// number of iterations on that level, at least 1. It decays so that no vertex oscillates for ever; used with
+/// [`Integrator::Euler`] and [`Integrator::RungeKutta`].
 pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
     let times = iterations.saturating_sub(FULL_GAIN_ITERATIONS).div_ceil(HALVING_ITERATIONS);
     // Eight halvings reduce any gain up to 256 to 1.
@@ -102,7 +109,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// The pyramid of a ramp along x from 0 to 1, quantised to `steps` steps.
+    /// Makes the pyramid of a test image whose intensity rises along x from 0 to 1 in `steps` equal steps.
     fn ramp(steps: f32) -> Pyramid {
         let value = |i: usize| ((i % 40) as f32 / 39.0 * steps).round_ties_even() / steps;
         let volume = Volume::new(VolumeInit {

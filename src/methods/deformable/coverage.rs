@@ -1,4 +1,5 @@
-//! Coverage: recall and precision of the model's surface against the iso-surface of the volume.
+//! Coverage: recall and precision of the model's surface against the iso-surface of the volume, and the parts that the
+//! model lacks.
 
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour};
@@ -7,15 +8,16 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
-/// The largest distance between a covered point and the other surface, in voxels of the finest level.
+/// The distance to the other surface, of model and iso-surface, up to which a point is covered, in voxels of the finest
+/// level.
 const COVERED_DISTANCE: f64 = 1.0;
 
-/// The largest side of the pieces of triangles, in voxels of the finest level: the covered share of a triangle is that
-/// of its pieces whose centroids are covered.
+/// The largest side of the pieces into which triangles are divided to measure coverage, in voxels of the finest level:
+/// the covered share of a triangle is that of its pieces whose centroids are covered.
 const PIECE: f32 = 1.0;
 
-/// The direction of rays that classify points as inside or outside; along no grid line, so that they rarely hit an
-/// edge.
+/// The direction of rays that classify points as inside or outside the model's surface; along no grid line, so that
+/// they rarely hit an edge.
 const RAY: Vec3 = Vec3::new(0.846_3, 0.311_7, 0.432_1);
 
 /// The agreement between the model's surface and the iso-surface of the volume.
@@ -36,15 +38,16 @@ pub struct Coverage {
 /// A connected part of the iso-surface whose triangles are not entirely within one voxel of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncoveredRegion {
-    /// A point on the part near its centroid, in world space.
+    /// A point on the region near its centroid, in world space, for marking the region in a view.
     pub position: DVec3,
-    /// The area of the part in square world units.
+    /// The area of the region in square world units.
     pub area: f64,
-    /// Whether the model lacks object or a cavity there.
+    /// Whether the model lacks a part of the object or a cavity at the region.
     pub kind: Missing,
 }
 
-/// The kind of part that a model lacks.
+/// The kind of part that a model lacks compared with the iso-surface of its volume; for reports of coverage and for
+/// seeding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// Part of the object is missing from the model: it lies outside the surface.
@@ -53,7 +56,8 @@ pub enum Missing {
     Cavity,
 }
 
-/// A measurement of [`Coverage`] that can be advanced in slices; it refers to the surface at the time it began.
+/// A measurement of [`Coverage`] that is advanced in slices of work, so that it does not block the caller; it refers to
+/// the surface at the time it began.
 #[derive(Clone, Debug)]
 pub struct CoverageSurvey {
     to_world: DAffine3,
@@ -61,7 +65,7 @@ pub struct CoverageSurvey {
     iso_tree: TriangleTree,
     model: TriangleMesh,
     model_tree: TriangleTree,
-    /// The number of triangles tested, first of the iso-surface, then of the model.
+    /// The number of triangles tested so far, first of the iso-surface, then of the model.
     tested: usize,
     /// By triangle of the iso-surface, for those tested so far: whether all of it is within one voxel of the model.
     is_covered: Vec<bool>,
@@ -104,7 +108,8 @@ impl DeformableModel {
 }
 
 impl CoverageSurvey {
-    /// Tests at most `triangles` more triangles, and returns the share of all triangles tested so far.
+    /// Tests at most `triangles` more triangles, and returns the progress from 0 to 1: the share of all triangles
+    /// tested so far.
     pub fn advance(&mut self, triangles: usize) -> f64 {
         let [of_iso, of_model] = [&self.iso_surface, &self.model].map(|mesh| mesh.triangles.len());
         let all = of_iso + of_model;
@@ -121,8 +126,8 @@ impl CoverageSurvey {
         if all == 0 { 1.0 } else { end as f64 / all as f64 }
     }
 
-    /// Tests a triangle of the iso-surface (`which` 0) or of the model (1) piece by piece, adds its areas to the sums,
-    /// and returns whether all of its pieces are covered.
+    /// Tests triangle `t` of the iso-surface (`which` 0) or of the model (1) piece by piece, adds its covered and total
+    /// area to the sums, and returns whether all of its pieces are within one voxel of the other surface.
     fn test(&mut self, which: usize, t: usize) -> bool {
         let (mesh, other) = [(&self.iso_surface, &self.model_tree), (&self.model, &self.iso_tree)][which];
         let corners = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
@@ -199,8 +204,8 @@ impl CoverageSurvey {
     }
 }
 
-/// Calls `visit` with the centroids of equal pieces of a triangle, whose sides are no longer than [`PIECE`] unless that
-/// takes more than 64 pieces along a side.
+/// Calls `visit` with the centroids of equal pieces of a triangle, from which its covered share is estimated. Sides of
+/// pieces are no longer than [`PIECE`] unless that takes more than 64 pieces along a side of the triangle.
 fn for_each_piece([a, b, c]: [Vec3; 3], mut visit: impl FnMut(Vec3)) {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / PIECE).ceil().clamp(1.0, 64.0) as u32;

@@ -1,4 +1,5 @@
-//! The region in which a surface may move. Without it a force that points outwards would inflate the surface for ever.
+//! The region in which a surface may move, a box around the image. Without it a force that points outwards would
+//! inflate the surface for ever.
 
 use crate::math::{Bounds, Vec3};
 
@@ -7,37 +8,38 @@ use crate::math::{Bounds, Vec3};
 const DOMAIN_SCALE: f32 = 1.5;
 
 /// 3^(1/4), the ratio of the half axes of the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 to the half sides of a box
-/// through whose corners it passes.
+/// through whose corners it passes; with it, a rounded box encloses the whole image.
 const THROUGH_CORNERS: f32 = 1.316_074;
 
-/// The largest ratio of the longest to the shortest half axis of the enclosing start surface; around flatter images the
-/// short ones are enlarged. The flatter the surface, the more its triangles are squashed before they can be resolved;
-/// at 33 some of them crossed.
+/// The largest ratio of the longest to the shortest half axis of the enclosing start surface; around flatter images and
+/// objects the short axes are lengthened. The flatter the surface, the more its triangles are squashed before edits
+/// repair them; at 33 some of them intersected.
 const MAX_ELONGATION: f32 = 6.0;
 
-/// The largest number of vertices of any surface. A vertex takes about 200 bytes, meshes are copied several times, and
-/// wasm32 has 4 GiB.
+/// The largest number of vertices of the surface of a deformable model, whatever its image. A vertex takes about 200
+/// bytes, meshes are copied several times, and wasm32 has 4 GiB.
 const MAX_VERTICES: f64 = 4e6;
 
 /// A box around the image in model space, in which all vertices must stay, with the rounded box that it is made from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Domain {
     pub(super) centre: Vec3,
-    /// The half axes of the rounded box around the whole image, which is the enclosing start surface if no object is
-    /// found to enclose.
+    /// The half axes, in model space, of the rounded box around the whole image, which is the enclosing start surface
+    /// if no object is found to enclose.
     pub(super) axes: Vec3,
     pub(super) bounds: Bounds,
 }
 
-/// Returns half axes of a rounded box, at least `around`, neither too short for a mesh with the sampling distance
-/// `delta` nor below the longest divided by [`MAX_ELONGATION`].
+/// Returns the half axes of a rounded box that encloses an image or object: those in `around`, lengthened where they
+/// are too short for a mesh with the lower edge bound `delta`, or below the longest divided by [`MAX_ELONGATION`].
 pub(super) fn rounded_axes(around: Vec3, delta: f32) -> Vec3 {
     let least = (4.0 * delta).max(around.max_element() / MAX_ELONGATION);
     around.max(Vec3::splat(least))
 }
 
 impl Domain {
-    /// Makes the domain of an image of `dims` voxels, for a surface that starts with the sampling distance `delta`.
+    /// Makes the domain of an image of `dims` voxels, for a surface that starts with δ, the lower edge bound, equal to
+    /// `delta` voxels.
     pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
         let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
         let axes = rounded_axes(Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))), delta);
@@ -48,20 +50,20 @@ impl Domain {
         }
     }
 
-    /// Returns the approximate number of vertices of the enclosing start surface: one per 2 δ² of the surface of a box
-    /// with the same half axes.
+    /// Returns the approximate number of vertices of the enclosing start surface for the lower edge bound `delta`, δ,
+    /// so that a start with too many is rejected: one per 2 δ² of the surface of a box with the same half axes.
     pub(super) fn enclosing_vertices(&self, delta: f32) -> usize {
         let [a, b, c] = (self.axes / delta).as_dvec3().to_array();
         (4.0 * (a * b + b * c + c * a)) as usize
     }
 
-    /// Returns the point of the domain nearest to `p`.
+    /// Returns the point of the domain nearest to `p`, in model space; vertices that would leave the domain move there.
     pub(super) fn clamp(&self, p: Vec3) -> Vec3 {
         p.clamp(self.bounds.min, self.bounds.max)
     }
 
-    /// Returns the largest number of vertices of a surface in the domain without unresolved contacts, one per cube of
-    /// side δ, but at most [`MAX_VERTICES`].
+    /// Returns the largest number of vertices, for the lower edge bound `delta`, δ, of a surface in the domain without
+    /// unresolved contacts: one per cube of side δ, but at most [`MAX_VERTICES`].
     pub(super) fn most_vertices(&self, delta: f32) -> usize {
         let cubes = ((self.bounds.max - self.bounds.min) / delta).as_dvec3().element_product();
         if cubes < MAX_VERTICES { cubes as usize } else { MAX_VERTICES as usize }

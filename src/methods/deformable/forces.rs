@@ -1,4 +1,4 @@
-//! Internal and external forces on the vertices (sections 3.7 and 3.8).
+//! Internal and external forces on the vertices of the deformable model (sections 3.7 and 3.8 of the paper).
 
 use super::contour::ObjectIs;
 use super::image::LevelImage;
@@ -7,12 +7,13 @@ use crate::math::{Mat3, Vec3};
 use crate::mesh::{Ring, VertexId};
 use crate::volume::CellCache;
 
-/// The speed along the normal, in δ per unit of time, above which the tangential part of rigidity acts in full.
+/// The speed along the normal, in δ per unit of time, above which the tangential parts of rigidity and of the
+/// attractors act in full; at lower speeds they fade out.
 ///
-/// The tangential part of f_c spaces vertices evenly while the surface moves. On a settled surface it would not end:
-/// vertices slide off ridges, edges there grow and are split, those beside shrink and are collapsed, and each edit
-/// displaces vertices, so that the energy never falls. Below 0.02 the sampling of slow fronts suffers; from 0.3 on
-/// sliding does not fade everywhere.
+/// The tangential part of the force of rigidity spaces vertices evenly while the surface moves. On a settled surface it
+/// would act for ever: vertices slide off ridges, edges there grow and are split, edges beside them shrink and are
+/// collapsed, and each edit displaces vertices, so that the energy never falls. Below 0.02 the sampling of slow fronts
+/// suffers; from 0.3 on sliding does not fade everywhere.
 const FULL_TANGENTIAL_SPEED: f32 = 0.1;
 
 /// The approximate distance from the contour, in voxels of the finest level, up to which rigidity may pull the surface:
@@ -20,7 +21,7 @@ const FULL_TANGENTIAL_SPEED: f32 = 0.1;
 const MAX_RIGIDITY_OFFSET: f32 = 0.1;
 
 /// The largest distance, in voxels of the finest level, between a vertex and the point on its normal at which the image
-/// is sampled for it, see [`Forces::mean_of_triangles`].
+/// is sampled for the force on it, see [`Forces::mean_of_triangles`].
 const MAX_INSET: f32 = 0.15;
 
 /// An [`Attractor`](super::Attractor), a point that attracts or repels the surface, in model space.
@@ -28,7 +29,8 @@ const MAX_INSET: f32 = 0.15;
 pub(super) struct LocalAttractor {
     pub(super) point: Vec3,
     pub(super) strength: f32,
-    /// Maps a displacement in model space to world space, divided by the radius of the attractor.
+    /// Maps a displacement in model space to world space, divided by the radius of the attractor: the length of the
+    /// result is 1 where the force ends.
     pub(super) in_radii: Mat3,
 }
 
@@ -49,13 +51,14 @@ pub(super) struct ForceScale {
     /// Whether the surface adapts to the image: the image limits rigidity along the normal, and is sampled at the mean
     /// of the triangles at a vertex instead of the vertex.
     adapts_to_image: bool,
-    /// Whether [`Forces::slope`] is needed, to limit rigidity or by the implicit integrator.
+    /// Whether [`Forces::slope`] has to be computed, to limit rigidity or for the implicit integrator.
     needs_slope: bool,
 }
 
 impl ForceScale {
-    /// Converts parameters to model units. `iso` is the normalised π_I, `gain` the factor on α_I, `delta` is δ in
-    /// voxels, and `voxel` is the length of a model unit in the world.
+    /// Converts parameters to model units. `iso` is the level's iso value, normalised to the volume's intensity range,
+    /// `gain` the level's factor on α_I, the strength of the image force, `delta` is δ in voxels, and `voxel` is the
+    /// length of a model unit in the world.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
         let yields = params.adapts_to_image();
         Self {
@@ -76,7 +79,7 @@ impl ForceScale {
     }
 
     /// Returns the image force per unit of difference between the iso value and the intensity: δ |α_I|, times the
-    /// level's gain.
+    /// level's gain. The implicit integrator and the limit of rigidity need it.
     pub(super) fn iso_stiffness(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }
@@ -93,31 +96,32 @@ pub(super) struct Field<'a> {
     pub(super) attractors: &'a [LocalAttractor],
 }
 
-/// The forces on the vertices and the quantities they depend on, by slot; buffers are kept between iterations.
+/// The forces on the vertices and the quantities they depend on, by vertex slot; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Forces {
     /// L(x), the vector from a vertex to the mean of its neighbours.
     laplacian: Vec<Vec3>,
     /// Unit normals of the vertices, outwards.
     pub(super) normal: Vec<Vec3>,
-    /// The absolute difference of Π over one voxel of the finest level along the normal; the stiffness of the image
-    /// force is proportional to it.
+    /// The absolute difference of the intensity Π, in 0..1, over one voxel of the finest level along the normal of each
+    /// vertex; the stiffness of the image force is proportional to it.
     pub(super) slope: Vec<f32>,
-    /// The image cell around each vertex at its last sample, which the next sample often reuses.
+    /// The image cell around each vertex at its last sample, cached because the next sample often reuses it.
     cells: Vec<CellCache>,
-    /// The sum of all forces.
+    /// The sum of all forces on each vertex, in model units.
     pub(super) force: Vec<Vec3>,
-    /// The time spent on force evaluation and not yet reported, in milliseconds.
+    /// The time spent on force evaluation and not yet added to a step report, in milliseconds.
     pub(super) milliseconds: f64,
 }
 
 impl Forces {
-    /// Discards the cached image cells, since the image changes.
+    /// Discards the cached image cells of all vertices, which is necessary when the pyramid level changes.
     pub(super) fn forget_image(&mut self) {
         self.cells.fill(CellCache::default());
     }
 
-    /// Computes the normals of some vertices, and L, the vectors from them to the means of their neighbours.
+    /// Computes the normals of `vertices` and their Laplacians, the vectors to the means of their neighbours, from
+    /// which the forces are evaluated.
     pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
@@ -141,8 +145,8 @@ impl Forces {
         }
     }
 
-    /// Computes the forces on some vertices; needs [`Self::update_normals`] of them and their neighbours at the same
-    /// positions.
+    /// Computes the forces on `vertices` and stores them in [`Self::force`]; needs [`Self::update_normals`] of them and
+    /// their neighbours at the same positions.
     pub(super) fn evaluate(
         &mut self,
         rings: &[Ring],
@@ -198,9 +202,10 @@ impl Forces {
         (normal_part + along) * scale.rigidity
     }
 
-    /// Returns the approximate mean position of the triangles at a vertex. With corners on a sphere of radius r,
-    /// triangles of edge l lie l²/8r inside it, a quarter of the length of L(x). The image is sampled there, so that
-    /// the surface encloses the volume of the contour; with vertices on the contour the volume would be too small.
+    /// Returns the approximate mean position of the triangles at a vertex. The image is sampled there, so that the
+    /// surface encloses the volume of the contour; with vertices on the contour the volume would be too small. With
+    /// corners on a sphere of radius r, triangles of edge l lie l²/8r inside it, a quarter of the distance between a
+    /// vertex and the mean of its neighbours.
     #[inline]
     fn mean_of_triangles(&self, v: usize, x: Vec3) -> Vec3 {
         let normal = self.normal[v];
@@ -208,8 +213,8 @@ impl Forces {
         x + normal * inset.clamp(-MAX_INSET, MAX_INSET)
     }
 
-    /// Returns the absolute difference of the intensity Π, in 0..1, over one voxel of the finest level along the
-    /// normal.
+    /// Returns the absolute difference of the intensity Π, in 0..1, over one voxel of the finest level along the normal
+    /// of a vertex: how steep the image is there.
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
@@ -217,16 +222,16 @@ impl Forces {
         (at(x + half) - at(x - half)).abs()
     }
 
-    /// Returns the largest force of rigidity along the normal that the image balances, so that no settled vertex is
-    /// further than 4/3 [`MAX_RIGIDITY_OFFSET`] from the contour.
+    /// Returns the largest force of rigidity along the normal of a vertex that the image force balances, so that no
+    /// settled vertex is further than 4/3 [`MAX_RIGIDITY_OFFSET`] from the contour.
     #[inline]
     fn rigidity_limit(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> f32 {
         scale.iso_stiffness() * (MAX_RIGIDITY_OFFSET * self.slope[v] + 0.25 * iso_difference.abs())
     }
 
     /// Returns a force with its tangential part faded out as the surface settles, faster than that of rigidity; used
-    /// for attractors. Their tangential part would otherwise draw the surrounding vertices to a point, where they are
-    /// collapsed, again and again.
+    /// for attractors. Their tangential part would otherwise draw the surrounding vertices to a point, where edges are
+    /// collapsed again and again.
     fn fade_tangential(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
         let normal = self.normal[v];
         let across = normal * force.dot(normal);
@@ -234,8 +239,8 @@ impl Forces {
         across + (force - across) * (speed * speed).min(1.0)
     }
 
-    /// Returns the difference π_I − Π(x) between the iso value and the intensity at a vertex, normalised; sampled at
-    /// the mean position of the triangles at the vertex if the surface adapts to the image.
+    /// Returns the difference π_I − Π(x) between the iso value and the intensity at a vertex, both normalised, for the
+    /// image force; sampled at the mean position of the triangles at the vertex if the surface adapts to the image.
     #[inline]
     fn iso_difference(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let p = if scale.adapts_to_image { self.mean_of_triangles(v, x) } else { x };
@@ -243,7 +248,7 @@ impl Forces {
     }
 
     /// Returns the image force, which moves a vertex along its normal n towards the iso-surface: f_I = δ α_I (π_I −
-    /// Π(x)) n (7), with α_I multiplied by the level's gain.
+    /// Π(x)) n (7), with α_I multiplied by the level's gain, π_I the iso value and Π the intensity.
     #[inline]
     fn iso_force(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> Vec3 {
         self.normal[v] * (scale.delta * scale.iso_force * iso_difference)
@@ -259,7 +264,8 @@ impl Forces {
     }
 }
 
-/// Returns the rest length d of the springs in model units; 0, whatever the mean, if the springs have no stiffness.
+/// Returns the rest length d, in model units, of the edges as springs. [`RestLength::Mean`] gives 0 if the springs have
+/// no stiffness, which saves computing the mean.
 fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     match scale.rest {
         RestLength::Zero => 0.0,
@@ -278,8 +284,8 @@ fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     }
 }
 
-/// Returns the force of the edges of a vertex as springs, per unit of stiffness, f_e / α_e: the sum over its neighbours
-/// y of (|y − x| − d)(y − x)/|y − x|, with the rest length d (6).
+/// Returns the force of the edges of a vertex at x as springs, per unit of stiffness, f_e / α_e: the sum over its
+/// neighbours y of (|y − x| − d)(y − x)/|y − x|, with the rest length d (6).
 fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     ring.as_slice().iter().fold(Vec3::ZERO, |sum, w| {
         let edge = positions[w.index()] - x;
@@ -288,7 +294,8 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     })
 }
 
-/// Returns the force of an attractor at a position: a spring to its point that fades out smoothly at its radius.
+/// Returns the force of an attractor at a position x in model space: a spring to the attractor's point that fades out
+/// smoothly at its radius.
 fn attraction(attractor: &LocalAttractor, x: Vec3) -> Vec3 {
     let offset = attractor.point - x;
     let far = (attractor.in_radii * offset).length_squared();

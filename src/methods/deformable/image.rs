@@ -11,8 +11,8 @@ use crate::volume::{CellCache, Grid, VectorGrid, Volume};
 /// that of √3 refinement, by which the mesh gets finer (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
-/// The largest absolute value of an intensity given by the caller, such as π_I, once it is normalised; within it no
-/// force overflows.
+/// The largest absolute value of an intensity given by the caller, such as the iso value π_I, once it is normalised;
+/// within it no force overflows.
 const MAX_NORMALISED: f64 = 100.0;
 
 /// One level of the image pyramid, sampled at positions in model space.
@@ -20,7 +20,7 @@ const MAX_NORMALISED: f64 = 100.0;
 pub(super) struct LevelImage {
     grid: Grid,
     gradient: Option<VectorGrid>,
-    /// Voxel index of this level = position · scale + offset.
+    /// Maps positions in model space to this level, together with `offset`: voxel index = position · scale + offset.
     scale: Vec3,
     offset: Vec3,
 }
@@ -36,15 +36,17 @@ impl LevelImage {
         p * self.scale + self.offset
     }
 
-    /// Returns Π, the trilinearly interpolated intensity in 0..1, and `background` outside the image, so that every
-    /// object ends at its border. `known` caches the image cell of the last call for the same vertex.
+    /// Returns Π, the trilinearly interpolated intensity in 0..1, at a position in model space, and `background`
+    /// outside the image, so that every object ends at its border. `known` caches the image cell of the last call for
+    /// the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
         self.grid.sample_padded(self.index(p), background, known)
     }
 
-    /// Returns ∇Π by the Sobel operator, per voxel of this level and with a length of at most `bound`; zero if
-    /// [`Self::prepare_gradient`] was not called.
+    /// Returns ∇Π, the gradient of the intensity by the Sobel operator, at a position in model space, for the gradient
+    /// force; per voxel of this level and with a length of at most `bound`; zero if [`Self::prepare_gradient`] was not
+    /// called.
     #[inline]
     pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
         let Some(field) = &self.gradient else { return Vec3::ZERO };
@@ -53,7 +55,7 @@ impl LevelImage {
         if length > bound { gradient * (bound / length) } else { gradient }
     }
 
-    /// Computes the gradient image for [`Self::gradient`], unless that was done before.
+    /// Computes the gradient image that [`Self::gradient`] samples, unless that was done before.
     pub(super) fn prepare_gradient(&mut self) -> Result<(), MethodError> {
         if self.gradient.is_none() {
             self.gradient = Some(self.grid.sobel()?);
@@ -61,7 +63,8 @@ impl LevelImage {
         Ok(())
     }
 
-    /// Returns the mean of all intensities above `iso`, or of all below; `None` if there are none.
+    /// Returns the mean of all intensities above `iso` if `above` is set, otherwise of all below it; `None` if there
+    /// are none. It is used as the mean intensity of the background.
     pub(super) fn mean_beyond(&self, iso: f32, above: bool) -> Option<f32> {
         let beyond = self.grid.values.iter().filter(|&&value| if above { value > iso } else { value < iso });
         let (sum, count) = beyond.fold((0.0, 0), |(sum, count), &value| (sum + f64::from(value), count + 1));
@@ -82,7 +85,8 @@ impl LevelImage {
     }
 
     /// Returns the steepness of the image at `iso`: the root mean square of the differences between neighbouring voxels
-    /// on opposite sides of it, per model unit; 0 if there are none.
+    /// on opposite sides of `iso`, per model unit; 0 if there are none. It limits the factor on the image force on
+    /// coarse levels.
     pub(super) fn steepness(&self, iso: f32) -> f32 {
         let (mut sum, mut count) = (0.0f64, 0usize);
         self.for_each_iso_crossing(iso, |difference| {
@@ -93,8 +97,9 @@ impl LevelImage {
         mean.sqrt() as f32 * self.voxels_per_unit()
     }
 
-    /// Returns the steepness of the image at `iso` as [`Self::steepness`], but by the median, which a few edges much
-    /// steeper than the others do not affect.
+    /// Returns the median of the absolute differences between neighbouring voxels on opposite sides of `iso`, per model
+    /// unit; 0 if there are none. Unlike [`Self::steepness`], it is not affected by a few edges much steeper than the
+    /// others; faint images are recognised by it.
     pub(super) fn median_steepness(&self, iso: f32) -> f32 {
         let mut differences = Vec::new();
         self.for_each_iso_crossing(iso, |difference| differences.push(difference.abs()));
@@ -105,8 +110,8 @@ impl LevelImage {
         *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
     }
 
-    /// Calls `visit` with the signed difference of each pair of voxels that share a face and are on opposite sides of
-    /// `iso`.
+    /// Calls `visit` with the signed difference of intensity of each pair of voxels that share a face and are on
+    /// opposite sides of `iso`, from which the steepness of the image is computed.
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
@@ -125,7 +130,8 @@ impl LevelImage {
         }
     }
 
-    /// Returns the number of voxels of this level per model unit, along the axis on which it is largest.
+    /// Returns the number of voxels of this level per model unit, along the axis on which it is largest; it converts
+    /// lengths to voxels of the level.
     pub(super) fn voxels_per_unit(&self) -> f32 {
         self.scale.max_element()
     }
@@ -171,7 +177,8 @@ impl Pyramid {
         Ok(Self { levels, low: volume.range()[0], range: volume.span() })
     }
 
-    /// Maps an intensity such that the range of the volume becomes 0..1. Results are clamped to ±[`MAX_NORMALISED`].
+    /// Maps an intensity in the volume's units such that the range of the volume becomes 0..1. Results are clamped to
+    /// ±[`MAX_NORMALISED`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
         ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }

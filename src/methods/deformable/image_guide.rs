@@ -1,8 +1,8 @@
 //! Topology changes decided by the image.
 //!
-//! The paper joins all vertices nearer to each other than 2.5/√3 δ (3), and cuts every neck whose edges are shorter
-//! than δ. Each wall, gap, strand and tunnel thinner than that is lost. Here the image is sampled first: a wall or a
-//! strand is kept if there is object in it, a gap or a tunnel if there is background in it.
+//! The paper joins all non-adjacent vertices nearer to each other than 2.5/√3 δ (3), and cuts every neck whose edges
+//! are shorter than δ. Each wall, gap, strand and tunnel thinner than that is lost. Here the image is sampled first: a
+//! wall or a strand is kept if there is object in it, a gap or a tunnel if there is background in it.
 
 use super::DeformableParams;
 use super::contour::ObjectIs;
@@ -12,11 +12,12 @@ use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{TopologyGuide, Unguided};
 use crate::volume::CellCache;
 
-/// The positions of the image samples between two vertices in contact, as shares of the distance.
+/// The positions of the image samples between two vertices in contact, as shares of their distance; the samples decide
+/// whether the vertices may be joined.
 const SAMPLES: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The cosine above which two vertices face each other: for joins, between the normal of each and the direction to or
-/// from the other; for collapses, between one normal and the reverse of the other.
+/// The cosine above which two vertices face each other across a wall or a gap: for joins, between the normal of each
+/// and the direction to or from the other; for collapses, between one normal and the reverse of the other.
 const FACING: f32 = 0.3;
 
 /// The largest distance of a settled surface from its contour, in voxels of the finest level. The image decides on
@@ -49,8 +50,8 @@ impl<'a> ImageGuide<'a> {
         self.object.depth(intensity, self.iso)
     }
 
-    /// Whether all points are in the object if `is_object`, else in the background, with intensities that differ from
-    /// the iso value by at least `tolerance`.
+    /// Returns whether all points, in model space, are in the object if `is_object`, else in the background, with
+    /// intensities that differ from the iso value by at least `tolerance`.
     fn are_all(&self, is_object: bool, points: &[Vec3], tolerance: f32) -> bool {
         points.iter().all(|&p| {
             let depth = self.depth(p);
@@ -58,8 +59,9 @@ impl<'a> ImageGuide<'a> {
         })
     }
 
-    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It is 0 in
-    /// uniform object or background; at the contour it makes up for vertices that have settled off it.
+    /// Returns the tolerance with which intensities near some vertices are compared with the iso value to decide on a
+    /// topology change: the largest difference of intensity over [`MAX_OFFSET`] along the normals of the vertices. It
+    /// is 0 in uniform object or background; at the contour it makes up for vertices that have settled off it.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
@@ -72,8 +74,8 @@ impl<'a> ImageGuide<'a> {
     }
 }
 
-/// Returns what decides which topology changes are made: the image, if the parameters adapt the surface to it; else, as
-/// in the paper, all are allowed.
+/// Returns the rule that decides which topology changes are made: by the image, if the parameters adapt the surface to
+/// it; else, as in the paper, all are allowed.
 pub(super) fn guide<'a>(
     image: &'a LevelImage,
     iso: f32,
@@ -83,9 +85,9 @@ pub(super) fn guide<'a>(
 }
 
 impl TopologyGuide for ImageGuide<'_> {
-    /// Allows a tube across a gap, where the outward sides of the vertices face each other, if all samples in between
-    /// are object; and across a wall, where their inward sides do, if all are background. Two vertices that do not face
-    /// each other are on one sheet and are not joined.
+    /// Allows a join of two vertices by a tube across a gap, where the outward sides of the vertices face each other,
+    /// if all samples in between are object; and across a wall, where their inward sides do, if all are background. Two
+    /// vertices that do not face each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let (p, offset) = (mesh.position(u), mesh.position(v) - mesh.position(u));
         let [m, n] = [u, v].map(|w| offset.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
@@ -97,7 +99,8 @@ impl TopologyGuide for ImageGuide<'_> {
         self.are_all(is_gap, &SAMPLES.map(|share| p + offset * share), self.tolerance(mesh, &[u, v]))
     }
 
-    /// Allows a cut through a strand if its middle is background, and through a tunnel if its middle is object.
+    /// Allows a cut along the cycle of edges `ring` through a strand if its middle is background, and through a tunnel
+    /// if its middle is object.
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
@@ -108,7 +111,7 @@ impl TopologyGuide for ImageGuide<'_> {
     }
 
     /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
-    /// sides would merge, and at a rim the next pair of vertices would follow.
+    /// sheets would merge there, and at a rim the next pair of vertices would follow.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let [m, n] = [u, v].map(|w| mesh.area_normal(w).normalize_or_zero());
         if m.dot(n) >= -FACING {

@@ -80,9 +80,9 @@ use std::ops::RangeInclusive;
 /// Options for creating a [`DeformableModel`].
 #[derive(Clone, Debug)]
 pub struct DeformableOptions {
-    /// The frame of a 4D volume that the surface is fitted to.
+    /// The index of the frame of a 4D volume that the surface is fitted to.
     pub frame: usize,
-    /// The start surface.
+    /// The surface from which the run starts.
     pub start: Start,
     /// The number of pyramid levels above the volume itself; 0 evolves on the volume directly. In runs that do not seed
     /// missing parts, the surface settles a little outside the iso-surface on coarse levels, so that thin walls are not
@@ -91,7 +91,7 @@ pub struct DeformableOptions {
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
     /// default 1.53 times the side of a cube with the volume of a voxel.
     pub edge: Option<f64>,
-    /// The parameters; by default [`DeformableParams::for_volume`].
+    /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
 }
 
@@ -104,54 +104,57 @@ impl Default for DeformableOptions {
 /// A point set by the user that attracts, or repels, the surface within `radius`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Attractor {
-    /// The position in world space.
+    /// The position of the attractor in world space.
     pub point: DVec3,
-    /// The spring constant of the force towards the point; negative values repel.
+    /// The spring constant of the force towards the attractor, which fades to 0 at its radius; negative values repel.
     pub strength: f64,
-    /// The distance in world units beyond which the force is zero.
+    /// The distance from the attractor, in world units, beyond which its force is zero.
     pub radius: f64,
 }
 
-/// The mean edge length of a mesh within its edge bounds, in δ, measured on converged spheres and skulls.
+/// The mean edge length of a mesh within its edge bounds, in δ, measured on converged spheres and skulls; it converts
+/// the option `edge` to δ.
 const MEAN_EDGE: f64 = 1.7;
 
 /// The default δ on the finest level in voxels. It is near the upper end of the range that the paper gives, 0.693 to 1
 /// voxels (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
-/// The accepted range of δ on the finest level in voxels: with less, a mesh of the whole image does not fit into
-/// memory; with more, the mesh misses the object.
+/// The accepted range of δ, the lower edge bound, on the finest level in voxels: with less, a mesh of the whole image
+/// does not fit into memory; with more, the mesh misses the object.
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
 /// The largest absolute strength of an attractor; beyond it, forces overflow.
 const MAX_STRENGTH: f64 = 1e3;
-/// The largest radius and absolute coordinate of an attractor, in voxels; beyond it, forces overflow.
+/// The largest radius and absolute coordinate of an attractor, in voxels of the volume; beyond it, forces overflow.
 const MAX_ATTRACTOR_DISTANCE: f64 = 1e6;
 
-/// The distance in δ that a vertex travels before its edge bounds and contacts are checked again.
+/// The distance, in units of the lower edge bound δ, that a vertex travels before its edge bounds and contacts are
+/// checked again.
 const CHECK_TRAVEL: f32 = 0.1;
 
-/// The number of iterations in which each vertex that has moved at all is checked at least once. A criterion on speed
-/// would miss slow vertices that travel far.
+/// The number of iterations in which the edge bounds and contacts of each vertex that has moved at all are checked at
+/// least once. A criterion on speed would miss slow vertices that travel far.
 const CHECK_PERIOD: usize = 50;
 
 /// The share of live vertex slots below which the mesh is renumbered, which removes free slots.
 const MIN_OCCUPANCY: f32 = 0.7;
 
-/// The keys of the model's vertex attributes.
+/// The keys of the vertex attributes in which the model's mesh stores the state of its vertices.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     velocity: VectorKey,
-    /// The position at the last check of edge bounds and contacts.
+    /// The position of the vertex when its edge bounds and contacts were last checked.
     checked_position: VectorKey,
-    /// The count of still iterations in a row; from [`awake::ITERATIONS_TO_SLEEP`] on the vertex sleeps.
+    /// The number of still iterations of the vertex in a row; from [`awake::ITERATIONS_TO_SLEEP`] on it sleeps.
     still_iterations: ScalarKey,
-    /// The number of iterations since an edit made or displaced the vertex, without those in which it slept.
+    /// The number of iterations since an edit made or displaced the vertex, without those in which it slept; while it
+    /// is small, the speed of the vertex does not delay convergence.
     since_edit: ScalarKey,
-    /// The decaying count of recent reversals of the velocity along the normal, by which the implicit integrator
-    /// shortens steps.
+    /// The decaying count of recent reversals of the vertex's velocity along its normal, by which the implicit
+    /// integrator shortens steps.
     reversals: ScalarKey,
-    /// The size of the vertex less 1: the local δ is δ · (1 + this).
+    /// The size of the vertex, its factor on δ, less 1: the local δ is δ · (1 + this).
     size: ScalarKey,
 }
 
@@ -165,14 +168,15 @@ pub struct DeformableModel {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
-    /// Whether the start was [`Start::Contour`], even if that contour was empty.
+    /// Whether the start was [`Start::Contour`], even if that contour was empty; [`Seeding::Auto`] depends on it.
     from_contour: bool,
     finest_delta: f64,
     level: usize,
-    /// π_I on this level, normalised to the range of the volume; moved towards the background on coarse levels of runs
-    /// that do not seed missing parts.
+    /// The iso value π_I on the current pyramid level, normalised to the range of the volume; moved towards the
+    /// background on coarse levels of runs that do not seed missing parts.
     level_iso: f32,
-    /// The factor by which α_I is multiplied on this level, before it decays.
+    /// The factor by which α_I, the strength of the image force, is multiplied at the beginning of the current pyramid
+    /// level; it decays with the explicit integrators.
     image_force_factor: f32,
     mesh: Mesh,
     keys: Keys,
@@ -186,7 +190,8 @@ pub struct DeformableModel {
 }
 
 impl DeformableModel {
-    /// Creates the model of one frame of `volume` on the coarsest level, with its start surface within edge bounds.
+    /// Creates the model of one frame of `volume` on the coarsest pyramid level, with the edges of its start surface
+    /// within bounds.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for an option or parameter that is not accepted; [`MethodError::Mesh`] for a
@@ -267,8 +272,8 @@ impl DeformableModel {
         Ok(model)
     }
 
-    /// Runs one iteration of figure 9: moves the vertices, then restores edge bounds and resolves contacts around those
-    /// that travelled; descends one level if the surface has converged.
+    /// Runs one iteration of the paper's figure 9: moves the vertices, then restores edge bounds and resolves contacts
+    /// around those that travelled; descends one pyramid level if the surface has converged.
     ///
     /// Once the finest level has converged, calls change nothing and report `done`.
     ///
@@ -337,8 +342,8 @@ impl DeformableModel {
     }
 
     /// Returns the vertices whose edge bounds and contacts have to be checked, and marks them as checked: moving ones
-    /// that have travelled [`CHECK_TRAVEL`] since their last check, and in turn one in [`CHECK_PERIOD`] of all if it
-    /// has moved at all.
+    /// that have travelled [`CHECK_TRAVEL`] since their last check, and in turn one of every [`CHECK_PERIOD`] vertices
+    /// if it has moved at all.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
@@ -353,8 +358,8 @@ impl DeformableModel {
         active
     }
 
-    /// Restores edge bounds and resolves contacts around `active`, wakes the edited vertices and their neighbours, and
-    /// renumbers the mesh if too few of its slots are live.
+    /// Restores edge bounds and resolves contacts around the vertices `active`, wakes the edited vertices and their
+    /// neighbours, and renumbers the mesh if too few of its slots are live. Returns the numbers of edits.
     fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
@@ -381,7 +386,8 @@ impl DeformableModel {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
 
-    /// Whether each level is searched for parts of its contour that the mesh lacks, as the parameter `seeding` tells.
+    /// Returns whether each pyramid level is searched for parts of its contour that the mesh lacks, which are then
+    /// added; the parameter `seeding` decides.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
             Seeding::Auto => self.from_contour,
@@ -390,8 +396,8 @@ impl DeformableModel {
         }
     }
 
-    /// Also prevents self-intersections that arise when the surface is mapped to world space and rounded to single
-    /// precision; not where rounding is too coarse for that.
+    /// Makes collision handling also prevent self-intersections that arise when the surface is mapped to world space
+    /// and rounded to single precision, except where rounding is too coarse for that.
     fn watch_output(&mut self) {
         self.resolver.watch_output(self.to_world, &self.domain.bounds);
     }
@@ -408,7 +414,8 @@ impl DeformableModel {
         }
     }
 
-    /// Marks every vertex as checked, and counts the components.
+    /// Marks the edge bounds and contacts of every vertex as checked at its current position, and counts the connected
+    /// components.
     fn mark_checked(&mut self) {
         let positions = self.mesh.positions().to_vec();
         self.mesh.vector_mut(self.keys.checked_position).copy_from_slice(&positions);
@@ -433,7 +440,7 @@ impl DeformableModel {
         }
     }
 
-    /// Replaces all parameters from the next step on, and wakes all vertices.
+    /// Replaces all parameters from the next step on, and wakes all sleeping vertices; a finished run continues.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for values out of range, [`MethodError::Volume`] if the gradient image does not
@@ -449,12 +456,12 @@ impl DeformableModel {
         Ok(())
     }
 
-    /// The current parameters.
+    /// The current parameters of the model.
     pub fn params(&self) -> &DeformableParams {
         &self.params
     }
 
-    /// Replaces the attractors from the next step on, and wakes all vertices.
+    /// Replaces the attractors from the next step on, and wakes all sleeping vertices; a finished run continues.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if a number is not finite or too large, or a radius is not positive.
@@ -487,8 +494,8 @@ impl DeformableModel {
         self.attractors.iter().map(local).collect()
     }
 
-    /// Computes the quantities that depend on the level and the parameters: the gradient image if a gradient force
-    /// acts, π_I and the factor on α_I.
+    /// Computes the quantities that depend on the pyramid level and the parameters: the gradient image if a gradient
+    /// force acts, the iso value π_I and the factor on α_I, the strength of the image force.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
@@ -509,7 +516,8 @@ impl DeformableModel {
         self.level
     }
 
-    /// The δ of the current level in world units, averaged over directions if voxels are not cubes.
+    /// δ, the lower bound of the edge length, on the current pyramid level in world units, averaged over directions if
+    /// voxels are not cubes.
     pub fn delta(&self) -> f64 {
         f64::from(self.model_delta()) * self.voxel
     }
@@ -542,14 +550,15 @@ impl DeformableModel {
         self.mesh.vertices().zip(normals).map(along).collect()
     }
 
-    /// Sets the clock, in milliseconds, with which steps measure the duration of each part. By default all durations
-    /// are 0.
+    /// Sets the clock, in milliseconds, with which steps measure the durations in their reports. By default all
+    /// durations are 0.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 }
 
-/// Converts the option `edge`, in world units, to δ on the finest level in voxels; `None` gives [`DEFAULT_DELTA`].
+/// Converts the option `edge`, the mean edge length in world units, to δ on the finest level in voxels; `None` gives
+/// [`DEFAULT_DELTA`]. `voxel` is the side, in world units, of a cube with the volume of a voxel.
 fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
     let delta = edge / voxel / MEAN_EDGE;
@@ -563,7 +572,8 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     ))
 }
 
-/// Returns the δ of a level in voxels of the finest level; it grows by [`image::REDUCTION`] with each level (15).
+/// Returns δ, the lower bound of the edge length, on a pyramid level in voxels of the finest level; it grows by
+/// [`image::REDUCTION`] with each level (15).
 fn delta_at(finest: f64, level: usize) -> f32 {
     (0..level).fold(finest, |delta, _| delta * image::REDUCTION) as f32
 }

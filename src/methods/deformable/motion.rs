@@ -1,4 +1,4 @@
-//! Integration of the law of motion m ẍ + γ ẋ = f (4) over one iteration.
+//! Integration of the law of motion of the vertices, m ẍ + γ ẋ = f (4), over one iteration.
 
 use super::Keys;
 use super::awake::{Awake, ITERATIONS_TO_SLEEP, stillness};
@@ -19,20 +19,20 @@ pub(super) struct SpeedSummary {
     pub(super) fastest: f32,
 }
 
-/// The number of iterations in which a vertex displaced by an edit returns to the surface; until then its speed does
-/// not delay convergence.
+/// The number of iterations after an edit in which the vertices displaced by it return to the surface; until then their
+/// speeds do not delay convergence.
 pub(super) const ITERATIONS_AFTER_EDIT: f32 = 6.0;
 
-/// The number of still iterations counted in addition for a vertex that could not move at all without a
-/// self-intersection: it is pressed against others and will not move in the next iteration either.
+/// The number of still iterations added for a vertex that could not move at all without a self-intersection, so that it
+/// falls asleep sooner: it is pressed against others and will not move in the next iteration either.
 const STILL_IF_STUCK: f32 = 2.0;
 
-/// The number of still iterations that a still iteration with the implicit integrator counts as, since its steps are
-/// long.
+/// The number of still iterations, towards [`ITERATIONS_TO_SLEEP`], that a single one with the implicit integrator
+/// counts as, since its steps are long.
 const STILL_PER_IMPLICIT_STEP: f32 = 2.0;
 
-/// The speed above which a vertex wakes its neighbours, in multiples of the largest speed of a still vertex. A
-/// neighbour of valence six moves by at most a sixth of the displacement.
+/// The speed along its normal above which a vertex wakes its sleeping neighbours, in multiples of the largest speed of
+/// a still vertex. A neighbour of valence six moves by at most a sixth of the displacement.
 const WAKING_SPEED: f32 = 4.0;
 
 /// The stiffness of the force of rigidity, f_c, against displacing a vertex of valence 6 from its neighbours: force per
@@ -42,12 +42,12 @@ const BENDING_STIFFNESS: f32 = 1.3;
 /// neighbours: force per displacement, as a multiple of α_e. The implicit integrator uses it.
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
-/// The share of its speed that a vertex must keep after a reversal of its velocity for the reversal to be counted;
-/// weaker oscillations decay by themselves.
+/// The share of its speed that a vertex must keep after a reversal of its velocity for the implicit integrator to count
+/// the reversal, and so to shorten steps; weaker oscillations decay by themselves.
 const MIN_KEPT_SPEED: f32 = 0.5;
 
-/// The decrease of the count of reversals in an iteration without one: oscillations with periods of up to eight
-/// iterations accumulate.
+/// The decrease of a vertex's count of velocity reversals, by which the implicit integrator shortens steps, in an
+/// iteration without a reversal; with it, oscillations with periods of up to eight iterations accumulate.
 const REVERSAL_DECAY: f32 = 0.25;
 
 /// The image, parameters and constraints that act on the mesh in one iteration.
@@ -57,34 +57,35 @@ pub(super) struct MotionContext<'a> {
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
-    /// Whether all vertices are examined: the forces on all are evaluated, and only those that have not settled move.
+    /// Whether this iteration examines all vertices before the level ends: the forces on all are evaluated, and only
+    /// those that have not settled move.
     pub(super) examine_all: bool,
     pub(super) clock: fn() -> f64,
 }
 
-/// The integrator of the law of motion; buffers are kept between iterations.
+/// Moves the vertices by the law of motion; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion {
     pub(super) awake: Awake,
     pub(super) forces: Forces,
-    /// Displacements in this iteration, by slot; zero between iterations.
+    /// The displacements of the vertices in this iteration, by slot; zero between iterations.
     displacements: Vec<Vec3>,
 }
 
 impl Motion {
-    /// Selects the vertices to process, those awake or all if `examine_all`, and computes their normals and L, the
-    /// vectors to the means of their neighbours, and those of the neighbours.
+    /// Selects the vertices that [`Self::advance`] will process, those awake or all if `examine_all`, and computes
+    /// normals and Laplacians of these and of their neighbours.
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool) {
         self.awake.find(mesh, keys.still_iterations, examine_all);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
 
-    /// Moves the vertices by one iteration as far as `displace` allows, and returns their energy and largest speed;
-    /// needs [`Self::prepare`] for the current mesh.
+    /// Moves the vertices by one iteration as far as `displace` allows, and returns their mean energy and largest
+    /// speed, by which convergence is judged; needs [`Self::prepare`] for the current mesh.
     ///
     /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns
-    /// the vertices held back, each with the share of its displacement that it moved by.
+    /// the vertices held back, each with the share, from 0 to 1, of its displacement that it moved by.
     pub(super) fn advance(
         &mut self,
         mesh: &mut Mesh,
@@ -178,7 +179,8 @@ impl Motion {
         self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += velocity_change[i]);
     }
 
-    /// Evaluates the forces on the moving vertices at given positions, with the current normals.
+    /// Evaluates the forces on the moving vertices at given positions and velocities, with the normals last computed,
+    /// and adds up the time that this takes.
     fn evaluate_forces(
         &mut self,
         mesh: &Mesh,
@@ -211,8 +213,8 @@ impl Motion {
         }
     }
 
-    /// Keeps as moving, and wakes, the examined vertices whose displacement along the normal exceeds that of a still
-    /// vertex; stops the others.
+    /// Ends an examination of all vertices: wakes those whose displacement along the normal exceeds that of a still
+    /// vertex, and keeps them as moving; stops the others.
     fn wake_unsettled(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
         let stillness = stillness(context.params.mass, context.params.energy_tolerance);
         let least = stillness * context.params.step_length() as f32 * context.delta;
@@ -230,7 +232,8 @@ impl Motion {
         awake.moving.iter().for_each(|v| still[v.index()] = 0.0);
     }
 
-    /// Measures energy and largest speed, counts still iterations, and wakes fast vertices with their neighbours.
+    /// Measures the mean energy and the largest speed of the vertices along their normals, counts still iterations, and
+    /// wakes fast vertices with their neighbours.
     fn measure(&self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) -> SpeedSummary {
         let per_time = 1.0 / (context.params.step_length() as f32 * context.delta);
         let stillness = stillness(context.params.mass, context.params.energy_tolerance);
@@ -259,8 +262,8 @@ impl Motion {
     }
 }
 
-/// Returns the updated count of recent reversals of a vertex, given its speeds along the normal before and after a
-/// step.
+/// Returns the updated count of recent velocity reversals of a vertex, by which the implicit integrator shortens its
+/// steps, given its speeds along the normal before and after a step.
 fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if before * after >= 0.0 {
         return higher(reversals - REVERSAL_DECAY, 0.0);
@@ -269,14 +272,15 @@ fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if is_undamped { reversals + 1.0 } else { reversals }
 }
 
-/// Wakes a vertex and its neighbours.
+/// Wakes a vertex and its neighbours: they are processed again from the next iteration on.
 fn wake(mesh: &mut Mesh, keys: Keys, v: VertexId) {
     let (rings, still) = mesh.rings_and_scalar_mut(keys.still_iterations);
     still[v.index()] = 0.0;
     rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
 }
 
-/// Adds to the still iterations of a vertex; once there are enough it sleeps, and its velocity is set to zero.
+/// Adds `iterations` to the still iterations of a vertex; once there are enough it sleeps, and its velocity is set to
+/// zero.
 fn count_still(mesh: &mut Mesh, keys: Keys, v: VertexId, iterations: f32) {
     let still = &mut mesh.scalar_mut(keys.still_iterations)[v.index()];
     *still += iterations;

@@ -18,24 +18,24 @@ pub struct DeformableParams {
     /// β_g: strength of the gradient force along the tangent plane, which attracts vertices to bright ridges; negative
     /// values repel them.
     pub gradient_tangent: f64,
-    /// The length to which longer image gradients are shortened, as a share of the volume's intensity range, per voxel
-    /// of the level.
+    /// The length to which longer image gradients are shortened for the gradient force, as a share of the volume's
+    /// intensity range, per voxel of the pyramid level.
     pub gradient_bound: f64,
     /// α_c: rigidity, the resistance to changes of curvature.
     pub rigidity: f64,
-    /// α_e: stiffness of the edges as springs.
+    /// α_e: stiffness of the edges as springs; small values even out the triangles, large ones shrink the surface.
     pub stiffness: f64,
-    /// d: the rest length of the springs.
+    /// d: the rest length of the edges as springs.
     pub rest_length: RestLength,
     /// m: the mass of a vertex.
     pub mass: f64,
-    /// γ: the damping coefficient.
+    /// γ: the damping coefficient, the friction that slows vertices.
     pub damping: f64,
-    /// The integrator of the law of motion.
+    /// The integrator of the law of motion of the vertices.
     pub integrator: Integrator,
-    /// Δt: the time step; one iteration of [`Integrator::Implicit`] takes 16 of them.
+    /// Δt: the time step of an iteration; one iteration of [`Integrator::Implicit`] takes 16 of them.
     pub time_step: f64,
-    /// The largest displacement of a vertex in one iteration, as a fraction of δ.
+    /// The largest displacement of a vertex in one iteration, as a fraction of δ, the lower edge bound.
     pub max_move: f64,
     /// ε: the bound of the mean kinetic energy along the normals, ½ m (v·n)² / δ²; a level converges only below it.
     pub energy_tolerance: f64,
@@ -45,21 +45,22 @@ pub struct DeformableParams {
     /// distance alone; with any larger value, unless α_I is 0, the image decides on topology changes and limits
     /// rigidity, and edge lengths vary with the curvature in proportion to it.
     pub adaptivity: f64,
-    /// Whether parts of a level's contour that the mesh lacks are added to it.
+    /// Whether parts of a pyramid level's contour, its iso-surface, that the mesh lacks are added to the mesh.
     pub seeding: Seeding,
-    /// The least volume, in voxels of the volume, that a closed part or cavity must enclose to be in a contour. Seeds
-    /// may be pieces of parts, and need only 1/32 of it.
+    /// The least volume, in voxels of the volume, that a closed part or cavity must enclose to be in a contour; smaller
+    /// ones are treated as noise. Seeds, parts added to the mesh, may be pieces of such parts, and need only 1/32 of
+    /// it.
     pub smallest_part: f64,
 }
 
-/// The step of the implicit integrator, in time steps. With 4 it takes twice as many iterations; with 64, fronts that
-/// meet pass by openings before they settle.
+/// The step of the implicit integrator, as a multiple of the parameter `time_step`. With 4 it takes twice as many
+/// iterations; with 64, fronts that meet pass by openings before they settle.
 const IMPLICIT_STEP: f64 = 16.0;
 
-/// The rest length of the edges as springs.
+/// The rest length of the edges of the mesh, which act as springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RestLength {
-    /// No rest length: edges contract, and the surface tends to minimal area.
+    /// A rest length of 0: edges contract, and the surface tends to minimal area.
     Zero,
     /// The mean edge length of the mesh: edges tend to equal length.
     Mean,
@@ -67,7 +68,7 @@ pub enum RestLength {
     Given(f64),
 }
 
-/// The integrator of the law of motion.
+/// The numerical integrator of the law of motion of the vertices, m ẍ + γ ẋ = f.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
@@ -81,7 +82,7 @@ pub enum Integrator {
     Implicit,
 }
 
-/// Whether levels are searched for parts of their contour that the mesh lacks.
+/// Whether pyramid levels are searched for parts of their contour that the mesh lacks, so that these are added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Seeding {
@@ -89,7 +90,7 @@ pub enum Seeding {
     Auto,
     /// Levels are searched and missing parts added in all runs.
     On,
-    /// Levels are never searched for missing parts.
+    /// Levels are searched for missing parts only on request, by [`super::DeformableModel::seed`].
     Off,
 }
 
@@ -111,13 +112,13 @@ impl DeformableParams {
         Self { iso: 0.5 * (low + high), ..Self::default() }
     }
 
-    /// Returns the parameters of the paper: uniform δ and rigidity, contact by distance alone, its law of motion; the
-    /// others have their defaults.
+    /// Returns the parameters of the paper: uniform δ and rigidity, contact by distance alone, and integration by
+    /// Euler's method; the others have their defaults.
     pub fn as_published(volume: &Volume) -> Self {
         Self { adaptivity: 0.0, integrator: Integrator::Euler, ..Self::for_volume(volume) }
     }
 
-    /// Returns the time that passes in one iteration: Δt, or the long step of the implicit integrator.
+    /// Returns the time that passes in one iteration: Δt, or [`IMPLICIT_STEP`] times Δt with the implicit integrator.
     pub(super) fn step_length(&self) -> f64 {
         match self.integrator {
             Integrator::Implicit => IMPLICIT_STEP * self.time_step,
@@ -125,12 +126,13 @@ impl DeformableParams {
         }
     }
 
-    /// Whether sampling, topology and rigidity adapt to the image: the image force and `adaptivity` are not 0.
+    /// Returns whether sampling, topology and rigidity adapt to the image: neither the image force nor `adaptivity` is
+    /// 0.
     pub(super) fn adapts_to_image(&self) -> bool {
         self.iso_force != 0.0 && self.adaptivity > 0.0
     }
 
-    /// Checks every numerical value against its range.
+    /// Checks every numerical parameter against its accepted range.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and the accepted range.
@@ -139,7 +141,8 @@ impl DeformableParams {
         given.filter_map(|(spec, value)| Some((spec, value?))).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// Returns the numerical values in the order of [`SPECS`], `None` for the other parameters.
+    /// Returns the numerical parameters in the order of [`SPECS`], by which their ranges are checked; `None` for the
+    /// other parameters.
     fn numbers(&self) -> [Option<f64>; 18] {
         let rest = if let RestLength::Given(length) = self.rest_length { Some(length) } else { None };
         [
@@ -390,7 +393,8 @@ const SPECS: [ParamSpec; 18] = [
     },
 ];
 
-/// The human-readable form of a [`RestLength`]: a word or a length. Binary states store a single number instead.
+/// The form in which a [`RestLength`] is serialised in human-readable formats: a word or a length. Binary states store
+/// a single number instead.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum RestLengthWords {

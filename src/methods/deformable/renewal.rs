@@ -1,4 +1,5 @@
-//! Renewal: on a level change, components that lack part of the finer contour are replaced by it.
+//! Renewal: when a run descends to a finer pyramid level, components of the mesh that lack part of the finer contour
+//! are replaced by it.
 //!
 //! A coarse level shows no thin walls, and its surface would have to be opened, split and filled in hundreds of places
 //! before it fits the finer image. If a component of the contour has points far from the mesh, it replaces all
@@ -11,15 +12,16 @@ use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
-/// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the contour.
+/// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the finer level's
+/// contour, so that components near it are replaced.
 const COVERED_DISTANCE: f32 = 1.0;
 
-/// The components of the mesh to replace by parts of the finer level's contour on a level change.
+/// The components of the mesh to replace by parts of the finer level's contour when a run descends one pyramid level.
 #[derive(Default)]
 pub(super) struct Renewal {
-    /// A vertex of each component to remove from the mesh.
+    /// One vertex of each component to remove from the mesh, which identifies the component.
     pub(super) removed: Vec<VertexId>,
-    /// The parts of the finer contour to add instead.
+    /// The parts of the finer contour to add in place of the removed components.
     pub(super) added: Mesh,
 }
 

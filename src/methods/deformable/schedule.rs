@@ -1,4 +1,4 @@
-//! Convergence of a level, and the descent to the next (section 5.1, figures 12 and 13).
+//! Convergence of a pyramid level, and the descent to the next finer one (section 5.1, figures 12 and 13).
 
 use super::renewal::Renewal;
 use super::{DeformableModel, DeformableParams, Integrator, Topology, image_guide};
@@ -7,46 +7,51 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
-/// The number of quiet iterations in a row, those with energy and speed below their bounds, that convergence needs: a
-/// single one may be a turning point of an oscillation.
+/// The least number of quiet iterations in a row, those with energy and speed below their bounds, after which a pyramid
+/// level has converged: a single one may be a turning point of an oscillation.
 const QUIET_ITERATIONS: f64 = 3.0;
 
-/// The number of quiet iterations in a row that convergence needs with the implicit integrator on levels that did not
-/// begin on their contour, where the speed of the fastest vertex is bounded, too; long steps are damped and do not
-/// oscillate.
+/// The least number of quiet iterations in a row, those with energy and speed below their bounds, after which a pyramid
+/// level has converged with the implicit integrator, unless it began on its contour. Few suffice, since the speed of
+/// the fastest vertex is bounded, too, and long steps are damped and do not oscillate.
 const QUIET_LONG_STEPS: f64 = 2.0;
 
-/// The largest number of quiet iterations required, whatever the time step and the damping.
+/// The largest number of quiet iterations in a row, those with energy and speed below their bounds, that convergence
+/// requires, whatever the time step and the damping.
 const MAX_QUIET_ITERATIONS: f64 = 500.0;
 
-/// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such
-/// as a front in a hole; without this bound the model would stop before the front has passed.
+/// The largest speed of a vertex along its normal in a converged surface, in δ per unit of time. The mean energy hides
+/// a few moving vertices, such as a front in a hole; without this bound the model would stop before the front has
+/// passed.
 const SETTLED_SPEED: f32 = 0.03;
 
-/// The largest number of searches of the finest level for missing parts.
+/// The largest number of times that the finest level is searched for missing parts to add, so that the run comes to an
+/// end.
 const MAX_SEARCHES: u32 = 3;
 
-/// The largest displacement in one iteration of a converged surface, in δ.
+/// The largest displacement of a vertex along its normal in one iteration of a converged surface, in δ; with long time
+/// steps it is stricter than [`SETTLED_SPEED`].
 const SETTLED_DISPLACEMENT: f32 = 0.1;
 
-/// The state of convergence on the current level.
+/// The state of convergence on the current pyramid level, which decides when the level ends; part of a saved run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Convergence {
     quiet: u32,
-    /// Whether all vertices have been examined, the forces on them evaluated whether asleep or not, since the surface
-    /// was first quiet on this level, or since parts were seeded.
+    /// Whether the forces on all vertices, asleep or not, have been evaluated once since the surface was first quiet on
+    /// this level, or since parts were seeded; a level ends only after that.
     was_examined: bool,
-    /// Whether the next iteration evaluates the forces on all vertices, asleep or not.
+    /// Whether the next iteration examines all vertices, asleep or not: it evaluates the forces on them, and wakes
+    /// those that have not settled.
     pub(super) examine_next: bool,
     done: bool,
-    /// The number of searches of the finest level for missing parts; [`MAX_SEARCHES`] once a search found none.
+    /// The number of searches of the finest level for missing parts to add; [`MAX_SEARCHES`] once a search found none.
     searches: u32,
-    /// Whether vertices have been given sizes by the curvature of this level.
+    /// Whether vertices have been given sizes, local factors on δ, by the curvature of this level's contour.
     pub(super) sized: bool,
     /// Whether the surface was on the contour of this level at its beginning, and neither parameters nor attractors
     /// have changed since; there are no moving fronts then, and the fastest vertex does not delay convergence.
     pub(super) began_on_contour: bool,
-    /// The number of iterations done before this level began.
+    /// The number of iterations of the run done before the current level began.
     pub(super) began: u32,
 }
 
@@ -71,15 +76,17 @@ impl DeformableModel {
         ((levels - 1 - self.level) as f64 + fraction.clamp(0.0, 1.0)) / levels as f64
     }
 
-    /// Wakes all vertices and restarts convergence, after a change that may move any of them.
+    /// Wakes all sleeping vertices and restarts convergence on the current level, after a change that may move any
+    /// vertex, such as that of a parameter.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still_iterations).fill(0.0);
         self.mesh.scalar_mut(self.keys.reversals).fill(0.0);
         self.convergence = Convergence { began: self.convergence.began, ..Convergence::default() };
     }
 
-    /// Counts quiet iterations. After enough of them it sets sizes and seeds missing parts on the finest level,
-    /// examines all vertices, checks the whole mesh, and descends one level or ends the run.
+    /// Counts quiet iterations, those with energy and speed below their bounds. After enough of them it sets sizes and
+    /// seeds missing parts on the finest level, examines all vertices, checks the whole mesh, and descends one level or
+    /// ends the run. Returns the numbers of edits.
     pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let is_slow = self.convergence.began_on_contour || self.speed.fastest < self.settled_speed();
         let quiet = is_slow && self.speed.energy < self.params.energy_tolerance;
@@ -109,8 +116,9 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Sets sizes on the finest level; if they are set already, seeds missing parts instead. After a change, quiet
-    /// iterations are counted anew. Edits wake only the vertices around them.
+    /// Sets the sizes of vertices, local factors on δ, on the finest level; if they are set already, seeds missing
+    /// parts instead. If that changed anything, quiet iterations are counted anew. Edits wake only the vertices around
+    /// them. Returns the numbers of edits.
     fn size_and_seed(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.set_sizes() {
             self.convergence.quiet = 0;
@@ -130,15 +138,16 @@ impl DeformableModel {
         Ok(found)
     }
 
-    /// Returns the speed, in δ per unit of time, below which the fastest vertex has settled: at most [`SETTLED_SPEED`],
-    /// and at most [`SETTLED_DISPLACEMENT`] in one iteration.
+    /// Returns the speed along the normal, in δ per unit of time, below which the fastest vertex must be for
+    /// convergence: [`SETTLED_SPEED`], or [`SETTLED_DISPLACEMENT`] per iteration if that is less.
     fn settled_speed(&self) -> f32 {
         let longest = SETTLED_DISPLACEMENT / self.params.step_length() as f32;
         if longest < SETTLED_SPEED { longest } else { SETTLED_SPEED }
     }
 
-    /// Returns the number of quiet iterations in a row for convergence, at least those of the response time m/γ, but at
-    /// most [`MAX_QUIET_ITERATIONS`]: a surface that has just begun to move is slow, too, without having converged.
+    /// Returns the number of quiet iterations in a row, those with energy and speed below their bounds, after which a
+    /// level has converged: at least as many as the response time m/γ takes, but at most [`MAX_QUIET_ITERATIONS`]. A
+    /// surface that has just begun to move is slow, too, without having converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let is_settled = integrator == Integrator::Implicit && !self.convergence.began_on_contour;
@@ -146,8 +155,8 @@ impl DeformableModel {
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MAX_QUIET_ITERATIONS) as u32
     }
 
-    /// Restores edge bounds and contacts around all vertices, and removes negligibly small components; does nothing if
-    /// the topology is fixed.
+    /// Restores edge bounds and resolves contacts around all vertices, and removes negligibly small components; does
+    /// nothing if the topology is fixed. Returns the numbers of edits.
     pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
@@ -162,8 +171,9 @@ impl DeformableModel {
         changes
     }
 
-    /// Refines the mesh and descends to the next finer image (figure 13). In runs that seed, components that lack part
-    /// of the finer contour are replaced by it; if that fails, missing parts are seeded instead.
+    /// Refines the mesh and descends to the next finer level of the image pyramid (figure 13). In runs that seed,
+    /// components that lack part of the finer contour are replaced by it; if that fails, missing parts are seeded
+    /// instead. Returns the numbers of edits.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
@@ -183,8 +193,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Tries [`Self::descend_renewed`] and returns whether it succeeded; if not, mesh, level and pending vertices are
-    /// restored.
+    /// Tries to descend one level by [`Self::descend_renewed`], and returns whether that succeeded; if not, mesh, level
+    /// and pending vertices are restored.
     fn try_to_renew(&mut self, renewal: &Renewal) -> bool {
         let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.pending());
         let is_renewed = self.descend_renewed(renewal).is_ok();
@@ -197,7 +207,8 @@ impl DeformableModel {
         is_renewed
     }
 
-    /// Descends with some components replaced by parts of the finer contour, and resolves the whole mesh like a start.
+    /// Descends one level with some components of the mesh replaced by parts of the finer contour, and brings all edges
+    /// within bounds like those of a start mesh.
     ///
     /// # Errors
     /// If there would be too many vertices, the result intersects itself, or memory does not suffice.
@@ -257,7 +268,7 @@ mod tests {
         .unwrap()
     }
 
-    /// A noisy ball on which single vertices keep moving long after the others have settled.
+    /// Makes a model of a noisy ball on which single vertices keep moving long after the others have settled.
     fn model() -> DeformableModel {
         let mut random = Random::new(1);
         let volume = volume(32, |p| {
@@ -269,7 +280,8 @@ mod tests {
         DeformableModel::new(&volume, options).unwrap()
     }
 
-    /// Without a contour a run starts from the enclosing surface, whose fronts have a long way to go.
+    /// Without a contour a run starts from the enclosing surface, whose fronts have far to move, so its fastest vertex
+    /// must delay convergence.
     #[test]
     fn only_a_start_on_the_contour_begins_on_it() {
         let speck = volume(32, |p| if (p - 15.5).length() < 2.0 { 1.0 } else { 0.0 });

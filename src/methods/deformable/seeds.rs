@@ -1,9 +1,9 @@
-//! Seeding: adds parts of a level's contour that are far from the mesh as new components.
+//! Seeding: adds parts of a pyramid level's contour that are far from the mesh as new components.
 //!
 //! A surface that only moves does not reach parts that vanished on a coarse level, or that no coarse level shows. So
 //! the voxels of a level are compared with the mesh: object outside of it is missing matter, background inside is a
-//! missing cavity. The contours of those further from the mesh than [`CLEARANCE`] are added; they are closed and clear
-//! of the mesh by construction. Forces and contact join them with the rest.
+//! missing cavity. The contours of missing voxels further from the mesh than [`CLEARANCE`] are added; they are closed
+//! and clear of the mesh by construction. Forces and contact join them with the rest of the mesh.
 
 use super::contour::{ObjectIs, contour, placed};
 use super::coverage::Missing;
@@ -17,22 +17,23 @@ use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, marching_cubes, voxels_inside};
 use fixedbitset::FixedBitSet;
 
-/// The least distance of missing voxels from the mesh, in voxels of the level. With less, seeds would touch the mesh;
-/// with more, thin parts beside it are not found.
+/// The distance from the mesh, in voxels of the pyramid level, beyond which voxels on the wrong side of it are missing,
+/// so that seeds are added there. With less, seeds would touch the mesh; with more, thin parts beside it are not found.
 const CLEARANCE: f64 = 0.9;
 
-/// The least volume of a seed, as a share of [`super::DeformableParams::smallest_part`]: pieces of parts that are
-/// already in the mesh may be smaller than separate parts.
+/// The least volume of a seed, a missing part added to the mesh, as a share of
+/// [`super::DeformableParams::smallest_part`]: pieces of parts that are already in the mesh may be smaller than
+/// separate parts.
 const SMALLEST_SEED: f64 = 1.0 / 32.0;
 
 /// The volume of the octahedron of the six neighbours of a voxel, in voxels; the contour of a single voxel encloses no
-/// more.
+/// more, so single voxels may be too small for a seed.
 const MAX_VOLUME_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
 
 impl DeformableModel {
-    /// Searches the current level for parts of the contour that the mesh lacks and adds them, whatever the parameter
-    /// `seeding`. A finished run continues if there are any; the report counts them as `seeds`. Nothing is added if the
-    /// topology is fixed or the image force is zero.
+    /// Searches the current pyramid level for parts of its contour that the mesh lacks and adds them, whatever the
+    /// parameter `seeding`. A finished run continues if there are any; the report counts them as `seeds`. Nothing is
+    /// added if the topology is fixed or the image force is zero.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
@@ -46,8 +47,8 @@ impl DeformableModel {
         Ok(self.report(changes, times))
     }
 
-    /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores the bounds
-    /// around them. Returns the edits, with the number of contours as `seeds`.
+    /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores edge bounds
+    /// and contacts around them. Returns the numbers of edits, with that of the contours as `seeds`.
     pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Changes::default());
@@ -71,8 +72,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Adds components to the mesh, except for those that would intersect it or each other. Returns the number of those
-    /// added, as `seeds`, and their vertices.
+    /// Adds the components `parts` to the mesh, except for those that would intersect it or each other. Returns the
+    /// number of components added, as `seeds`, and their vertices.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; nothing is added then.
@@ -95,7 +96,7 @@ impl DeformableModel {
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
 
-    /// Checks that components can be added without exceeding the largest number of vertices.
+    /// Checks that the components `parts` can be added to the mesh without exceeding the largest number of vertices.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`].
@@ -105,8 +106,8 @@ impl DeformableModel {
         if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
     }
 
-    /// Initialises the attributes of vertices added to the mesh: at rest, awake and checked, with size 1, the uniform
-    /// δ.
+    /// Initialises the attributes of vertices added to the mesh: at rest, awake, checked for edge bounds and contacts
+    /// at their positions, and with size 1, the uniform δ.
     pub(super) fn initialise_attributes(&mut self, added: &[VertexId]) {
         let keys = self.keys;
         for v in added.iter().map(|v| v.index()) {
@@ -120,7 +121,8 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the contours of matter and of cavities that the mesh lacks, closed surfaces in model space.
+    /// Returns the contours of matter and of cavities, in this order, that the mesh lacks on the current level; closed
+    /// surfaces in model space.
     fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
@@ -142,17 +144,17 @@ struct Comparison<'a> {
     image: &'a LevelImage,
     iso: f32,
     object: ObjectIs,
-    /// Whether each voxel is inside the contour, which has no closed parts that are too small.
+    /// Whether each voxel is inside the level's contour, which has no closed parts that are too small.
     in_contour: FixedBitSet,
     /// Whether each voxel is inside the mesh.
     in_mesh: FixedBitSet,
-    /// The mesh in voxel indices of the level.
+    /// The mesh in voxel indices of the pyramid level.
     surface: TriangleMesh,
 }
 
 impl Comparison<'_> {
-    /// Returns closed surfaces, in model space, around the missing voxels of one kind; each encloses at least
-    /// `smallest`, in voxels of the finest level.
+    /// Returns closed surfaces, in model space, around the voxels of missing matter or of missing cavities, as `kind`
+    /// tells; each encloses at least `smallest` voxels of the finest level.
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
         let missing = self.missing_voxels(kind)?;
@@ -174,13 +176,14 @@ impl Comparison<'_> {
         Ok(parts.without_components_below(smallest))
     }
 
-    /// Whether the contour assigns a voxel to the object if matter is missing, or to the background if cavities are.
+    /// Returns whether the contour assigns a voxel, given by its index in the grid, to the object if matter is missing,
+    /// or to the background if cavities are.
     fn is_in_missing_phase(&self, kind: Missing, voxel: usize) -> bool {
         self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
-    /// Returns the voxels on the wrong side of the mesh, see [`Self::misplaced_voxels`], that are further from the mesh
-    /// than [`CLEARANCE`], in ascending order.
+    /// Returns the grid indices of missing voxels, in ascending order: those on the wrong side of the mesh, see
+    /// [`Self::misplaced_voxels`], that are further from it than [`CLEARANCE`].
     fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
         let mut missing = self.misplaced_voxels(kind);
         if missing.is_empty() {
@@ -194,8 +197,8 @@ impl Comparison<'_> {
         Ok(missing)
     }
 
-    /// Returns the voxels on the wrong side of the mesh whose six neighbours are on that side of the mesh, too, in
-    /// ascending order.
+    /// Returns the grid indices, in ascending order, of the voxels on the wrong side of the mesh, such as object
+    /// outside it, whose six neighbours are on that side of the mesh, too.
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Cavity;
         let dims = self.image.grid().0.dims;
@@ -209,7 +212,7 @@ impl Comparison<'_> {
     }
 
     /// Returns the part of the mesh with the triangles that may be within [`CLEARANCE`] of the positions around which
-    /// `cells` were inserted.
+    /// `cells` were inserted, so that distances are measured to few triangles.
     fn surface_near(&self, cells: &CellSet) -> TriangleMesh {
         let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| cells.contains(p)).collect();
         let near =
@@ -222,15 +225,15 @@ impl Comparison<'_> {
     }
 
     /// Returns the difference between the intensity of a voxel and the iso value, positive in the object if matter is
-    /// missing, in the background if cavities are.
+    /// missing, or in the background if cavities are, as `kind` tells.
     fn depth(&self, kind: Missing, voxel: usize) -> f32 {
         let depth = self.object.depth(self.image.grid().0.values[voxel], self.iso);
         if kind == Missing::Matter { depth } else { -depth }
     }
 
-    /// Returns the steepness of the image at the contour of some voxels: the root mean square of the differences
-    /// between those with positive [`Self::depth`] and their neighbours with negative depth; if there are none, of the
-    /// positive depths alone; 1 if there are none, either.
+    /// Returns the steepness of the image at the contour of some voxels, which bounds the values of [`Self::field`]:
+    /// the root mean square of the differences between those with positive [`Self::depth`] and their neighbours with
+    /// negative depth; if there are none, of the positive depths alone; 1 if there are none, either.
     fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
         let dims = self.image.grid().0.dims;
         let (mut differences, mut depths) = (Mean::default(), Mean::default());
@@ -249,8 +252,9 @@ impl Comparison<'_> {
         differences.value().or(depths.value()).map_or(1.0, |square| square.sqrt() as f32)
     }
 
-    /// Returns a field on a box around a cluster of missing voxels, positive inside their contour and negative outside:
-    /// it is 0 on the iso-surface where that bounds them, else halfway to the next voxel.
+    /// Returns a field, for marching cubes, on the box of voxels from `low` to `high` around a cluster of missing
+    /// voxels, positive inside their contour and negative outside: it is 0 on the iso-surface where that bounds the
+    /// cluster, else at most halfway to the next voxel.
     fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
         let grid = self.image.grid().0;
         let steepness = self.steepness(kind, missing);
@@ -281,7 +285,6 @@ impl Comparison<'_> {
     }
 }
 
-/// An accumulator for the mean of numbers.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -299,7 +302,6 @@ impl Mean {
     }
 }
 
-/// Returns the length of the longest edge.
 fn longest_edge(surface: &TriangleMesh) -> f32 {
     let longest = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|v| surface.positions[v as usize]);
@@ -308,7 +310,7 @@ fn longest_edge(surface: &TriangleMesh) -> f32 {
     surface.triangles.iter().map(longest).fold(0.0, f32::max).sqrt()
 }
 
-/// Returns the indices of a voxel along the axes.
+/// Converts the index of a voxel in a grid of `dims` voxels to its indices along the three axes.
 fn indices(dims: [usize; 3], voxel: usize) -> [usize; 3] {
     [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]]
 }
@@ -317,7 +319,7 @@ fn coordinates(dims: [usize; 3], voxel: usize) -> Vec3 {
     Vec3::from(indices(dims, voxel).map(|k| k as f32))
 }
 
-/// Returns the six voxels that share a face with a voxel; `None` for those outside the image.
+/// Returns the grid indices of the six voxels that share a face with a voxel; `None` for those outside the image.
 fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> {
     let at = indices(dims, voxel);
     let step = [1, dims[0], dims[0] * dims[1]];
@@ -326,8 +328,8 @@ fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> 
     })
 }
 
-/// Returns the bounding box of some voxels, enlarged by one voxel within the image: its first voxel, and the one past
-/// its last, along each axis.
+/// Returns the bounding box of voxels given by grid indices, enlarged by one voxel within the image: its first voxel,
+/// and the one past its last, along each axis.
 fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) {
     let (mut low, mut high) = (dims, [0; 3]);
     for &voxel in voxels {
@@ -340,7 +342,8 @@ fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) 
     (low.map(|k| k.saturating_sub(1)), [0, 1, 2].map(|axis| (high[axis] + 2).min(dims[axis])))
 }
 
-/// Groups voxels, given in order, into clusters connected over faces, edges or corners; each is in order.
+/// Groups voxels, given by ascending grid indices, into clusters connected over faces, edges or corners; the indices of
+/// each cluster are ascending, too.
 fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
     let mut groups = DisjointSets::new(voxels.len());
     for (i, &voxel) in voxels.iter().enumerate() {

@@ -1,10 +1,11 @@
 //! Non-uniform sampling: edge lengths by the curvature of the image's contour.
 //!
-//! The midpoint of an edge of length l with its ends on a contour of curvature κ is κ l²/8 away from it; this is the
-//! sagitta. It is measured in the image, also where the ends have not settled: their own offsets are subtracted. It
-//! bounds the length of an edge that stays near the contour. Where a wall or a gap is thin, edges are no longer than
-//! with uniform δ, since sheets whose edges are longer than their distance are cut. They need not be shorter, since
-//! [`super::image_guide`] keeps the sheets apart. The paper has uniform δ and names this as future work.
+//! The midpoint of an edge of length l with its ends on a contour of curvature κ is at the distance κ l²/8 from the
+//! contour; this is the sagitta, which bounds the length of an edge that stays near the contour. It is measured in the
+//! image, also where the ends have not settled: their own offsets from the contour are subtracted. Where a wall or a
+//! gap is thin, edges are no longer than with uniform δ, since sheets whose edges are longer than their distance are
+//! cut. They need not be shorter, since [`super::image_guide`] keeps the sheets apart. The paper has uniform δ and
+//! names this as future work.
 
 use super::DeformableModel;
 use super::contour::ObjectIs;
@@ -19,35 +20,38 @@ use crate::volume::CellCache;
 const MAX_SAGITTA: f32 = 0.25;
 
 /// The distance of an edge's midpoint from the contour, the sagitta, in voxels of the finest level, below which edges
-/// are made longer. The surface is inside its contour by two thirds of it: with 0.25, a ball of 7 voxels has 7 % less
-/// volume.
+/// are made longer. The surface is inside its contour by two thirds of this distance: with 0.25, a ball of 7 voxels has
+/// 7 % less volume.
 const MIN_SAGITTA: f32 = 0.05;
 
-/// The smallest size of a vertex, a factor on δ, with full adaptivity.
+/// The smallest size of a vertex, a local factor on δ, if the parameter `adaptivity` is 1.
 const SMALLEST: f32 = 0.7;
-/// The largest size of a vertex, a factor on δ, with full adaptivity.
+/// The largest size of a vertex, a local factor on δ, if the parameter `adaptivity` is 1.
 const LARGEST: f32 = 1.6;
 
-/// The largest difference of size between the ends of an edge of size 1, and in proportion for shorter and longer
-/// edges; with this, sampling remains isotropic.
+/// The largest difference of size, a local factor on δ, between the ends of an edge of length [`MEAN_EDGE`] δ, and in
+/// proportion for shorter and longer edges; with this, sampling remains isotropic.
 const GRADATION: f32 = 0.3;
 
-/// The step of the search for the opposite side of a wall or a gap, in voxels.
+/// The step of the search along a vertex's normal for the opposite side of a wall or a gap, in voxels of the finest
+/// level.
 const STRIDE: f32 = 0.5;
 
-/// The number of passes over the mesh that bound the difference of size between neighbours; each reaches one edge
-/// further.
+/// The number of passes over the mesh that bound the difference of size, a local factor on δ, between neighbouring
+/// vertices; each reaches one edge further.
 const PASSES: usize = 3;
 
-/// The length of an edge of size 1, in δ.
+/// The mean edge length, in δ, where vertices have size 1.
 const MEAN_EDGE: f32 = super::MEAN_EDGE as f32;
 
-/// The largest offset from the contour that is measured, in voxels; larger ones are clamped.
+/// The largest offset of a vertex or an edge's midpoint from the contour that is measured, in voxels of the finest
+/// level; larger ones are clamped.
 const MAX_OFFSET: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex by curvature, and returns whether it did: not if sizes were set on this level
-    /// before, or if the model does not adapt to the image. Seeds added later are given sizes separately.
+    /// Sets the size of every vertex, a local factor on δ, by the curvature of the contour, and returns whether it did:
+    /// not if sizes were set on this level before, or if the model does not adapt to the image. Seeds added later are
+    /// given sizes separately.
     pub(super) fn set_sizes(&mut self) -> bool {
         if self.convergence.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
@@ -58,8 +62,8 @@ impl DeformableModel {
         true
     }
 
-    /// Sets the sizes of the vertices of whole components by curvature, with bounded differences between neighbours,
-    /// and scaled by the parameter `adaptivity`.
+    /// Sets the sizes, local factors on δ, of the vertices of whole components by the curvature of the contour, with
+    /// bounded differences between neighbours, and scaled by the parameter `adaptivity`.
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
         for _ in 0..PASSES {
@@ -70,8 +74,9 @@ impl DeformableModel {
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
     }
 
-    /// Returns for each vertex, by slot, the smallest size of its edges by curvature. At thin walls and gaps, sizes
-    /// above 1 are bounded by the thickness, but not below 1.
+    /// Returns for each vertex in `members`, by slot, the smallest of the sizes, local factors on δ, that the curvature
+    /// of the contour gives its edges. At thin walls and gaps, sizes above 1 are bounded by the thickness, but not
+    /// below 1.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let offsets = self.offsets_from_contour(members);
@@ -91,8 +96,8 @@ impl DeformableModel {
         sizes
     }
 
-    /// Returns the size at which the contact distance equals the thickness of the wall or gap at a vertex; infinite if
-    /// none is found.
+    /// Returns the size, a factor on δ, at which the contact distance equals the thickness of the wall or gap at a
+    /// vertex; infinite if none is found.
     fn size_by_thickness(&self, v: VertexId) -> f32 {
         let normal = self.mesh.area_normal(v).normalize_or_zero();
         let contact = Sampling::new(self.model_delta()).contact();
@@ -106,7 +111,8 @@ impl DeformableModel {
         thickness / contact
     }
 
-    /// Returns the difference between the intensity at a point and the iso value, positive in the object.
+    /// Returns the difference between the intensity at a point in model space and the iso value, positive in the
+    /// object.
     fn depth(&self, p: Vec3) -> f32 {
         let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
         object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
@@ -124,8 +130,8 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the offset of each vertex from the contour along its normal, by slot, in voxels; positive inside the
-    /// contour.
+    /// Returns the offset of each vertex in `members` from the contour along its normal, by slot, in voxels of the
+    /// finest level; positive inside the contour.
     fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
         for &v in members {
@@ -135,9 +141,9 @@ impl DeformableModel {
         offsets
     }
 
-    /// Returns the size, a factor on δ, at which an edge would have a sagitta, the distance of its midpoint from the
-    /// contour, of [`MAX_SAGITTA`] if that is below 1, or of [`MIN_SAGITTA`] if that is above 1, else 1; infinite if
-    /// the edge is straight. `offsets` are those of its ends from the contour, in voxels.
+    /// Returns the size of an edge, a factor on δ, by its sagitta, the distance of its midpoint from the contour: the
+    /// size at which the sagitta would be [`MAX_SAGITTA`] if this size is below 1, or [`MIN_SAGITTA`] if this size is
+    /// above 1, else 1; infinite if the edge is straight. `offsets` are those of its ends from the contour, in voxels.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
@@ -156,8 +162,8 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the approximate depth of a point inside the contour along a direction, in voxels, clamped to
-    /// ±[`MAX_OFFSET`]; negative outside.
+    /// Returns the approximate depth of a point inside the contour along a direction, in voxels of the finest level,
+    /// clamped to ±[`MAX_OFFSET`]; negative outside.
     fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let slope = (ahead - behind).abs();
@@ -174,7 +180,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// The intersection of two balls of different radius.
+    /// Makes a model of the intersection of two balls of different radius, whose surface varies in curvature.
     fn model() -> DeformableModel {
         let n = 24;
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;

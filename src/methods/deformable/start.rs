@@ -1,4 +1,4 @@
-//! Start surfaces (section 3.6): made in model space, and resolved before the first step.
+//! Start surfaces (section 3.6): made in model space, with their edges brought within bounds before the first step.
 
 use super::contour::{ObjectIs, contour, placed, simplified};
 use super::domain::{Domain, rounded_axes};
@@ -12,7 +12,7 @@ use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
-/// The start surface of a run; lengths and points in world units.
+/// The start surface of a run; lengths and points are in world space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// The iso-surface at π_I on the coarsest level, outer and inner boundaries, without parts that enclose less than
@@ -26,27 +26,29 @@ pub enum Start {
     Bubbles(u32),
     /// Spheres of equal radius around given points.
     Seeds {
-        /// The centres.
+        /// The centres of the spheres in world space.
         points: Vec<DVec3>,
-        /// The common radius.
+        /// The radius of all spheres in world units.
         radius: f64,
     },
     /// The iso-surface of the coarsest level at this intensity, in the volume's units, with the brighter side inside.
     MarchingCubes(f64),
-    /// A closed mesh without self-intersections, its triangles counter-clockwise seen from outside.
+    /// A closed mesh of the caller in world space, without self-intersections, its triangles counter-clockwise seen
+    /// from outside.
     Mesh(TriangleMesh),
 }
 
 /// The image and the sampling that a start surface is made for.
 pub(super) struct StartContext<'a> {
     pub(super) image: &'a LevelImage,
-    /// The normalised intensity above which voxels are enclosed by [`Start::Enclosing`]; `None` if α_I is not negative.
+    /// The normalised intensity above which voxels are enclosed by [`Start::Enclosing`]; `None` if α_I, the strength of
+    /// the image force, is not negative.
     pub(super) brighter_than: Option<f32>,
-    /// π_I, normalised.
+    /// The iso value π_I, normalised to the range of the volume.
     pub(super) iso: f32,
-    /// The side of π_I on which the object is.
+    /// The side of the iso value π_I on which the object is.
     pub(super) object: ObjectIs,
-    /// The least volume of a closed part of the contour, in voxels of the finest level.
+    /// The least volume, in voxels of the finest level, of a closed part of the contour; smaller ones are left out.
     pub(super) smallest_part: f64,
     /// The dimensions of the finest level in voxels.
     pub(super) dims: [usize; 3],
@@ -55,7 +57,8 @@ pub(super) struct StartContext<'a> {
     /// The voxel spacing in world units.
     pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
-    /// Whether an empty contour gives an empty start mesh, since missing parts are seeded later.
+    /// Whether an empty contour gives an empty start mesh, since missing parts are seeded later, instead of the
+    /// enclosing surface.
     pub(super) may_be_empty: bool,
 }
 
@@ -65,43 +68,44 @@ impl StartContext<'_> {
     }
 }
 
-/// The smallest radius of a start sphere, in δ: an icosahedron of this radius has its edges within bounds, with a
-/// margin.
+/// The smallest radius of a start sphere, in δ: an icosahedron of this radius has its edges within the edge bounds,
+/// with a margin.
 const SMALLEST_RADIUS: f32 = 1.2;
 
-/// The distance between an object and the surface that encloses it, in δ.
+/// The distance between an object and the enclosing start surface around it, in δ.
 const OBJECT_MARGIN: f32 = 1.5;
 
-/// The radius of a bubble as a share of the smallest side of its cell; neighbours are further apart than the contact
-/// distance.
+/// The radius of a bubble, a sphere of [`Start::Bubbles`], as a share of the smallest side of its grid cell; with it,
+/// neighbours are further apart than the contact distance.
 const BUBBLE_SHARE: f32 = 0.3;
 
 /// The longest edge of a start sphere in δ: well below the upper edge bound 2.5, and well above √3, so that one more
 /// refinement does not make edges shorter than the lower bound.
 const SPHERE_EDGE: f32 = 2.2;
 
-/// The largest number of bubbles along an axis: with more, memory, not the method, is the limit.
+/// The largest number of bubbles, spheres of [`Start::Bubbles`], along an axis: with more, memory, not the method, is
+/// the limit.
 const MAX_BUBBLES: u32 = 100;
 /// The largest number of start spheres at given points: with more, memory, not the method, is the limit.
 const MAX_SEEDS: usize = 10_000;
 
-/// The side of the cells around self-intersections of a contour with its edges within bounds, as a multiple of the
-/// longest edge allowed; when the contour is resolved again, edits in these cells are tested in full.
+/// The side, as a multiple of the longest edge allowed, of the cells that mark where a contour intersects itself after
+/// its edges were brought within bounds; when that is repeated, edits in these cells are tested in full.
 const TESTED_CELL: f32 = 2.5;
 
-/// The number of times that a contour is brought within edge bounds with some edits not tested in full for
-/// self-intersections, before all are.
+/// The number of attempts to bring a contour within edge bounds with some edits not tested in full for
+/// self-intersections; in the attempt after these, all edits are.
 const MAX_RUNS: usize = 2;
 
-/// The largest number of further resolver calls, after the first, to bring the edges of a start mesh within bounds;
-/// each refines a coarse mesh several times.
+/// The largest number of resolver calls, after the first, that bring the edges of a start mesh within bounds; each
+/// refines a coarse mesh several times.
 const MAX_CALLS: usize = 20;
 
 impl Start {
-    /// Makes the start mesh on the coarsest level, with its edges within bounds and no two parts in contact. For
+    /// Makes the start mesh on the coarsest level, with its edges within bounds and its contacts resolved. For
     /// [`Start::Contour`] that is the enclosing surface, the replacement for an empty contour.
     ///
-    /// `iso` normalises intensities.
+    /// `iso` normalises an intensity of the volume; `guide` decides which topology changes are allowed.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if a number is out of range, spheres or the caller's mesh are out of the
@@ -221,10 +225,11 @@ fn resolve_with(
     Ok(())
 }
 
-/// Makes a rounded box, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, around the object or the whole image.
+/// Makes the surface of [`Start::Enclosing`]: a rounded box, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, around the object or the
+/// whole image.
 ///
-/// An icosahedron is refined, and after each refinement projected onto the box and resolved: a fine icosahedron
-/// squashed onto a flat box would have triangles that no edit can repair.
+/// An icosahedron is refined, and after each refinement projected onto the box and its edges brought within bounds: a
+/// fine icosahedron squashed onto a flat box would have triangles that no edit can repair.
 fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
     let delta = context.sampling.shortest();
     let most = context.most_vertices();
@@ -253,8 +258,9 @@ fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
     Ok(mesh)
 }
 
-/// Returns the centre and the half axes of a rounded box around all of the object, with the proportions of its bounding
-/// box and a margin of [`OBJECT_MARGIN`]; `None` if there is no object.
+/// Returns the centre and the half axes, in model space, of a rounded box around all of the object, with the
+/// proportions of its bounding box and a margin of [`OBJECT_MARGIN`], for the enclosing start surface; `None` if there
+/// is no object.
 fn around_object(context: &StartContext) -> Option<(Vec3, Vec3)> {
     let ends = context.image.ends_of_rows(context.brighter_than?);
     let Bounds { min, max } = Bounds::from_points(&ends);
@@ -271,7 +277,8 @@ fn around_object(context: &StartContext) -> Option<(Vec3, Vec3)> {
     Some((centre, axes * scale))
 }
 
-/// Returns the fourth root of x⁴ + y⁴ + z⁴: 1 on the unit rounded box.
+/// Returns the fourth root of x⁴ + y⁴ + z⁴: 1 on the unit rounded box, less inside and more outside; points divided by
+/// it are projected onto the box.
 fn rounded_distance(p: Vec3) -> f32 {
     let square = p * p;
     (square * square).element_sum().sqrt().sqrt()
@@ -335,8 +342,8 @@ fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<M
     Ok(mesh)
 }
 
-/// Makes a sphere of a radius in world units around the origin and maps it to model space without translation; it is an
-/// ellipsoid there if voxels are not cubes.
+/// Makes a sphere of a radius in world units around the origin, to be copied to the points of [`Start::Seeds`], and
+/// maps it to model space without translation; it is an ellipsoid there if voxels are not cubes.
 fn world_ball(context: &StartContext, radius: f64) -> Result<Mesh, MethodError> {
     let least = f64::from(SMALLEST_RADIUS * context.sampling.shortest()) * largest(context.spacing);
     let most = f64::from((context.domain.bounds.max - context.domain.bounds.min).max_element())
@@ -362,8 +369,8 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// Makes the simplified contour at π_I of the start level, for [`DeformableModel::resolve_contour`]. If it is empty: an
-/// empty mesh if [`StartContext::may_be_empty`], else `None`.
+/// Makes the simplified contour at the iso value π_I of the start level, for [`DeformableModel::resolve_contour`]. If
+/// it is empty: an empty mesh if [`StartContext::may_be_empty`], else `None`.
 pub(super) fn contour_mesh(context: &StartContext) -> Result<Option<Mesh>, MethodError> {
     let surface = contour(context.image, context.iso, context.object, context.smallest_part)?;
     if surface.triangles.is_empty() {

@@ -1,4 +1,4 @@
-//! Saving and restoring a run; a restored run continues bit for bit.
+//! Saving and restoring a run of the deformable model; a restored run continues bit for bit.
 
 use super::domain::Domain;
 use super::motion::SpeedSummary;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLDEF\x05";
 
-/// The saved part of a run: everything but the volume and what is computed from it.
+/// The saved part of a run of the deformable model: everything but the volume and what is computed from it.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -31,7 +31,7 @@ struct State {
 }
 
 impl DeformableModel {
-    /// Returns the state of the run as bytes, without the volume.
+    /// Returns the state of the run as bytes, without the volume, for [`Self::restore`].
     pub fn save(&self) -> Vec<u8> {
         let state = State {
             fingerprint: self.fingerprint,

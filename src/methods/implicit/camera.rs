@@ -1,40 +1,43 @@
-//! Calibrated cameras from which the points were made, with their images (paper, sections VI-A and VII-C).
+//! Calibrated cameras that photographed the object whose points are reconstructed: they show which side of the points
+//! is outside, and their images colour the surface (Dinh, Turk & Slabaugh, sections VI-A and VII-C).
 
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use crate::methods::saved::Hash;
 
-/// Largest accepted side of an image, in pixels: more than any photograph has, and its bytes still fit in memory.
+/// Largest accepted width and height of a camera's image, in pixels: more than any photograph has, and the image still
+/// fits in memory.
 const MAX_PIXELS: u32 = 16384;
 
-/// Threshold below which the left 3×3 block of a projection counts as singular: the volume that its rows span, each
-/// scaled to length 1.
+/// Smallest accepted volume that the rows of the left 3×3 block of a projection matrix span, each scaled to length 1;
+/// with less, the camera has no centre and is rejected.
 ///
 /// Rows of a parallel projection span 1e-16 or so by rounding; with a focal length of one pixel in an image of 16384 it
 /// is still 1e-8.
 const MIN_SPAN: f64 = 1e-12;
 
-/// A calibrated perspective camera, with its image if there is one. Cameras tell where the outside is, and colour the
-/// surface.
+/// A calibrated perspective camera, with its image if there is one. Cameras show which side of the input points is
+/// outside, and their images colour the reconstructed surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Maps a world point to (x·depth, y·depth, depth), where (x, y) is its position in the image, in pixels.
+    /// Maps a world point p to (x·depth, y·depth, depth), where (x, y) is the position of p in the image, in pixels.
     to_view: DAffine3,
-    /// Inverse of `to_view`; maps the origin to the camera's centre.
+    /// Maps (x·depth, y·depth, depth) to the world point that is projected to (x, y), and the origin to the camera's
+    /// centre: the inverse of `to_view`.
     from_view: DAffine3,
     width: u32,
     height: u32,
     image: Option<Vec<u8>>,
 }
 
-/// A world point projected into the image of a camera.
+/// The projection of a world point into the image of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
-    /// Pixels to the right of the centre of the first pixel.
+    /// Horizontal position in the image, in pixels to the right of the centre of the upper left pixel.
     pub x: f64,
-    /// Pixels down from the centre of the first pixel.
+    /// Vertical position in the image, in pixels down from the centre of the upper left pixel.
     pub y: f64,
-    /// Distance from the camera along its axis, in world units; positive.
+    /// Distance of the world point from the camera along the camera's axis, in world units; positive.
     pub depth: f64,
 }
 
@@ -44,8 +47,8 @@ impl Camera {
     ///
     /// The convention is that of OpenCV: x to the right, y down, the centre of the first pixel at (0, 0), that of the
     /// last at (width − 1, height − 1). P may be scaled by any factor, also a negative one: points in front of the
-    /// camera are those whose s has the sign of the determinant of the left 3×3 block, as if the axes right, down and
-    /// ahead are right-handed.
+    /// camera are those whose s has the sign of the determinant of the left 3×3 block; that is, the axes right, down
+    /// and ahead are taken as right-handed.
     ///
     /// `image` holds red, green, blue and alpha of each pixel, row by row from the top. Pixels with an alpha of 0 are
     /// ignored, which masks the background of an object.
@@ -71,7 +74,8 @@ impl Camera {
         Ok(Self { to_view, from_view: to_view.inverse(), width, height, image })
     }
 
-    /// Adds the camera and its image to `hash`, by which a saved state is checked against its input.
+    /// Adds the projection and the image of the camera to `hash`, the fingerprint of the input by which a saved state
+    /// is checked when it is restored.
     pub fn hash_into(&self, hash: &mut Hash) {
         self.to_view.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
         [self.width, self.height].into_iter().for_each(|n| hash.mix(u64::from(n)));
@@ -80,8 +84,8 @@ impl Camera {
         words.iter().for_each(|&pixel| hash.mix(u32::from_le_bytes(pixel).into()));
     }
 
-    /// Returns the same camera for a world transformed by `map`, which must be invertible: it sees `map`(p) where it
-    /// saw p.
+    /// Returns the camera for a world transformed by `map`, which must be invertible: it projects `map`(p) to the pixel
+    /// to which this camera projects p. Moves cameras into the normalised box of the points.
     #[must_use]
     pub fn transformed(self, map: &DAffine3) -> Self {
         let to_view = scaled_to_depth(self.to_view * map.inverse());
@@ -93,7 +97,7 @@ impl Camera {
         self.from_view.translation
     }
 
-    /// Returns the width and the height of the image, in pixels.
+    /// Returns the width and the height of the image, in pixels, also for a camera without an image.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
@@ -103,22 +107,22 @@ impl Camera {
         self.image.is_some()
     }
 
-    /// Projects `p` into the image plane, also beyond the image; `None` if `p` is behind the camera or in the plane
-    /// through its centre.
+    /// Projects a world point `p` into the image plane, also beyond the border of the image; `None` if `p` is behind
+    /// the camera or in the plane through its centre.
     pub fn project(&self, p: DVec3) -> Option<Projected> {
         let view = self.view(p);
         let (x, y, depth) = (view.x / view.z, view.y / view.z, view.z);
         (depth > 0.0 && x.is_finite() && y.is_finite()).then_some(Projected { x, y, depth })
     }
 
-    /// Returns whether the image covers (x, y): its pixels are squares around their centres.
+    /// Returns whether the position (x, y), in pixels, is in the image, whose pixels are squares around their centres.
     pub fn covers(&self, x: f64, y: f64) -> bool {
         let within = |at: f64, side: u32| at >= -0.5 && at <= f64::from(side) - 0.5;
         within(x, self.width) && within(y, self.height)
     }
 
-    /// Returns red, green and blue of the image at (x, y), in 0..1, and alpha, above 0 and at most 1. `None` if alpha
-    /// is 0, outside the image, and without an image.
+    /// Returns red, green and blue of the image at the position (x, y), in pixels, in 0..1, and alpha, above 0 and at
+    /// most 1. `None` if alpha is 0, outside the image, and without an image.
     ///
     /// Bilinear between the centres of pixels; colours are weighted by alpha, so that masked pixels do not bleed in.
     pub fn color_at(&self, x: f64, y: f64) -> Option<(Vec3, f32)> {
@@ -129,33 +133,36 @@ impl Camera {
         mean.color()
     }
 
-    /// Returns column and row of the four pixels whose centres surround (x, y), with their bilinear weights; `None`
-    /// outside the image.
+    /// Returns column and row of the four pixels whose centres surround the position (x, y), in pixels, each with its
+    /// bilinear weight, for blending their colours; `None` if (x, y) is outside the image.
     pub(super) fn bilinear_pixels(&self, x: f64, y: f64) -> Option<[([usize; 2], f32); 4]> {
         let [columns, rows] = [linear_weights(x, self.width), linear_weights(y, self.height)];
         let pixel = |i: usize, j: usize| ([columns[i].0, rows[j].0], columns[i].1 * rows[j].1);
         self.covers(x, y).then(|| [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)])
     }
 
-    /// Returns red, green, blue and alpha, 0..=255, of a pixel that is within the image; `None` without an image.
+    /// Returns red, green, blue and alpha, 0..=255, of the pixel in `column` and `row`, which must be in the image;
+    /// `None` if the camera has no image.
     pub(super) fn pixel(&self, [column, row]: [usize; 2]) -> Option<[u8; 4]> {
         let image = self.image.as_ref()?;
         image.as_chunks().0.get(row * self.width as usize + column).copied()
     }
 
-    /// Returns (x·depth, y·depth, depth) of a world point; see [`Projected`].
+    /// Returns (x·depth, y·depth, depth) of a world point `p`, where (x, y) is its position in the image, in pixels;
+    /// unlike [`Self::project`], this is defined behind the camera, too.
     pub(super) fn view(&self, p: DVec3) -> DVec3 {
         self.to_view.transform_point3(p)
     }
 
-    /// Returns the displacements of a world point at depth 1 that move its projection by one pixel to the right, and by
-    /// one down.
+    /// Returns the two displacements of a world point at depth 1 that move its projection by one pixel to the right and
+    /// by one pixel down. Multiplied by a depth, they are the size of a pixel there.
     pub(super) fn pixel_axes(&self) -> [DVec3; 2] {
         [self.from_view.matrix3.x_axis, self.from_view.matrix3.y_axis]
     }
 }
 
-/// Accumulates a mean colour of pixels, each weighted by its alpha times a given share.
+/// Accumulates the mean colour of several pixels, each weighted by its alpha times a given share, as in bilinear
+/// interpolation, so that masked pixels (alpha 0) do not count.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ColorMean {
     sum: Vec3,
@@ -169,15 +176,15 @@ impl ColorMean {
         self.alpha += share * a;
     }
 
-    /// Returns the mean colour, and the sum of alpha times share, above 0; `None` if that sum is 0, as there is no
-    /// colour then.
+    /// Returns the mean colour of the pixels, red, green and blue in 0..1, and the sum of their weights (alpha times
+    /// share), above 0; `None` if that sum is 0, as there is no colour then.
     pub(super) fn color(self) -> Option<(Vec3, f32)> {
         (self.alpha > 0.0).then(|| (self.sum / self.alpha, self.alpha))
     }
 }
 
-/// Returns an error message if the arguments of [`Camera::new`] are invalid, saying what is accepted. `length` is that
-/// of the image in bytes.
+/// Checks the arguments of [`Camera::new`]: returns an error message that says what is accepted, or `None` if they are
+/// valid. `length` is the size of the image in bytes, if there is an image.
 fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize>) -> Option<String> {
     if let Some(i) = projection.iter().position(|entry| !entry.is_finite()) {
         let (row, column, entry) = (i / 4 + 1, i % 4 + 1, projection[i]);
@@ -191,8 +198,9 @@ fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize
     Some(format!("the image must have {expected} bytes, four per pixel of {width} × {height}, got {found}"))
 }
 
-/// Returns the projection scaled such that its last coordinate is the depth; `None` if its left 3×3 block is singular,
-/// so that the camera has no centre.
+/// Converts a 3×4 projection matrix, row by row, to the map from world points to (x·depth, y·depth, depth), where depth
+/// is in world units and positive in front of the camera. `None` if the left 3×3 block is singular, so that the camera
+/// has no centre.
 fn normalized_projection(projection: [f64; 12]) -> Option<DAffine3> {
     // Normalised first, as products of extreme entries overflow or underflow.
     let size = projection.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
@@ -209,15 +217,15 @@ fn normalized_projection(projection: [f64; 12]) -> Option<DAffine3> {
     to_view.inverse().is_finite().then_some(to_view)
 }
 
-/// Returns the projection scaled by the positive factor that makes its last row a unit vector (Hartley & Zisserman,
-/// *Multiple view geometry*, section 6.2.3).
+/// Returns the projection `to_view` scaled by the positive factor that makes its last row a unit vector, so that depths
+/// are in world units (Hartley & Zisserman, *Multiple view geometry*, section 6.2.3).
 fn scaled_to_depth(to_view: DAffine3) -> DAffine3 {
     let factor = to_view.matrix3.row(2).length().recip();
     DAffine3 { matrix3: to_view.matrix3 * factor, translation: to_view.translation * factor }
 }
 
-/// Returns the indices of the two of `side` pixels along an axis whose centres surround `at`, with their linear
-/// weights; beyond the outermost centres, `at` is clamped.
+/// Returns the indices of the two pixels whose centres surround the position `at`, along an axis of an image with
+/// `side` pixels, each with its weight for linear interpolation; beyond the outermost centres, `at` is clamped.
 fn linear_weights(at: f64, side: u32) -> [(usize, f32); 2] {
     let at = at.clamp(0.0, f64::from(side - 1));
     let low = at as usize;
@@ -231,8 +239,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Projection of a camera at (1, 2, −5) that looks along z, with right along x and down along y: focal length 100,
-    /// principal point (40, 30).
+    /// Projection matrix of a test camera at (1, 2, −5) that looks along z, with right along x and down along y: focal
+    /// length 100, principal point (40, 30).
     const AHEAD: [f64; 12] = [100.0, 0.0, 40.0, 100.0, 0.0, 100.0, 30.0, -50.0, 0.0, 0.0, 1.0, 5.0];
 
     fn camera(projection: [f64; 12]) -> Camera {

@@ -1,5 +1,5 @@
-//! Input points: validation, scaling into the normalised box, removal of duplicates, and clustering against outliers
-//! (paper, section VI-D).
+//! Input points of an implicit surface: validation, scaling into the normalised box, in which their longest side is 2,
+//! removal of duplicates, and clustering against outliers (Dinh, Turk & Slabaugh, section VI-D).
 
 use crate::math::order::sort_by_rank;
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, Vec3, symmetric};
@@ -8,19 +8,23 @@ use crate::methods::MethodError;
 /// A point cloud near a surface, with optional normals, confidences and colours; the input of an implicit surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
-    /// Positions.
+    /// Positions of the points near the surface, in world units; in units of the normalised box after `mapped`.
     pub points: Vec<Vec3>,
-    /// Normals, pointing outwards, of any length.
+    /// Outward normal of each point, of any length, which shows on which side the outside is; estimated where needed if
+    /// `None`.
     pub normals: Option<Vec<Vec3>>,
-    /// Confidence of each point, in (0, 1]: the regularisation λ of its constraint is divided by it.
+    /// Confidence of each point, in (0, 1]: the regularisation λ of its constraint is divided by it, so that points of
+    /// low confidence are fitted loosely. `None` means 1 for all.
     pub confidence: Option<Vec<f32>>,
-    /// Red, green and blue of each point, in 0..1.
+    /// Red, green and blue of each point, in 0..1, for colouring a surface that no camera sees; `None` if the points
+    /// have no colours.
     pub colors: Option<Vec<Vec3>>,
 }
 
-/// Minimum number of distinct points in a cloud: fewer span no volume.
+/// Minimum number of distinct points in the input cloud: fewer span no volume.
 pub const MIN_POINTS: usize = 4;
-/// Ratio of the least to the largest standard deviation along the principal axes up to which a cloud counts as flat.
+/// Ratio of the least to the largest standard deviation of points along their principal axes up to which a cloud counts
+/// as flat, and is rejected because it spans no volume.
 const FLAT: f64 = 1e-6;
 
 impl Cloud {
@@ -53,17 +57,17 @@ impl Cloud {
         }
     }
 
-    /// Returns the number of points.
+    /// Returns the number of points in the cloud.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Returns whether there are no points.
+    /// Returns whether the cloud has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Returns the points with the given indices, in that order, with their attributes.
+    /// Returns the cloud of the points with the given indices, in the order of the indices, with their attributes.
     pub fn select(&self, indices: &[u32]) -> Self {
         fn gather<T: Copy>(all: &[T], indices: &[u32]) -> Vec<T> {
             indices.iter().map(|&i| all[i as usize]).collect()
@@ -76,7 +80,8 @@ impl Cloud {
         }
     }
 
-    /// Returns the cloud without duplicates: the first of each set of equal points, in order.
+    /// Returns the cloud without duplicates: of each set of points with equal positions, the first is kept with its
+    /// attributes; the order is unchanged.
     pub fn distinct(&self) -> Self {
         let bits = |i: u32| self.points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
         let mut order: Vec<([u32; 3], u32)> = (0..self.len() as u32).map(|i| (bits(i), i)).collect();
@@ -86,10 +91,10 @@ impl Cloud {
         if first.len() == self.len() { self.clone() } else { self.select(&first) }
     }
 
-    /// Checks that there are at least `MIN_POINTS` points.
+    /// Checks that the cloud has at least `MIN_POINTS` points, the fewest that span a volume.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for fewer.
+    /// [`MethodError::InvalidArgument`] for fewer points.
     pub fn check_count(&self) -> Result<(), MethodError> {
         if self.len() >= MIN_POINTS {
             return Ok(());
@@ -98,7 +103,7 @@ impl Cloud {
         Err(MethodError::invalid("points", problem))
     }
 
-    /// Checks that the points span a volume.
+    /// Checks that the points span a volume, as a closed surface near them requires.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for points in one plane, or so near to one that their least standard deviation
@@ -115,20 +120,21 @@ impl Cloud {
         Ok(())
     }
 
-    /// Returns the cloud with its points mapped into the normalised box. Normals are unchanged, as `map` neither
-    /// rotates nor mirrors.
+    /// Returns the cloud with its points mapped by `map` from world units into the normalised box. Normals are
+    /// unchanged, as `map` neither rotates nor mirrors.
     pub fn mapped(&self, map: &BoxMap) -> Self {
         Self { points: self.points.iter().map(|&p| map.in_box(p)).collect(), ..self.clone() }
     }
 }
 
-/// Maximum number of points in each list of points for a linear system: the matrix of that many takes about 2 GB.
+/// Maximum number of points in each list that becomes constraints (samples, exterior and added points): the matrix of
+/// the linear system for that many takes about 2 GB.
 pub const MAX_POINTS: usize = 100_000;
 
 /// Checks that a list of `count` points has at most [`MAX_POINTS`].
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] naming the list, `name`, with both numbers.
+/// [`MethodError::InvalidArgument`] with the name of the list, `name`, and both numbers, if it has more.
 pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodError> {
     if count <= MAX_POINTS {
         return Ok(());
@@ -136,10 +142,10 @@ pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodErr
     Err(MethodError::invalid(name, format!("must have at most {MAX_POINTS} points, got {count}")))
 }
 
-/// Checks that all values are finite.
+/// Checks that all vectors of a list of points, normals or colours are finite.
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] naming the list, `name`, and its first value that is not.
+/// [`MethodError::InvalidArgument`] with the name of the list, `name`, and its first vector that is not.
 pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodError> {
     match values.iter().position(|p| !p.is_finite()) {
         Some(i) => Err(MethodError::invalid(name, format!("point {i} must be finite, got {}", values[i]))),
@@ -147,12 +153,15 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
     }
 }
 
-/// Smallest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
+/// Smallest accepted size of a point cloud, which is the longest side of its bounding box in world units; limited by
+/// single precision.
 const MIN_SIZE: f64 = 1e-27;
-/// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
+/// Largest accepted size of a point cloud, which is the longest side of its bounding box in world units; limited by
+/// single precision.
 const MAX_SIZE: f64 = 1e38;
-/// Maximum distance of the points from the origin along an axis, in longest sides of their bounding box: at this
-/// distance, the smallest cell that single precision resolves is already 1/30 of a side.
+/// Maximum distance of the points of a cloud from the origin along an axis, in units of the longest side of their
+/// bounding box: at this distance, the smallest extraction cell that single precision resolves is already 1/30 of that
+/// side.
 const MAX_SIZES_FROM_ORIGIN: f64 = 240.0;
 
 /// Uniform map from world units (those of the input points) into the normalised box, which is centred at the origin and
@@ -160,7 +169,7 @@ const MAX_SIZES_FROM_ORIGIN: f64 = 240.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMap {
     centre: DVec3,
-    /// Box units per world unit.
+    /// Units of the normalised box per world unit.
     scale: f64,
 }
 
@@ -173,14 +182,16 @@ impl BoxMap {
     }
 
     /// Returns an upper bound of the absolute coordinates of the points from which the map was made, in world units.
+    /// The larger it is, the coarser is single precision at the points.
     pub fn max_coordinate(&self) -> f64 {
         self.centre.abs().max_element() + 1.0 / self.scale
     }
 
-    /// Checks that single precision resolves the vertices of a surface near the points.
+    /// Checks that single precision resolves the vertices of a surface near the points from which the map was made.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for points too small or too large, or too far from the origin for their size.
+    /// [`MethodError::InvalidArgument`] for points whose bounding box is too small or too large, or too far from the
+    /// origin for its size.
     pub fn check_precision(&self) -> Result<(), MethodError> {
         let size = 2.0 / self.scale;
         let largest = self.max_coordinate() + size;
@@ -201,34 +212,34 @@ impl BoxMap {
         ))
     }
 
-    /// Returns the number of box units per world unit.
+    /// Returns the number of units of the normalised box per world unit.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// Maps a world point into the box, in single precision.
+    /// Maps a world point into the normalised box, rounded to single precision.
     pub fn in_box(&self, p: Vec3) -> Vec3 {
         self.in_box_exactly(p.as_dvec3()).as_vec3()
     }
 
-    /// Maps a world point into the box, in double precision.
+    /// Maps a world point into the normalised box, in double precision.
     pub fn in_box_exactly(&self, p: DVec3) -> DVec3 {
         (p - self.centre) * self.scale
     }
 
-    /// Maps a point of the box to world units.
+    /// Maps a point of the normalised box to world units.
     pub fn in_world(&self, p: DVec3) -> DVec3 {
         p / self.scale + self.centre
     }
 
-    /// Returns the map from world units into the box as an affine transformation.
+    /// Returns the map from world units into the normalised box as an affine transformation, for cameras.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.centre)
     }
 }
 
-/// Returns the mean distance from a point to its nearest neighbour, in the units of the points, estimated from at most
-/// 4000 of them; there must be at least two.
+/// Returns the mean distance from a point to its nearest neighbour, in the units of `points`, estimated from at most
+/// 4000 of them. There must be at least two points. It is the unit of search radii and cell sizes.
 pub fn mean_spacing(points: &[Vec3]) -> f64 {
     let tree =
         crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());
@@ -247,12 +258,12 @@ pub fn mean_spacing(points: &[Vec3]) -> f64 {
     sampled.map(distance).sum::<f64>() / count as f64
 }
 
-/// Maximum number of points from which the mean spacing is estimated: enough for an error of a hundredth.
+/// Maximum number of points from which [`mean_spacing`] is estimated: enough for an error of a hundredth.
 const SPACING_SAMPLE: usize = 4000;
 
-/// Returns the indices of the points in the `keep` largest clusters, in ascending order. Points belong to one cluster
-/// if their grid cells, with edges of length `cell`, are linked by a chain of cells with points that touch, even at a
-/// corner.
+/// Returns the indices of the points in the `keep` largest clusters, in ascending order, to discard outliers. Points
+/// belong to one cluster if their grid cells, with edges of length `cell`, are linked by a chain of cells with points
+/// that touch, even at a corner.
 pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     let clusters = clusters(points, cell);
     let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
@@ -288,7 +299,8 @@ fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     found
 }
 
-/// Returns a grid cell and its 26 neighbours; coordinates are `i32`, stored as the `u32` with the same bits.
+/// Returns a grid cell and its 26 neighbours, for joining the points of touching cells to clusters. Coordinates are
+/// `i32`, stored as the `u32` with the same bits.
 fn neighbours(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     let [x, y, z] = cell.map(|k| k as i32);
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
@@ -308,7 +320,7 @@ pub mod tests {
         random.next_u32() as f32 / 2_147_483_648.0 - 1.0
     }
 
-    /// Returns random points on the unit sphere.
+    /// Returns `count` random points on the unit sphere, a cloud for tests.
     pub fn on_ball(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(7);
         let mut point =

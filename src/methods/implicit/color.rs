@@ -1,4 +1,4 @@
-//! Vertex colours from the images of the cameras (paper, section VII-C).
+//! Vertex colours of the reconstructed surface from the images of the cameras (Dinh, Turk & Slabaugh, section VII-C).
 //!
 //! Each camera that sees a vertex contributes the colour of its image there, weighted by the cosine between the normal
 //! and the direction to the camera. The paper subdivides triangles until their footprint in the images is smaller than
@@ -14,29 +14,31 @@ use crate::mesh::TriangleMesh;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Largest side of a depth buffer, in pixels; one of this size takes 16 MB. Larger images get a buffer of lower
-/// resolution.
+/// Largest side of the depth buffer that decides which vertices a camera sees, in pixels; one of this size takes 16 MB.
+/// Larger images get a buffer of lower resolution.
 const LARGEST_BUFFER: u32 = 2048;
 
-/// Cosine between normal and direction to the camera below which the depth tolerance no longer grows. With a smaller
-/// value, vertices just behind a silhouette are seen through the surface; with a larger one, vertices of a steep side
-/// hide each other. A camera with such an oblique view has next to no weight.
+/// Cosine between surface normal and direction to the camera below which the depth tolerance of the visibility test no
+/// longer grows. With a smaller value, vertices just behind a silhouette are seen through the surface; with a larger
+/// one, vertices of a steep side hide each other. A camera with such an oblique view has next to no weight.
 const GRAZING: f64 = 0.1;
 
-/// Width of a silhouette, in pixels of the image. The surface is never exact, and at a silhouette where it is slightly
-/// too large, the image shows the background: on a painted ball too large by half a pixel, colours are off by 0.14 with
-/// a width of 0 and by 0.01 with 3. With 4, small parts in small images are nothing but silhouette, and colours are off
-/// by 0.07.
+/// Width, in image pixels, of the border of the visible part of the surface (the silhouette), where a camera has little
+/// weight. The surface is never exact, and where it is slightly too large, the image shows the background at its
+/// border: on a painted ball too large by half a pixel, colours are off by 0.14 with a width of 0 and by 0.01 with 3.
+/// With 4, small parts in small images are nothing but silhouette, and colours are off by 0.07.
 const SILHOUETTE_WIDTH: f64 = 3.0;
 
-/// Factor of the weight of a view at a silhouette: it matters only where no camera has a better view.
+/// Factor on the weight of a camera's colour for a vertex at a silhouette: such colours matter only where no camera has
+/// a better view.
 const SILHOUETTE_WEIGHT: f32 = 0.01;
 
-/// Margin of a triangle's pixel bounds against rounding, in pixels; without it, single pixels on edges are missed.
+/// Margin against rounding, in pixels, around the pixels that a triangle may cover in a depth buffer; without it,
+/// single pixels on edges are missed.
 const PIXEL_MARGIN: f64 = 1e-6;
 
-/// Returns the colour of each vertex, red, green and blue in 0..1, from all cameras that have an image; `None` if they
-/// see nothing of the surface. See [`Coloring`] for the requirements on the surface.
+/// Returns the colour of each vertex, red, green and blue in 0..1, from all cameras that have an image; `None` if no
+/// camera sees any of it. See [`Coloring`] for the requirements on the surface.
 pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
     let mut coloring = Coloring::new(surface.positions.len());
     cameras.iter().for_each(|camera| coloring.add(surface, camera));
@@ -45,18 +47,17 @@ pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
 
 /// Accumulates vertex colours of a surface, camera by camera.
 ///
-/// All calls must be given the same closed surface, counter-clockwise seen from outside, with valid indices. If it has
-/// no normals, those of [`TriangleMesh::vertex_normals`] are computed for each camera.
+/// All calls must be given the same closed surface, with triangles counter-clockwise seen from outside, with valid
+/// indices. If it has no normals, those of [`TriangleMesh::vertex_normals`] are computed for each camera.
 #[derive(Clone, Debug)]
 pub struct Coloring {
     gathered: Vec<WeightedColor>,
     depths: DepthBuffer,
 }
 
-/// The accumulated colour of a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 struct WeightedColor {
-    /// Sum of the colours, each times its weight.
+    /// Sum of the colours given to the vertex, each times its weight.
     color: Vec3,
     weight: f32,
 }
@@ -67,7 +68,8 @@ impl Coloring {
         Self { gathered: vec![WeightedColor::default(); vertices], depths: DepthBuffer::default() }
     }
 
-    /// Adds the colours that `camera` sees of the surface; none if it has no image.
+    /// Adds the colours of all vertices that `camera` sees, weighted by how well it sees them; does nothing if the
+    /// camera has no image.
     pub fn add(&mut self, surface: &TriangleMesh, camera: &Camera) {
         if !camera.has_image() {
             return;
@@ -91,14 +93,14 @@ impl Coloring {
         self.gathered[vertex].weight += weight;
     }
 
-    /// Returns whether no vertex has a colour.
+    /// Returns whether no vertex has been given a colour so far; colours of the input points are used then.
     pub fn is_empty(&self) -> bool {
         self.gathered.iter().all(|gathered| gathered.weight == 0.0)
     }
 
-    /// Returns the colour of each vertex: the weighted mean of those added. Unseen vertices take the mean of their
-    /// neighbours, ring by ring outwards from the seen ones; connected components of which nothing is seen take the
-    /// mean of all seen vertices. `None` if no vertex is seen.
+    /// Returns the colour of each vertex: the weighted mean of the colours added. Unseen vertices take the mean of
+    /// their neighbours, ring by ring outwards from the seen ones; connected components of which nothing is seen take
+    /// the mean of all seen vertices. `None` if no vertex is seen.
     pub fn finish(self, surface: &TriangleMesh) -> Option<Vec<Vec3>> {
         let mean = |g: &WeightedColor| (g.weight > 0.0).then(|| g.color / g.weight);
         let mut colors: Vec<Option<Vec3>> = self.gathered.iter().map(mean).collect();
@@ -108,7 +110,6 @@ impl Coloring {
     }
 }
 
-/// Returns the mean of `colors`, or `None` if there are none.
 fn mean_of(colors: impl Iterator<Item = Vec3>) -> Option<Vec3> {
     let (sum, count) = colors.fold((DVec3::ZERO, 0.0), |(sum, count), c| (sum + c.as_dvec3(), count + 1.0));
     (count > 0.0).then(|| (sum / count).as_vec3())
@@ -130,8 +131,8 @@ fn fill_unseen(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
     }
 }
 
-/// Lists of the neighbours of all vertices. A list names a neighbour once for every triangle that has both vertices: on
-/// a closed surface, all equally often.
+/// The neighbours of all vertices, from which unseen vertices take their colours. Each neighbour is listed once for
+/// every triangle that has both vertices: on a closed surface, all equally often, so that means are not biased.
 struct Neighbours {
     starts: Vec<usize>,
     all: Vec<usize>,
@@ -163,22 +164,23 @@ impl Neighbours {
     }
 }
 
-/// Depth buffer of one camera, to decide which vertices it sees.
+/// Depth buffer of one camera, to decide which vertices of the surface the camera sees.
 #[derive(Clone, Debug, Default)]
 struct DepthBuffer {
     width: usize,
     height: usize,
-    /// Buffer pixels per image pixel, at most 1.
+    /// Pixels of the depth buffer per image pixel along an axis, at most 1.
     scale: f64,
-    /// 1/depth at the centres of the pixels, row by row: unlike depth, it is linear over a triangle in the image. 0
-    /// where there is no surface.
+    /// 1/depth of the nearest surface at the centres of the buffer's pixels, row by row: unlike depth, it is linear
+    /// over a triangle in the image. 0 where there is no surface.
     inverse_depth: Vec<f32>,
-    /// The vertices as (x·depth, y·depth, depth), with x and y in buffer pixels.
+    /// The vertices of the surface as (x·depth, y·depth, depth), with x and y in buffer pixels; kept only to reuse the
+    /// memory.
     view: Vec<DVec3>,
 }
 
 impl DepthBuffer {
-    /// Renders `surface` as `camera` sees it, in place of the previous contents.
+    /// Renders the depths of `surface` as `camera` sees it, replacing the previous contents of the buffer.
     fn draw(&mut self, surface: &TriangleMesh, camera: &Camera) {
         let [width, height] = camera.size();
         self.scale = (f64::from(LARGEST_BUFFER) / f64::from(width.max(height))).min(1.0);
@@ -196,16 +198,16 @@ impl DepthBuffer {
         self.view = view;
     }
 
-    /// Returns the buffer coordinate, along either axis, of the centre of the image's first pixel: both start at the
-    /// same border.
+    /// Returns the position in the buffer, along either axis and in buffer pixels, of the centre of the first image
+    /// pixel: image and buffer start at the same border, but their pixels differ in size.
     fn shift(&self) -> f64 {
         0.5 * self.scale - 0.5
     }
 
-    /// Rasterises a triangle, whichever side faces the camera. It covers a pixel if the ray through the pixel's centre
-    /// is a combination of the corners with non-negative factors, which also holds for corners behind the camera (Olano
-    /// & Greer, *Triangle scan conversion using 2D homogeneous coordinates*, 1997). The three factors are linear over
-    /// the image and sum to 1/depth.
+    /// Rasterises a triangle into the depth buffer, whichever side faces the camera. It covers a pixel if the ray
+    /// through the pixel's centre is a combination of the corners with non-negative factors, which also holds for
+    /// corners behind the camera (Olano & Greer, *Triangle scan conversion using 2D homogeneous coordinates*, 1997).
+    /// The three factors are linear over the image and sum to 1/depth.
     fn draw_triangle(&mut self, corners: [DVec3; 3]) {
         let [a, b, c] = corners;
         let volume = a.dot(b.cross(c));
@@ -229,7 +231,8 @@ impl DepthBuffer {
         }
     }
 
-    /// Returns the columns and rows that the part of a triangle in front of the camera can cover.
+    /// Returns the ranges of the buffer's columns and rows that the part of a triangle in front of the camera can
+    /// cover.
     fn pixel_bounds(&self, corners: [DVec3; 3]) -> (Range<usize>, Range<usize>) {
         // Near plane, relative to the deepest corner: the image of an edge through the camera's plane is unbounded.
         let near = 1e-6 * corners.iter().fold(0.0, |deepest: f64, p| deepest.max(p.z));
@@ -285,8 +288,9 @@ impl DepthBuffer {
         Some((color, cosine as f32 * alpha * worth))
     }
 
-    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`SILHOUETTE_WIDTH`]
-    /// pixels to the left or right of it, above or below, in the image.
+    /// Returns whether a surface point is at a silhouette, where the camera gets little weight: something farther away
+    /// by several times `tolerance`, or nothing, is [`SILHOUETTE_WIDTH`] pixels to the left or right of it, above or
+    /// below, in the image.
     fn at_silhouette(&self, camera: &Camera, at: Projected, tolerance: f64) -> bool {
         let [width, height] = camera.size().map(|side| side as usize);
         let beyond = at.depth + (SILHOUETTE_WIDTH + 1.0) * tolerance;
@@ -300,9 +304,9 @@ impl DepthBuffer {
     }
 
     /// Returns the depth tolerance of the visibility test: a bound on the difference between a surface point at `depth`
-    /// and the buffer in the pixels around it. It is the change of depth in the tangent plane, plus the distance
-    /// spanned by these pixels for deviations from that plane. `slope` is the normal divided by its dot product with
-    /// the vector to the camera.
+    /// and the depths in the buffer's pixels around it. It is the change of depth in the tangent plane, plus the
+    /// distance spanned by these pixels for deviations from that plane. `slope` is the normal divided by its dot
+    /// product with the vector to the camera.
     fn depth_tolerance(&self, camera: &Camera, depth: f64, slope: DVec3) -> f64 {
         // One image pixel along each axis, and one buffer pixel more if those are larger.
         let pixels = if self.scale < 1.0 { 1.0 + 1.0 / self.scale } else { 1.0 };
@@ -310,8 +314,8 @@ impl DepthBuffer {
         pixels * depth * camera.pixel_axes().map(change).iter().sum::<f64>()
     }
 
-    /// Returns the least and the greatest depth in the buffer pixels around the centre of an image pixel, or those of a
-    /// single pixel if buffer and image have the same size. Infinite where there is no surface.
+    /// Returns the least and the greatest depth, in world units, in the buffer pixels around the centre of an image
+    /// pixel, or those of a single pixel if buffer and image have the same size. Infinite where there is no surface.
     fn depths_at(&self, pixel: [usize; 2]) -> [f64; 2] {
         let [column, row] = pixel.map(|at| at as f64 * self.scale + self.shift());
         let (mut nearest, mut farthest) = (0.0, f32::INFINITY);
@@ -326,8 +330,8 @@ impl DepthBuffer {
     }
 }
 
-/// Returns 1/depth of the farthest and of the nearest corner, the limits that interpolation over the triangle must not
-/// exceed by rounding.
+/// Returns 1/depth of the farthest and of the nearest corner of a triangle, limits that 1/depth interpolated over the
+/// triangle must not exceed by rounding. The upper one is infinite if a corner is not in front of the camera.
 fn nearness_limits(corners: [DVec3; 3]) -> Range<f64> {
     let depths = corners.map(|p| p.z);
     let [low, high] =
@@ -355,7 +359,8 @@ mod tests {
             mesh.to_triangles()
         }
 
-        /// Returns the distance at which a ray of unit length hits the ball, and the colour there; `None` if it misses.
+        /// Returns the distance at which the ray from `from` in the unit direction `ray` hits the ball, and the colour
+        /// there; `None` if it misses.
         fn hit(&self, from: DVec3, ray: DVec3) -> Option<(f64, [u8; 4])> {
             let (along, off) = ((self.centre - from).dot(ray), from - self.centre);
             let root = along * along - off.length_squared() + self.radius * self.radius;
@@ -376,7 +381,7 @@ mod tests {
         [r, g, b, 255]
     }
 
-    /// Returns a camera at `from` that looks at `to`, with an image of the balls in front of `background`.
+    /// Returns a test camera at `from` that looks at `to`, with an image of the balls in front of `background`.
     fn camera(balls: &[&Ball], from: DVec3, to: DVec3, size: [u32; 2], background: [u8; 4]) -> Camera {
         let ahead = (to - from).normalize();
         let right = ahead.any_orthonormal_vector();
@@ -417,8 +422,8 @@ mod tests {
         coloring.gathered.iter().map(|gathered| gathered.weight).collect()
     }
 
-    /// Returns the largest difference of a component of `colors` from the colour with which the unit ball is painted
-    /// there.
+    /// Returns the largest difference, over all vertices and channels, between `colors` and the colour with which the
+    /// unit ball is painted at a vertex; the error measure of the tests.
     fn worst(surface: &TriangleMesh, colors: &[Vec3]) -> f32 {
         let off = |(p, color): (&Vec3, &Vec3)| (*p * 0.4 + 0.5 - *color).abs().max_element();
         surface.positions.iter().zip(colors).map(off).fold(0.0, f32::max)

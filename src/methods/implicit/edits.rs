@@ -1,4 +1,4 @@
-//! Manual edits of the input: points added, removed, and marked as outside.
+//! Manual edits of the input points of an implicit surface: points added, removed, and marked as outside.
 
 use super::cloud::{BoxMap, Cloud, check_finite, check_max_count};
 use super::exterior::Exterior;
@@ -8,27 +8,29 @@ use crate::math::Vec3;
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 
-/// Manual edits of an implicit surface, as differences from its input points.
+/// Manual edits of the points that an implicit surface is fitted to, as differences from its input points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointEdits {
-    /// Additional points near the surface, in world units.
+    /// Points near the surface, in world units, that are used in addition to the input points.
     pub added: Vec<Vec3>,
-    /// Indices of input points to leave out; points at the same position are left out, too. If only a sample of the
-    /// points is used, removed samples are not replaced by others.
+    /// Indices of input points to leave out; other input points at the same position are left out, too. If only a
+    /// sample of the points is used, samples that are removed are not replaced by other points.
     pub removed: Vec<u32>,
-    /// Additional points known to be outside, in world units.
+    /// Points known to be outside the surface, in world units, that are used in addition to other exterior points.
     pub exterior: Vec<Vec3>,
 }
 
 /// Maximum distance, along each axis, from the centre of the input points' bounding box to a point that is added or
-/// marked as outside, in halves of the longest side of that box.
+/// marked as outside, in halves of the longest side of that box. The default cell size allows for a surface that
+/// extends so far.
 pub const MAX_ADDED_DISTANCE: f32 = 3.0;
 
 impl PointEdits {
-    /// Checks the edits against the input points: numbers of points, finite coordinates, distances and indices.
+    /// Checks the edits against `original`, the input points in world units, and `map`, their map into the normalised
+    /// box: numbers of points, finite coordinates, distances and indices.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
+    /// [`MethodError::InvalidArgument`] naming the list, the bad entry and what is accepted.
     pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
         for (name, points) in [("added", &self.added), ("exterior", &self.exterior)] {
             check_max_count(name, points.len())?;
@@ -52,7 +54,8 @@ impl PointEdits {
         }
     }
 
-    /// Checks that no point marked as outside coincides with a point of `surface`, a cloud in the normalised box.
+    /// Checks that no point marked as outside coincides with a point of `surface`, a cloud in the normalised box, into
+    /// which `map` maps world points: the implicit function cannot be both 0 and −1 there.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first point that does.
@@ -67,8 +70,8 @@ impl PointEdits {
         }
     }
 
-    /// Returns an index of the removed points by their positions in the normalised box; `original` holds all input
-    /// points.
+    /// Returns the positions of the removed points in the normalised box, as an index for finding out whether a point
+    /// was removed; `original` holds all input points, in world units.
     pub fn removed_positions(&self, original: &[Vec3], map: &BoxMap) -> PositionIndex {
         let positions: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
         PositionIndex::new(&positions)
@@ -99,8 +102,9 @@ impl PointEdits {
         cloud.select(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
     }
 
-    /// Builds the constraints, with λ still 0, from the sampled points, the exterior points and these edits; `original`
-    /// holds all input points.
+    /// Builds the constraints on the implicit function, with their regularisation λ still 0, from the sampled points,
+    /// the exterior points and these edits; `original` holds all input points in world units, and `map` maps these into
+    /// the normalised box.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if too few points remain, they lie in one plane, or a point is both on the

@@ -1,4 +1,5 @@
-//! Points for exterior constraints, at which f has to be −1 (paper, section VI-A).
+//! Exterior points, known to be outside the surface, at which the implicit function f has to be −1: they fix which side
+//! of the input points is outside (Dinh, Turk & Slabaugh, section VI-A).
 
 use super::camera::Camera;
 use super::cloud::Cloud;
@@ -7,43 +8,45 @@ use super::sampling::subsampled;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::PointGrid;
 
-/// Number of exterior points on the bounding sphere, which are always added.
+/// Number of exterior points on a sphere around all input points; they are always added.
 const SPHERE_POINTS: usize = 16;
-/// Radius of the bounding sphere, in half diagonals of the points' bounding box: small enough to confine the surface,
-/// and large enough that the surface does not bulge beyond it between points.
+/// Radius of the sphere of exterior points around the input points, in half diagonals of their bounding box: small
+/// enough to confine the surface, and large enough that the surface does not bulge beyond it between points.
 const SPHERE: f64 = 1.2;
-/// Number of surface points per exterior point near the surface.
+/// Number of surface points for which one exterior point near the surface is made.
 const SURFACE_POINTS: usize = 10;
-/// Lower bound of the number to which exterior points near the surface are reduced; clouds of more than ten times as
-/// many points get more.
+/// Number to which the exterior points near the surface are reduced for clouds of at most ten times as many points;
+/// larger clouds get more.
 const MIN_POINTS: usize = 30;
-/// Distance of exterior points from the surface, in mean spacings of the points, if no minimum is larger. At 1 they
-/// constrain less than noise does, at 6 they fall into cavities.
+/// Distance at which exterior points are made from surface points, in mean spacings of the points, unless [`NOISE`] or
+/// [`MIN_OFFSET`] requires more. At a distance of 1 they constrain less than noise does, at 6 they fall into cavities.
 const OFFSET: f32 = 3.0;
-/// Minimum distance of exterior points from the surface, in standard deviations of the noise.
+/// Minimum distance at which exterior points are made from surface points, in standard deviations of the noise of the
+/// surface points.
 const NOISE: f32 = 4.0;
-/// Minimum distance of exterior points from the surface, in box units: dense clouds are not less noisy.
+/// Minimum distance at which exterior points are made from surface points, in units of the normalised box (longest side
+/// 2): dense clouds are not less noisy.
 const MIN_OFFSET: f32 = 0.04;
-/// Minimum distance of an exterior point from all surface points, as a share of the distance at which it was made: a
-/// nearer one may be inside.
+/// Minimum distance of an exterior point from all surface points, as a share of its distance from the one from which it
+/// was made: a nearer one may be inside the surface, and is dropped.
 const MIN_CLEARANCE: f32 = 0.8;
 
-/// The points that become exterior constraints, in box units.
+/// The points outside the surface that become exterior constraints, in units of the normalised box.
 #[derive(Clone, Debug)]
 pub struct Exterior {
-    /// Points near the surface, given by the caller or made from the surface points.
+    /// Exterior points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
-    /// Distance of the points in `near` from the surface points from which they were made, in box units; 0 if they were
-    /// given.
+    /// Distance of the points in `near` from the surface points from which they were made, in units of the normalised
+    /// box; 0 if the caller gave them.
     pub offset: f32,
-    /// Points on the bounding sphere.
+    /// Exterior points on a sphere around all surface points, which confine the surface.
     pub on_sphere: Vec<Vec3>,
 }
 
 impl Exterior {
-    /// Returns those of [`Self::near`] that remain valid after edits: they are near a point of `surface`, the edited
-    /// points, from which they may have been made, and not too near to a point of `added`. Points given by the caller
-    /// are all kept.
+    /// Returns the exterior points [`Self::near`] that remain valid after edits of the surface points: they are near a
+    /// point of `surface`, the edited points, from which they may have been made, and not too near to a point of
+    /// `added`. Points given by the caller are all kept.
     pub fn valid_after_edits<'a>(
         &'a self,
         surface: &'a [Vec3],
@@ -63,7 +66,8 @@ impl Exterior {
 /// one is dropped, since the points from which it was made were removed.
 const MAX_OFFSETS: f32 = 1.25;
 
-/// Returns the exterior points `given` by the caller, in box units, and points on a bounding sphere of `cloud`.
+/// Returns the exterior points `given` by the caller, in units of the normalised box, with points on a sphere around
+/// `cloud`.
 pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
     Exterior { near: given, offset: 0.0, on_sphere: sphere_around(&cloud.points) }
 }
@@ -71,8 +75,9 @@ pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
 /// Makes exterior points for the surface points `cloud`, whose mean distance to the nearest neighbour is `spacing`.
 ///
 /// They are made from an even sample of the surface points, by an offset towards each camera that sees the point, or
-/// without cameras along the normal, given or estimated. Those too near to the surface are dropped, and Poisson-disc
-/// sampling leaves at most one for ten surface points, or 30 if that is more. Points on the bounding sphere are added.
+/// without cameras along the normal, given or estimated. Exterior points too near to the surface are dropped, and
+/// Poisson-disc sampling leaves at most one for ten surface points, or 30 if that is more. Points on a sphere around
+/// the cloud are added.
 pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let target_count = (cloud.len() / SURFACE_POINTS).max(MIN_POINTS);
     // A few more than wanted, as some will be rejected.
@@ -87,9 +92,9 @@ pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: 
     Exterior { near: kept.collect(), offset, on_sphere: sphere_around(&cloud.points) }
 }
 
-/// Directions that lead outwards from surface points, and the noise of the points.
+/// Directions that lead outwards from surface points, for making exterior points, and the noise of the surface points.
 struct OutwardDirections {
-    /// Indices of points, each with a direction; a point may have several, or none.
+    /// Pairs of the index of a surface point and a unit direction; a point may have several, or none.
     directions: Vec<(u32, Vec3)>,
     noise: f32,
 }
@@ -126,12 +131,12 @@ fn outward_directions(
     OutwardDirections { directions, noise: normals.noise }
 }
 
-/// Minimum number of points whose normals are estimated, even if fewer are needed: with fewer, neighbours may lie on
-/// different sides of a thin part.
+/// Minimum number of surface points whose normals are estimated, even if fewer are needed: with fewer, neighbours may
+/// lie on different sides of a thin part.
 const ORIENTED: usize = 3000;
 
-/// Returns the directions from each surface point in `positions`, given with its normal, to the cameras that see it:
-/// those in a direction whose cosine with the normal is above [`GRAZING`], and not occluded.
+/// Returns the directions from each surface point in `positions`, a list of indices and normals, to the cameras that
+/// see it: cameras in a direction whose cosine with the normal is above [`GRAZING`], and not occluded.
 ///
 /// Occlusion alone does not suffice, since rays slip through gaps in the far side of an object.
 fn towards_cameras(
@@ -154,11 +159,12 @@ fn towards_cameras(
     directions
 }
 
-/// Cosine between normal and direction to a camera below which the view is too oblique to tell the outer side.
+/// Cosine between the normal of a surface point and the direction to a camera below which the view is too oblique to
+/// show which side of the point is outside.
 const GRAZING: f32 = 0.2;
 
 /// Returns [`SPHERE_POINTS`] points spread evenly along a spiral on a sphere around the bounding box of `points`; its
-/// radius is [`SPHERE`] half diagonals of that box.
+/// radius is [`SPHERE`] half diagonals of that box. They become exterior constraints.
 fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let bounds = Bounds::from_points(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
@@ -173,15 +179,17 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     (0..SPHERE_POINTS).map(point).collect()
 }
 
-/// Edge length of an occlusion voxel, in mean spacings of the points: with 1.5, rays pass through the gaps of stereo
-/// data; with 6, the legs of an object merge.
+/// Edge length of the voxels that decide whether something hides a surface point from a camera, in mean spacings of the
+/// points: with 1.5, rays pass through the gaps of stereo data; with 6, the legs of an object merge.
 const VOXEL: f32 = 3.5;
-/// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
+/// Length of the start of a ray from a surface point to a camera, in occlusion voxels, where the ray is not tested for
+/// occlusion, as the voxels there contain the neighbourhood of the point itself.
 const UNTESTED_VOXELS: f32 = 1.5;
-/// Maximum length of the longest side of the points' bounding box, in occlusion voxels: smaller voxels are enlarged.
+/// Maximum number of occlusion voxels along the longest side of the points' bounding box, to limit memory; smaller
+/// voxels are enlarged.
 const MAX_VOXELS: f32 = 256.0;
 
-/// Voxels that contain points, to decide whether a camera sees a point.
+/// Grid of voxels, each marked if it contains surface points, to decide whether a camera sees a point.
 struct OccupancyGrid {
     origin: Vec3,
     edge: f32,
@@ -214,8 +222,8 @@ impl OccupancyGrid {
             .then(|| (z * self.dims[1] + y) * self.dims[0] + x)
     }
 
-    /// Returns whether the segment from `p` to `camera`, beyond the neighbourhood of `p`, passes no voxel with points;
-    /// it is tested every half voxel.
+    /// Returns whether the segment from the surface point `p` to the centre of a camera, `camera`, passes no voxel with
+    /// points beyond the neighbourhood of `p`; it is tested every half voxel.
     fn is_unoccluded(&self, p: Vec3, camera: Vec3) -> bool {
         let length = p.distance(camera);
         let step = (camera - p) / length * (0.5 * self.edge);
@@ -260,7 +268,7 @@ mod tests {
         (ring * ring + p.z * p.z).sqrt() - 0.3
     }
 
-    /// Returns a camera at `from`, which is not on the y axis, that looks at the origin.
+    /// Returns a test camera at `from`, which is not on the y axis, that looks at the origin.
     fn camera(from: DVec3) -> Camera {
         let ahead = -from.normalize();
         let right = ahead.cross(DVec3::Y).normalize();

@@ -1,5 +1,6 @@
-//! Extraction of the iso-surface by marching cubes, only in cells that it crosses, starting from those at the points
-//! (paper, section VII; Lorensen & Cline, *Marching cubes*, 1987).
+//! Extraction of an iso-surface of the implicit function by marching cubes, only in lattice cells that the surface
+//! crosses, starting from the cells at the points (Dinh, Turk & Slabaugh, section VII; Lorensen & Cline, *Marching
+//! cubes*, 1987).
 
 use super::cloud::BoxMap;
 use super::edits::MAX_ADDED_DISTANCE;
@@ -10,24 +11,26 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Lattice, SurfaceExtractor};
 
-/// Minimum and maximum default number of cells along the longest side of the points' bounding box; far from the origin
-/// there may be fewer.
+/// Minimum and maximum default number of extraction cells along the longest side of the points' bounding box; far from
+/// the origin there may be fewer, as single precision is coarser there.
 const CELLS: [f64; 2] = [64.0, 160.0];
-/// Default edge length of a cell, in mean spacings of the points, if [`CELLS`] allows it: finer detail comes from the
-/// kernel alone.
+/// Default edge length of an extraction cell, in mean spacings of the points, if [`CELLS`] allows it: finer detail
+/// comes from the kernel alone, not from the points.
 const CELL: f64 = 0.5;
-/// Margin of the lattice around the points, as a share of the longest side of their bounding box: the surface may bulge
-/// beyond them.
+/// Margin of the extraction lattice around the points, as a share of the longest side of their bounding box: the
+/// surface may bulge beyond them.
 const MARGIN: f64 = 0.3;
-/// Number of cells between the lines of the coarse scan, which finds connected components that no point is near.
+/// Number of extraction cells between the lattice lines that are scanned for connected components of the surface that
+/// no point is near.
 const SCAN: usize = 6;
-/// Evaluations of f per vertex to refine its position: after one parabolic step, the error is less than that of the
-/// fast sums.
+/// Number of evaluations of the implicit function f by which each vertex of the extracted surface is refined: after one
+/// parabolic step, the error is less than that of the fast multipole sums of f.
 const STEPS: usize = 1;
-/// Evaluations of f in a slice of work: about ten milliseconds.
+/// Number of evaluations of the implicit function f in one call of [`Extraction::advance`], which then takes about ten
+/// milliseconds.
 const SLICE: usize = 3000;
 
-/// Extraction of an iso-surface, slice by slice.
+/// Extraction of an iso-surface of the implicit function, in slices of about ten milliseconds of work.
 pub struct Extraction {
     field: FastField,
     map: BoxMap,
@@ -38,12 +41,13 @@ pub struct Extraction {
 
 enum Stage {
     Extract,
-    /// Computing the normals; holds the finished mesh, and the normals computed so far.
+    /// Computing the normals; holds the finished mesh, and the normals of its vertices computed so far.
     Normals(TriangleMesh, Vec<Vec3>),
 }
 
-/// Returns the default edge length of a cell, in world units, for points whose mean distance to the nearest neighbour
-/// is `spacing`, in box units. Far from the origin it is larger, as single precision is coarser there.
+/// Returns the default edge length of an extraction cell, in world units, for points whose mean distance to the nearest
+/// neighbour is `spacing`, in units of the normalised box. Far from the origin it is larger, as single precision is
+/// coarser there.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
     let around = (f64::from(MAX_ADDED_DISTANCE) + 2.0 * MARGIN) / map.scale();
@@ -51,12 +55,14 @@ pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     if cell > least { cell } else { least }
 }
 
-/// Maximum distance of a default lattice from the world's origin, in cell edges: a little less than [`Lattice`] allows.
+/// Maximum distance of the extraction lattice from the world's origin along an axis, in edges of the default cell: a
+/// little less than [`Lattice`] allows.
 const MAX_DISTANCE_IN_EDGES: f64 = 8100.0;
 
 impl Extraction {
-    /// Starts extracting the surface on which `field` equals `level`, from the cells around `points` and those that a
-    /// coarse scan finds; points and edge length of a cell, `cell`, are in world units.
+    /// Starts extracting the surface on which `field`, in the normalised box of `map`, equals `level`, from the cells
+    /// around `points` and those that a coarse scan of the lattice finds; `points` and the edge length of a cell,
+    /// `cell`, are in world units.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points; [`MethodError::Volume`]
@@ -84,7 +90,8 @@ impl Extraction {
         Ok(Self { field, map, level, extractor, stage: Stage::Extract })
     }
 
-    /// Does a slice of work. Returns the surface with its outward normals once it is finished, `None` before.
+    /// Does a slice of the extraction, about ten milliseconds of work. Returns the surface, in world units, with its
+    /// outward normals once it is finished, `None` before.
     ///
     /// # Errors
     /// [`MethodError::Volume`] if memory cannot be allocated.
@@ -118,7 +125,7 @@ impl Extraction {
         }
     }
 
-    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
+    /// Returns the approximate share of the extraction that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         match &self.stage {
             Stage::Extract => 0.8 * self.extractor.progress(),
@@ -128,7 +135,8 @@ impl Extraction {
         }
     }
 
-    /// Returns the surface extracted so far, with boundaries where it continues.
+    /// Returns the surface extracted so far, in world units, with open boundaries where it continues; for display
+    /// meanwhile.
     ///
     /// # Errors
     /// [`MethodError::Volume`] if memory cannot be allocated.
@@ -139,7 +147,8 @@ impl Extraction {
         }
     }
 
-    /// Returns the number of connected components found so far that no point is near; the coarse scan finds them.
+    /// Returns the number of connected components of the surface found so far that none of the points given to
+    /// [`Self::new`] is near; a coarse scan of the lattice finds them.
     pub fn spurious_components(&self) -> usize {
         self.extractor.components_found_by_scan()
     }

@@ -1,4 +1,5 @@
-//! The radial basis functions (paper, section V and equation 6).
+//! The radial basis functions (kernels) from which the implicit function is built (Dinh, Turk & Slabaugh, section V and
+//! equation 6).
 //!
 //! The multi-order kernel minimises first, second and third order energy at once: it is the fundamental solution of
 //! −δ²Δf + Δ²f − τ²Δ³f = 0. (The paper prints δ and τ without the squares; its own equation 6 has them.)
@@ -10,33 +11,34 @@ use std::f64::consts::PI;
 /// A radial basis function φ with its parameters, in units of the normalised box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kernel {
-    /// The paper's kernel (equation 6). It decays only as 1/(4πδ²r), with the default δ and τ to about two thousandths
-    /// of φ(0) at a distance of a hundred units, so it must not be truncated.
+    /// The multi-order kernel of Dinh, Turk & Slabaugh (equation 6). It decays only as 1/(4πδ²r), with the default δ
+    /// and τ to about two thousandths of φ(0) at a distance of a hundred units, so it must not be truncated.
     MultiOrder {
-        /// δ, an inverse length: a larger value makes the surface tighter.
+        /// δ, an inverse length in units of the normalised box: a larger value makes the surface tighter.
         delta: f64,
-        /// τ, a length: a larger value makes the surface smoother.
+        /// τ, a length in units of the normalised box: a larger value makes the surface smoother.
         tau: f64,
     },
-    /// |r|³, for comparison: the paper's thin plate (triharmonic in three dimensions).
+    /// |r|³, for comparison: the thin plate of Dinh, Turk & Slabaugh (triharmonic in three dimensions).
     ThinPlate {
-        /// Radius of a ball that contains all centres.
+        /// Radius of a ball that contains all centres: the kernel is shifted so that it is positive definite there.
         radius: f64,
     },
     /// −|r|, for comparison: the true thin plate of three dimensions (biharmonic).
     Biharmonic {
-        /// Radius of a ball that contains all centres.
+        /// Radius of a ball that contains all centres: the kernel is shifted so that it is positive definite there.
         radius: f64,
     },
-    /// exp(−r²/2σ²), for comparison.
+    /// The Gaussian exp(−r²/2σ²), for comparison.
     Gaussian {
-        /// σ, a length.
+        /// σ, the width of the Gaussian: a length in units of the normalised box.
         sigma: f64,
     },
 }
 
 impl Kernel {
-    /// Creates the kernel that `params` select, for centres in a ball of `radius`.
+    /// Creates the kernel that `params` select, for constraints whose centres are in a ball of `radius`, in units of
+    /// the normalised box.
     pub fn new(params: &ImplicitParams, radius: f64) -> Self {
         match params.kernel {
             KernelKind::MultiOrder => Self::MultiOrder { delta: params.delta, tau: params.tau },
@@ -46,20 +48,21 @@ impl Kernel {
         }
     }
 
-    /// Returns the number of polynomials that f has besides the kernel's terms: 1, the constant, or 4 for a thin plate,
-    /// with x, y and z.
+    /// Returns the number of polynomials that the implicit function f has besides its kernel terms: 1 (the constant),
+    /// or 4 for a thin plate (with x, y and z).
     pub fn polynomials(&self) -> usize {
         if matches!(self, Self::ThinPlate { .. }) { 4 } else { 1 }
     }
 
     /// Returns whether the kernel is only conditionally positive definite, that is, for weights orthogonal to the
-    /// polynomials. The absolute value of such a kernel grows with the distance.
+    /// polynomials. The absolute value of such a kernel grows with the distance, so that large terms cancel in sums,
+    /// which need more precision.
     pub fn is_conditional(&self) -> bool {
         matches!(self, Self::ThinPlate { .. } | Self::Biharmonic { .. })
     }
 
-    /// Returns φ(r) and its derivative by r², dφ/d(r²) = φ′(r)/2r; at r = 0 the limit of that, or 0 for −r, which has
-    /// none.
+    /// Returns the kernel φ(r) and its derivative by r², dφ/d(r²) = φ′(r)/2r; at r = 0 the limit of that, or 0 for −r,
+    /// which has none.
     ///
     /// r³ and −r are only conditionally positive definite. Both are shifted by terms that make them positive definite
     /// between points of the ball that contains all centres, and that vanish in every sum whose weights are orthogonal
@@ -85,16 +88,17 @@ impl Kernel {
 
 #[cfg(test)]
 impl Kernel {
-    /// Returns φ(r).
+    /// Returns the kernel φ at the distance `r`, for tests.
     pub fn value(&self, r: f64) -> f64 {
         self.value_and_slope(r)[0]
     }
 }
 
-/// Distance r, in decay lengths 1/a (see [`multi_order`]), below which the closed form suffers from cancellation, and
-/// the power series is used; there it has converged in [`TERMS`] terms.
+/// Distance r, in decay lengths 1/a (see [`multi_order`]), below which the closed form of the multi-order kernel
+/// suffers from cancellation, and its power series is used; there the series has converged in [`TERMS`] terms.
 const SERIES_BELOW: f64 = 0.5;
-/// Number of terms of the power series: 0.5²⁰/20! is below rounding for all parameters, as |b| is below 2a.
+/// Number of terms of the power series of the multi-order kernel: 0.5²⁰/20! is below rounding for all parameters, as
+/// |b| is below 2a.
 const TERMS: usize = 20;
 
 /// Returns φ(r) and dφ/d(r²) of the multi-order kernel, by equation 6 in real numbers: φ(r) = (1 − g(r)) / (4πδ²r),
@@ -140,7 +144,7 @@ fn damped_terms(a: f64, b_squared: f64, product: f64, r: f64) -> [f64; 2] {
 }
 
 /// Returns φ(r) and dφ/d(r²) of the multi-order kernel near its centre, from the power series φ = −scale Σ gₖ rᵏ⁻¹, k
-/// from 1; φ(0) = 1/(4πδ√(1+2δτ)).
+/// from 1; `product` is a² − b², `scale` is 1/(4πδ²), and φ(0) = 1/(4πδ√(1+2δτ)).
 fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2] {
     let mut g = [0.0; TERMS + 2];
     (g[0], g[1]) = (1.0, kappa - a);
@@ -162,25 +166,25 @@ fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2]
 #[derive(Clone, Debug)]
 pub struct KernelTable {
     kernel: Kernel,
-    /// φ and dφ/ds at r = 0.
+    /// The kernel φ and its derivative dφ/ds, where s = r², at r = 0, for distances below the table.
     centre: [f64; 2],
     cubics: Vec<[f64; 4]>,
 }
 
-/// Base-2 logarithm of the number of intervals in an octave of r². With a quarter of the intervals, the error exceeds
-/// 1e-6.
+/// Base-2 logarithm of the number of intervals into which the table divides an octave of r². With a quarter of the
+/// intervals, the table's error exceeds 1e-6.
 const PART_BITS: u32 = 5;
-/// Number of low bits of an `f64` that do not affect the choice of its interval.
+/// Number of low bits of a squared distance, as an `f64`, that do not affect the choice of its interval in the table.
 const SHIFT: u32 = 52 - PART_BITS;
-/// Lower end of the table, as a squared distance r² (r is about 1e-6); below it, φ is extrapolated linearly in r² from
-/// 0.
+/// Lower end of a [`KernelTable`], as a squared distance r² (r is about 1e-6); below it, φ is extrapolated linearly in
+/// r² from 0.
 const TABLE_START: f64 = 1.0 / (1_u64 << 40) as f64;
-/// Upper end of the table, as a squared distance r²: r = 16 box units, beyond the distances between any points in the
-/// box and around it. Farther away, the kernel itself is evaluated.
+/// Upper end of a [`KernelTable`], as a squared distance r²: r = 16 units of the normalised box, beyond the distances
+/// between any points in the box and around it. Farther away, the kernel itself is evaluated.
 const TABLE_END: f64 = 256.0;
 
 impl KernelTable {
-    /// Tabulates `kernel`.
+    /// Tabulates `kernel` over the squared distance, for fast evaluation.
     pub fn new(kernel: Kernel) -> Self {
         let cubics = (interval(TABLE_START)..=interval(TABLE_END)).map(|index| {
             let [from, to] = [index, index + 1].map(|bits| f64::from_bits(bits << SHIFT));
@@ -189,12 +193,13 @@ impl KernelTable {
         Self { kernel, centre: kernel.value_and_slope(0.0), cubics: cubics.collect() }
     }
 
-    /// Returns the tabulated kernel.
+    /// Returns the kernel that is tabulated.
     pub fn kernel(&self) -> Kernel {
         self.kernel
     }
 
-    /// Returns φ at the squared distance `s`, from the table.
+    /// Returns the kernel φ at the squared distance `s`, from the table, or beyond its upper end from the kernel
+    /// itself.
     #[inline]
     pub fn value(&self, s: f64) -> f64 {
         match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
@@ -206,7 +211,8 @@ impl KernelTable {
         }
     }
 
-    /// Returns φ and dφ/ds at the squared distance `s`, from the table.
+    /// Returns the kernel φ and its derivative dφ/ds at the squared distance `s`, from the table, or beyond its upper
+    /// end from the kernel itself.
     #[inline]
     pub fn value_and_slope(&self, s: f64) -> [f64; 2] {
         match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
@@ -228,21 +234,21 @@ impl KernelTable {
     }
 }
 
-/// Returns the number of the interval that contains `s`, in the table or not, counted from that of 0; it consists of
-/// the leading bits of `s`.
+/// Returns the number of the interval of a [`KernelTable`] that contains the squared distance `s`, counted from the one
+/// that contains 0: the leading bits of `s`. It may be outside the table.
 #[inline]
 fn interval(s: f64) -> u64 {
     s.to_bits() >> SHIFT
 }
 
-/// Returns the lower end of the interval that contains `s`.
+/// Returns the lower end of the interval of a [`KernelTable`] that contains the squared distance `s`.
 #[inline]
 fn interval_start(s: f64) -> f64 {
     f64::from_bits(s.to_bits() >> SHIFT << SHIFT)
 }
 
 /// Returns the coefficients, constant first, of the cubic with the given values and slopes at both ends of an interval
-/// (Hermite interpolation), as a function of the distance from its lower end.
+/// of the table (Hermite interpolation), as a function of the distance from its lower end.
 fn cubic([a, slope_a]: [f64; 2], [b, slope_b]: [f64; 2], width: f64) -> [f64; 4] {
     let rise = (b - a) / width;
     [
@@ -260,8 +266,9 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Rows of δ, τ, r and φ(r): equation 6 in complex arithmetic of 60 digits, by mpmath, with v, w = (1 ± √(1 −
-    /// 4δ²τ²)) / 2τ² and at 2δτ = 1 the limit: (1 + (w e^(−r√v) − v e^(−r√w)) / (v − w)) / 4πδ²r.
+    /// Reference values of the multi-order kernel, rows of δ, τ, r and φ(r): equation 6 in complex arithmetic of 60
+    /// digits, by mpmath, with v, w = (1 ± √(1 − 4δ²τ²)) / 2τ² and at 2δτ = 1 the limit: (1 + (w e^(−r√v) − v e^(−r√w))
+    /// / (v − w)) / 4πδ²r.
     const REFERENCE: &[(f64, f64, f64, f64)] = &[
         (5.0, 0.025, 1e-06, 0.014235250867869038),
         (5.0, 0.025, 0.001, 0.014234781622721626),
@@ -345,7 +352,7 @@ mod tests {
         1.0 / (4.0 * PI * delta * (1.0 + 2.0 * delta * tau).sqrt())
     }
 
-    /// Returns random points in the unit ball, each with another close to it.
+    /// Returns random points in the unit ball, each with another close to it, as ill-conditioned input for tests.
     fn points(count: usize, seed: u64) -> Vec<DVec3> {
         let mut random = Random::new(seed);
         let mut found = Vec::new();
@@ -537,8 +544,8 @@ mod tests {
         }
     }
 
-    /// Bound for the error of every table, relative to φ(0). The multi-order kernel is off by 2.6e-9 at its defaults
-    /// and 4e-9 at most.
+    /// Bound for the error of the table of every kernel in the tests, relative to φ(0). The multi-order kernel is off
+    /// by 2.6e-9 at its defaults and 4e-9 at most.
     const TABLE_ERROR: f64 = 1e-7;
 
     /// Returns whether a symmetric matrix is positive definite, by trying a Cholesky factorisation.

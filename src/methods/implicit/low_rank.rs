@@ -1,23 +1,25 @@
-//! Low-rank approximation of kernel blocks between separated clusters, by adaptive cross approximation with partial
-//! pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
+//! Low-rank approximation of matrix blocks that hold a kernel between the points of two separated clusters, by adaptive
+//! cross approximation with partial pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
 
 use super::vectors::{MatrixScalar, dot};
 
-/// A matrix block as a sum of outer products, Σ uₖ vₖᵀ.
+/// A matrix block approximated as a sum of outer products, Σ uₖ vₖᵀ, which takes less memory and time than all its
+/// entries.
 #[derive(Clone, Debug)]
 pub struct LowRank<T> {
-    /// The vectors uₖ one after the other, each with one entry per row of the block.
+    /// The vectors uₖ of the sum Σ uₖ vₖᵀ, one after the other, each with one entry per row of the block.
     pub columns: Vec<T>,
-    /// The vectors vₖ one after the other, each with one entry per column of the block.
+    /// The vectors vₖ of the sum Σ uₖ vₖᵀ, one after the other, each with one entry per column of the block.
     pub rows: Vec<T>,
 }
 
-/// Maximum rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
+/// Maximum rank of the low-rank approximation of a matrix block, whatever its error; blocks between separated clusters
+/// stay far below it.
 const MAX_RANK: usize = 64;
 
-/// Approximates a block of `height` by `width` entries by a low-rank matrix, to a relative error of about `tolerance`
-/// in the Frobenius norm, unless that takes a rank above `MAX_RANK`. `row` and `column` write the entries of a row or
-/// column, given its index.
+/// Approximates a matrix block of `height` by `width` entries by a low-rank matrix, to a relative error of about
+/// `tolerance` in the Frobenius norm, unless that takes a rank above `MAX_RANK`. `row` and `column` write the entries
+/// of a row or column, given its index.
 pub fn cross_approximation<T: MatrixScalar>(
     [height, width]: [usize; 2],
     tolerance: f64,
@@ -61,7 +63,8 @@ pub fn cross_approximation<T: MatrixScalar>(
     LowRank { columns: rounded(&us), rows: rounded(&vs) }
 }
 
-/// Subtracts the approximation so far from a row or column of the block: the sum of `parts`, each times its `weight`.
+/// Subtracts the low-rank approximation so far from a row or column of the block: the sum of `parts`, each times its
+/// `weight`.
 fn subtract(values: &mut [f64], parts: &[Vec<f64>], weight: impl Fn(usize) -> f64) {
     for (k, part) in parts.iter().enumerate() {
         let weight = weight(k);

@@ -1,4 +1,5 @@
-//! Fitness of a surface: distances of the points from it, and its curvature (paper, section VI-C).
+//! Fitness of a reconstructed surface: distances of the points from it, and its curvature (Dinh, Turk & Slabaugh,
+//! section VI-C).
 
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, curvature};
@@ -6,17 +7,18 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 use serde::Serialize;
 
-/// Distances of points from a surface, in the units of the points, and how curved the surface is.
+/// How well a surface fits points: their distances from it, in the units of the points, and how curved the surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Fitness {
-    /// Mean distance of the points from the surface.
+    /// Mean distance of the points from the surface, in their units.
     pub mean: f64,
-    /// Root mean square distance of the points from the surface.
+    /// Root mean square distance of the points from the surface, in their units.
     pub rms: f64,
-    /// Largest distance of a point from the surface.
+    /// Largest distance of a point from the surface, in the points' units.
     pub max: f64,
-    /// Mean over the vertices of |H|, the absolute mean curvature of the surface, per unit of length.
+    /// Mean over the vertices of |H|, the absolute mean curvature of the surface, in inverse units of the points'
+    /// coordinates.
     pub mean_curvature: f64,
 }
 

@@ -73,17 +73,19 @@ use point_colors::PointColors;
 use sampling::{Samples, Sampling};
 use solve::{Constraints, PositionIndex, Solution, Solver};
 
-/// Options of an [`ImplicitSurface`], beside its points.
+/// Options of an [`ImplicitSurface`], given to [`ImplicitSurface::new`] together with its points.
 #[derive(Clone, Debug)]
 pub struct ImplicitOptions {
-    /// Points known to be outside, in world units (those of the input points); if `None`, exterior points are made from
-    /// cameras, normals or the points alone. In both cases some on a bounding sphere are added.
+    /// Points known to be outside the surface, in world units (those of the input points); if `None`, exterior points
+    /// are made from cameras, normals or the points alone. In both cases, points on a sphere around all points are
+    /// added.
     pub exterior: Option<Vec<Vec3>>,
-    /// Cameras from which the points were made; their images colour the surface.
+    /// Cameras that photographed the object: they show on which side of the points the outside is, and their images
+    /// colour the surface.
     pub cameras: Vec<Camera>,
-    /// Maximum number of points that become surface constraints; more are subsampled.
+    /// Maximum number of points that become surface constraints; larger clouds are subsampled.
     pub max_points: usize,
-    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all.
+    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all clusters.
     pub keep_components: Option<usize>,
     /// Initial parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
@@ -101,18 +103,19 @@ impl Default for ImplicitOptions {
     }
 }
 
-/// Default of [`ImplicitOptions::max_points`].
+/// Default value of [`ImplicitOptions::max_points`].
 const DEFAULT_POINTS: usize = 20_000;
-/// Maximum size of a matrix, in bytes, that is kept after a solve for later edits; a larger one is rebuilt when needed.
+/// Maximum size, in bytes, of the linear system's matrix that is kept after a solve, so that edits of the points need
+/// not rebuild it; a larger one is rebuilt when needed.
 const KEPT_BYTES: usize = 256 << 20;
-/// Seed of all random choices.
+/// Seed of all random choices: a constant, so that equal input gives equal results.
 const SEED: u64 = 1;
 
 /// Reconstruction of an implicit surface from points, step by step, up to a coloured mesh.
 pub struct ImplicitSurface {
     /// The input points, in world units.
     original: Vec<Vec3>,
-    /// The input points without duplicates, in the normalised box.
+    /// The input points without duplicates, mapped into the normalised box.
     cloud: Cloud,
     map: BoxMap,
     options: ImplicitOptions,
@@ -120,19 +123,20 @@ pub struct ImplicitSurface {
     edits: PointEdits,
     samples: Option<Samples>,
     exterior: Option<Exterior>,
-    /// The current constraints, from samples, exterior points and edits.
+    /// The current constraints on the implicit function, made from samples, exterior points and edits.
     constraints: Constraints,
     stage: Stage,
-    /// Slices of work done in the current stage; 0 in a solve, as the solver counts its own.
+    /// Slices of work done in the current stage, so that a saved run can be continued there; 0 in a solve, as the
+    /// solver counts its own.
     slices: u32,
     solved: Option<Solved>,
-    /// The edits at the last full solve, whose system later edits revise.
+    /// The edits of the points at the last full solve; the linear system of that solve is revised for later edits.
     base_edits: Option<PointEdits>,
-    /// The solver of the last full solve, possibly revised since; `None` before it, during a solve, and if its matrix
-    /// is too large to keep.
+    /// The solver of the last full solve, possibly revised since, kept for later edits; `None` before it, during a
+    /// solve, and if its matrix is too large to keep.
     solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
-    /// Counter of changes of the surface or its colours, for callers that draw it.
+    /// Counter of changes of the surface or its colours, so that callers know when to draw it again.
     version: u32,
     components: u32,
     euler: i64,
@@ -142,13 +146,13 @@ pub struct ImplicitSurface {
     clock: fn() -> f64,
 }
 
-/// The solved implicit function, with its centres and kernel.
+/// The implicit function found by the last solve, with its centres and kernel.
 #[derive(Clone, Debug)]
 struct Solved {
     centres: Vec<Vec3>,
     solution: Solution,
     kernel: Kernel,
-    /// Mean of f over the surface constraints.
+    /// Mean of the implicit function over the surface constraints, one of the choices for the iso-value.
     mean: f64,
     field: Field,
 }
@@ -159,8 +163,8 @@ impl Solved {
         Self { centres, solution, kernel, mean, field }
     }
 
-    /// Returns the weights of the solution at the centres of `constraints`, 0 at new ones: the start of a revised
-    /// solve.
+    /// Returns the weights of this solution at the centres of `constraints`, and 0 at new centres, as initial values
+    /// for the solve after an edit.
     fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
         let known = PositionIndex::new(&self.centres);
         let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
@@ -168,7 +172,7 @@ impl Solved {
     }
 }
 
-/// The stage of the pipeline that is to be done next.
+/// The stage of the reconstruction that the next call of [`ImplicitSurface::step`] works on, with its data.
 enum Stage {
     Subsample(Box<Sampling>),
     Constrain,
@@ -182,14 +186,14 @@ enum Stage {
 struct ColoringState {
     mesh: TriangleMesh,
     coloring: Coloring,
-    /// Index of the camera whose image is used next.
+    /// Index of the camera whose image is used next, in [`ImplicitOptions::cameras`].
     camera: usize,
-    /// Interpolation of the points' colours, if no camera saw anything.
+    /// Interpolation of the colours of the input points, used if no camera sees the surface; `None` before that.
     points: Option<PointColors>,
 }
 
 impl ImplicitSurface {
-    /// Creates the reconstruction from `points`, before its first step.
+    /// Creates a reconstruction of the surface near `points`, which [`Self::step`] then computes.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the array, option or parameter that cannot be used, and what is
@@ -243,14 +247,14 @@ impl ImplicitSurface {
         self.clock = clock;
     }
 
-    /// Does one slice of the current stage: some ten milliseconds of work with some ten thousand points. Does nothing
-    /// once the surface is complete.
+    /// Continues the reconstruction by one slice of its current stage: some ten milliseconds of work with some ten
+    /// thousand points. Does nothing once the surface is complete.
     ///
     /// # Errors
     /// [`MethodError::Singular`] if the system cannot be solved; [`MethodError::InvalidArgument`] if too few sampled
     /// points are left, if they lie in one plane or coincide with exterior points, or if the cell does not suit them;
-    /// [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and other parameters may
-    /// be set.
+    /// [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and the run can continue
+    /// with other parameters.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let (phase, start) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
@@ -262,8 +266,8 @@ impl ImplicitSurface {
         Ok(self.report(phase, times))
     }
 
-    /// Does one slice of the current stage. On an error the last surface is kept, and [`Self::fallback`] is the next
-    /// stage.
+    /// Continues the reconstruction by one slice of its current stage. On an error the last finished surface is kept,
+    /// and [`Self::fallback`] is the next stage.
     fn advance(&mut self) -> Result<(), MethodError> {
         let fallback = self.fallback();
         let stage = std::mem::replace(&mut self.stage, fallback);
@@ -309,7 +313,8 @@ impl ImplicitSurface {
         Ok(if self.exterior.is_some() { self.begin_solve() } else { first_stage(&self.options) })
     }
 
-    /// Builds the constraints from the samples; does nothing before these are selected.
+    /// Makes the exterior points, and builds the constraints on the implicit function from them, the samples and the
+    /// edits; does nothing before the samples are selected.
     fn make_constraints(&mut self) -> Result<(), MethodError> {
         let Some(samples) = &self.samples else { return Ok(()) };
         let exterior = match &self.options.exterior {
@@ -334,7 +339,8 @@ impl ImplicitSurface {
         constraints
     }
 
-    /// Starts a full solve of the current constraints, and returns its stage.
+    /// Starts to solve the linear system of the current constraints from scratch; returns the stage in which
+    /// [`Self::advance`] continues.
     fn begin_solve(&mut self) -> Stage {
         self.base_edits = Some(self.edits.clone());
         self.solver = None;
@@ -346,8 +352,8 @@ impl ImplicitSurface {
         Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
     }
 
-    /// Starts a solve that revises the system of the last full solve, or a full one if that is impossible; returns its
-    /// stage.
+    /// Starts to solve the linear system of the current constraints after an edit: by revising the system of the last
+    /// full solve, or from scratch if that is impossible. Returns the stage in which [`Self::advance`] continues.
     fn begin_revision(&mut self) -> Stage {
         self.revised_solver().map_or_else(|| self.begin_solve(), Stage::Solve)
     }
@@ -364,8 +370,8 @@ impl ImplicitSurface {
         is_usable.then_some(solver)
     }
 
-    /// Returns the constraints of the last full solve, rebuilt from its edits; `None` before the first, or after it
-    /// failed.
+    /// Returns the constraints of the last full solve, rebuilt from its edits so that its linear system can be rebuilt
+    /// and revised; `None` before the first full solve, or after it failed.
     fn base_constraints(&self) -> Option<Constraints> {
         let (edits, samples, exterior) =
             (self.base_edits.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
@@ -385,7 +391,7 @@ impl ImplicitSurface {
         self.begin_extraction()
     }
 
-    /// Returns the error of a failed solve, and discards its system, which cannot be revised.
+    /// Returns the error of a failed solve, and discards its linear system, so that later edits do not revise it.
     fn singular(&mut self) -> MethodError {
         (self.base_edits, self.solver) = (None, None);
         let cause = if self.params.lambda_surface == 0.0 {
@@ -408,7 +414,8 @@ impl ImplicitSurface {
         points.iter().map(|p| self.map.in_world(p.as_dvec3()).as_vec3()).collect()
     }
 
-    /// Returns the iso-value of f at which the surface is extracted.
+    /// Returns the iso-value of the implicit function f, chosen by the parameter `level`, at which the surface is
+    /// extracted.
     fn iso_value(&self, solved: &Solved) -> f64 {
         match self.params.level {
             IsoValue::Zero => 0.0,
@@ -451,14 +458,14 @@ impl ImplicitSurface {
         self.version = self.version.wrapping_add(1);
     }
 
-    /// Returns the stage to continue with if the current one fails: the first one if there is no surface yet, else the
-    /// end.
+    /// Returns the stage to continue with if the current one fails: the first one if there is no finished surface yet,
+    /// else [`Stage::Done`].
     fn fallback(&self) -> Stage {
         if self.mesh.triangles.is_empty() { first_stage(&self.options) } else { Stage::Done }
     }
 
-    /// Returns the edge length of an extraction cell, in world units: as set, or if that is 0, derived from the spacing
-    /// of the samples; 0 before these are selected.
+    /// Returns the edge length of an extraction cell, in world units: the parameter `cell`, or if that is 0, a length
+    /// derived from the mean spacing of the sampled points; 0 until these are selected.
     pub fn cell(&self) -> f64 {
         match &self.samples {
             Some(samples) if self.params.cell == 0.0 => default_cell(&self.map, samples.spacing),
@@ -466,17 +473,17 @@ impl ImplicitSurface {
         }
     }
 
-    /// Returns the current parameters.
+    /// Returns the current parameters of the reconstruction.
     pub fn params(&self) -> &ImplicitParams {
         &self.params
     }
 
-    /// Sets the parameters. The surface stays until the new one is complete. If only cell or iso-value change, the
-    /// system is not solved again.
+    /// Sets the parameters, with which the reconstruction continues. The last finished surface stays until the new one
+    /// is complete. If only cell or iso-value change, the system is not solved again.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the parameter, or [`MethodError::Volume`] if memory cannot be allocated;
-    /// nothing has changed then.
+    /// [`MethodError::InvalidArgument`] naming the parameter that is out of range, or [`MethodError::Volume`] if memory
+    /// cannot be allocated; nothing has changed then.
     pub fn set_params(&mut self, params: ImplicitParams) -> Result<(), MethodError> {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
@@ -500,18 +507,18 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// Returns the current edits of the input points.
+    /// Returns the current edits of the input points, as set by [`Self::set_edits`].
     pub fn edits(&self) -> &PointEdits {
         &self.edits
     }
 
-    /// Replaces all edits: points added, removed and marked as outside. The surface stays until the new one is
-    /// complete. If only a few constraints change, the last system is revised: its solution is reused, and its matrix,
-    /// unless that was too large to keep.
+    /// Replaces all edits of the input points: points added, removed and marked as outside. The last finished surface
+    /// stays until the new one is complete. If only a few constraints change, the last system is revised: its solution
+    /// is reused, and its matrix, unless that was too large to keep.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left, or all lie in one
-    /// plane; nothing has changed then.
+    /// [`MethodError::InvalidArgument`] naming the list and the bad entry, or if too few points are left, or all lie in
+    /// one plane; nothing has changed then.
     pub fn set_edits(&mut self, edits: PointEdits) -> Result<(), MethodError> {
         edits.validate(&self.original, &self.map)?;
         let remaining = edits.apply_to(&self.cloud, &self.original, &self.map);
@@ -535,19 +542,20 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// Returns the last finished surface; empty before the first. It is in world units, with outward normals from the
-    /// gradient of f, and colours if an image shows it or points with colours are near.
+    /// Returns the last finished surface; empty before the first is finished. It is in world units, with outward
+    /// normals from the gradient of f, and colours if an image shows it or points with colours are near.
     pub fn surface(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// Returns a counter that increases when the surface or its colours change.
+    /// Returns a counter that increases when the surface or its colours change, so that a caller knows when to draw it
+    /// again.
     pub fn version(&self) -> u32 {
         self.version
     }
 
-    /// Returns the surface that is being extracted, as far as it is complete, with boundaries where it continues; while
-    /// it is being coloured, all of it. Empty in other stages.
+    /// Returns, for display, the surface that is being extracted, in world units, as far as it is complete, with
+    /// boundaries where it continues; while it is being coloured, all of it. Empty in other stages.
     ///
     /// # Errors
     /// [`MethodError::Volume`] if memory cannot be allocated.
@@ -559,19 +567,20 @@ impl ImplicitSurface {
         }
     }
 
-    /// Returns the number of connected components of the last surface that no surface constraint is near.
+    /// Returns the number of connected components of the last finished surface that no surface constraint is near, and
+    /// that the points therefore do not support.
     pub fn spurious_components(&self) -> usize {
         self.spurious_components
     }
 
-    /// Returns the number of input points that were left out because they equal another, at the latest when scaled into
-    /// the normalised box in single precision.
+    /// Returns the number of input points that are ignored because they equal another one, exactly or after rounding to
+    /// single precision in the normalised box.
     pub fn duplicates(&self) -> usize {
         self.original.len() - self.cloud.len()
     }
 
-    /// Returns the mean distance from a sample to its nearest neighbour, estimated from at most 4000 samples, in box
-    /// units; 0 before the samples are selected.
+    /// Returns the mean distance from a sampled point to its nearest neighbour, estimated from at most 4000 samples, in
+    /// units of the normalised box (longest side 2); 0 before the samples are selected.
     pub fn spacing(&self) -> f64 {
         self.samples.as_ref().map_or(0.0, |samples| samples.spacing)
     }

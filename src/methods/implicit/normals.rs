@@ -8,28 +8,33 @@ use crate::spatial::PointGrid;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Radii of the neighbourhoods to which planes are fitted, in mean spacings of the points; one of them is chosen.
+/// Radii of the neighbourhoods to which planes are fitted, in mean spacings of the points; the smallest with planar
+/// neighbourhoods is chosen.
 const RADII: [f32; 7] = [3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0];
-/// Ratio of thickness to width below which a neighbourhood counts as planar; noise is then a tenth of its radius.
+/// Ratio of the standard deviations of a neighbourhood's points across their fitted plane and within it, below which
+/// the neighbourhood counts as planar; noise is then a tenth of its radius.
 const FLAT: f64 = 0.2;
-/// Maximum number of points whose neighbourhoods are tested to choose the radius.
+/// Maximum number of points whose neighbourhoods are tested to choose one of [`RADII`].
 const TRIALS: usize = 200;
-/// Number of nearest neighbours of a point that are tested as its neighbours along the surface.
+/// Number of nearest points to which each point is linked in the graph along which normals are oriented, unless they
+/// are on another sheet of the surface.
 const NEIGHBOURS: usize = 10;
 
-/// Unit normals at some points of a cloud, and the noise of the cloud.
+/// Unit normals of the surface at some points of a cloud, and the noise of the cloud, for making exterior points.
 pub struct Normals {
-    /// One normal per point, outwards as far as can be determined.
+    /// Unit normals, one for each point at which they were requested, pointing outwards as far as can be determined.
     pub directions: Vec<Vec3>,
-    /// Standard deviation of the points from their fitted planes, in units of the points; 0 if normals were given.
+    /// Noise of the points: their standard deviation from the planes fitted to them, in units of their coordinates; 0
+    /// if normals were given.
     pub noise: f32,
 }
 
 /// Estimates normals of the surface near `points`, whose mean distance to the nearest neighbour is `spacing`, at the
 /// points with indices `at`.
 ///
-/// Within each connected component of the neighbour graph, normals are oriented like an already oriented neighbour, the
-/// pair with the smallest angle first; then each component is oriented such that it encloses a positive volume.
+/// Within each connected component of the graph that links neighbouring points, normals are oriented like an already
+/// oriented neighbour, the pair with the smallest angle first; then each component is oriented such that it encloses a
+/// positive volume.
 pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     let grid = PointGrid::of(points, RADII[0] * spacing);
     let positions: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
@@ -47,12 +52,13 @@ pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     Normals { directions, noise: noise as f32 }
 }
 
-/// The least-squares plane of a neighbourhood.
+/// The least-squares plane of the points around a position, whose normal is an estimate of the surface normal.
 struct Plane {
     normal: Vec3,
-    /// Standard deviation of the points across the plane.
+    /// Standard deviation of the points across the plane, in units of their coordinates.
     thickness: f64,
-    /// Standard deviation of the points within the plane, along the direction in which it is least.
+    /// Standard deviation of the points within the plane, along the direction in which it is least, in units of their
+    /// coordinates.
     width: f64,
 }
 
@@ -78,8 +84,9 @@ impl Plane {
     }
 }
 
-/// Returns the smallest radius of [`RADII`] whose median neighbourhood is planar, or else the one whose median
-/// neighbourhood is flattest, and the thickness of that neighbourhood. Both are in units of the points.
+/// Returns the radius of the neighbourhoods to which planes are fitted, the smallest of [`RADII`] whose median
+/// neighbourhood is planar, or else the one whose median neighbourhood is flattest; and the thickness of that
+/// neighbourhood. Both are in units of the points' coordinates.
 fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, f64) {
     let step = positions.len().div_ceil(TRIALS);
     let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
@@ -98,8 +105,9 @@ fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, 
     (best.1, best.2)
 }
 
-/// Returns the undirected neighbour graph of `positions`: each is linked to its [`NEIGHBOURS`] nearest ones, except
-/// those on another sheet, across a gap or a thin wall. `radius` is the initial search radius.
+/// Returns the graph along which normals are oriented, as lists of neighbours: each of `positions` is linked to its
+/// [`NEIGHBOURS`] nearest ones, except those on another sheet of the surface, across a gap or a thin wall. `radius` is
+/// the initial search radius.
 fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     let grid = PointGrid::of(positions, radius);
     let near = |&p: &Vec3| grid.nearest(p, NEIGHBOURS + 1, radius).into_iter().map(|(_, i)| i as usize);
@@ -123,7 +131,7 @@ fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec
 }
 
 /// Absolute cosine between a normal and the direction to a neighbour: if it is at least this for the normals of both,
-/// they count as parts of different sheets.
+/// point and neighbour count as parts of different sheets of the surface.
 const SAME_SHEET_COSINE: f32 = 0.7;
 
 fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
@@ -146,7 +154,7 @@ fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
 
 /// Returns the flux of the offsets from the mean position through the points of a connected component, Σ (p − mean)·n
 /// over the positions p with normals n. If the points are spread evenly over a closed surface with outward normals, it
-/// is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all normals point inwards.
+/// is proportional to the enclosed volume (Gauss's theorem); a negative flux shows that all normals point inwards.
 fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
     let position = |i: u32| positions[i as usize].as_dvec3();
     let middle = part.iter().map(|&i| position(i)).sum::<DVec3>() / part.len() as f64;
@@ -154,7 +162,7 @@ fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
 }
 
 /// Orients the normals of the connected component of `start` along a minimum spanning tree over the angle between
-/// normals (Prim's algorithm): each is flipped to agree with the one it is reached from.
+/// normals (Prim's algorithm): each is flipped to agree with the normal of the point from which it is reached.
 fn propagate(start: u32, graph: &[Vec<u32>], normals: &mut [Vec3], oriented: &mut [bool]) {
     let mut pending = BinaryHeap::from([Reverse((0_u32, start, start))]);
     while let Some(Reverse((_, i, from))) = pending.pop() {
@@ -181,7 +189,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns a roughly normally distributed number with standard deviation 1.
+    /// Returns a roughly normally distributed number with mean 0 and standard deviation 1, to disturb test points.
     fn noise(random: &mut Random) -> f64 {
         2.0 * ((0..3).map(|_| random.unit()).sum::<f64>() - 1.5)
     }
@@ -247,7 +255,8 @@ mod tests {
         }
     }
 
-    /// If the starting normal is wrong, so are all of its component, and the sign of the volume shows it.
+    /// If the normal from which all others are oriented points inwards, so do all of its connected component, and the
+    /// negative volume that they enclose shows it.
     #[test]
     fn orientation_does_not_depend_on_the_start() {
         let mut random = Random::new(5);

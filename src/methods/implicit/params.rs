@@ -8,48 +8,51 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct ImplicitParams {
-    /// φ: the radial basis function.
+    /// The radial basis function φ from which the implicit function is built.
     pub kernel: KernelKind,
-    /// δ: first-order smoothness of the multi-order kernel, per box unit.
+    /// δ of the multi-order kernel, its first-order smoothness, in inverse units of the normalised box: larger values
+    /// pull the surface tight around the points.
     pub delta: f64,
-    /// τ: third-order smoothness of the multi-order kernel, in box units.
+    /// τ of the multi-order kernel, its third-order smoothness, in units of the normalised box: larger values round off
+    /// detail.
     pub tau: f64,
-    /// σ: width of the Gaussian kernel, in box units.
+    /// σ: width of the Gaussian kernel, in units of the normalised box; other kernels do not use it.
     pub sigma: f64,
-    /// λ of surface constraints, before confidences and the number of points are taken into account: the larger, the
-    /// more f may differ from 0 at the points; with 0 it interpolates them.
+    /// Regularisation λ of surface constraints, before confidences and the number of points are taken into account: the
+    /// larger, the more the implicit function f may differ from 0 at the points; with 0 the surface interpolates them.
     pub lambda_surface: f64,
-    /// λ of exterior constraints: the larger, the more f may differ from −1 at them.
+    /// Regularisation λ of exterior constraints: the larger, the more the implicit function f may differ from −1 at
+    /// them.
     pub lambda_exterior: f64,
-    /// Relative residual at which the linear solver stops.
+    /// Relative residual at which the solver of the linear system for the weights of the implicit function stops.
     pub tolerance: f64,
     /// Edge length of an extraction cell, in world units; 0 derives it from the spacing of the sampled points.
     pub cell: f64,
-    /// The iso-value of f at which the surface is extracted.
+    /// The iso-value of the implicit function f at which the surface is extracted.
     pub level: IsoValue,
 }
 
-/// Choice of the radial basis function.
+/// Choice of the radial basis function from which the implicit function is built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelKind {
-    /// The paper's kernel (equation 6): first, second and third order smoothness at once.
+    /// The multi-order kernel of Dinh, Turk & Slabaugh (equation 6): first, second and third order smoothness at once.
     MultiOrder,
-    /// |r|³, the paper's thin plate, for comparison.
+    /// |r|³, the thin plate of Dinh, Turk & Slabaugh, for comparison with the multi-order kernel.
     ThinPlate,
-    /// −|r|, which is biharmonic in three dimensions, for comparison.
+    /// −|r|, which is biharmonic in three dimensions, for comparison with the multi-order kernel.
     Biharmonic,
-    /// exp(−r²/2σ²), for comparison.
+    /// The Gaussian exp(−r²/2σ²), for comparison with the multi-order kernel.
     Gaussian,
 }
 
-/// Choice of the iso-value of f at which the surface is extracted.
+/// Choice of the iso-value of the implicit function f at which the surface is extracted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IsoValue {
-    /// The iso-value 0, as in the paper.
+    /// The iso-value 0, as in Dinh, Turk & Slabaugh.
     Zero,
-    /// The mean of f over the surface constraints, usually a little below 0.
+    /// The mean of the implicit function f over the surface constraints, usually a little below 0.
     Mean,
 }
 
@@ -70,7 +73,7 @@ impl Default for ImplicitParams {
 }
 
 impl ImplicitParams {
-    /// Checks every number against its range.
+    /// Checks every numeric parameter against its range.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
@@ -88,8 +91,8 @@ impl ImplicitParams {
         specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// Returns these parameters, but with those that affect only the extraction, cell and iso-value, taken from
-    /// `other`; used to find out whether a change needs a new solve.
+    /// Returns these parameters, but with `cell` and `level`, which affect only the extraction, taken from `other`;
+    /// used to find out whether a change of parameters needs a new solve.
     pub fn with_extraction_of(&self, other: &Self) -> Self {
         Self { cell: other.cell, level: other.level, ..self.clone() }
     }
@@ -103,10 +106,12 @@ impl ImplicitParams {
     }
 }
 
-/// δ, per box unit, from which surfaces of points with large gaps break up.
+/// Value of δ, in inverse units of the normalised box, from which surfaces of points with large gaps break up; the user
+/// is warned then.
 const LARGE_DELTA: f64 = 25.0;
 
-/// Returns the specifications of all parameters, in the order in which a page should show them.
+/// Returns the specification of each parameter (range, default, label, help), in the order in which a user interface
+/// should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

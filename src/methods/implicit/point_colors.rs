@@ -1,4 +1,4 @@
-//! Vertex colours interpolated from coloured points near the surface.
+//! Vertex colours interpolated from coloured points near the surface, for surfaces that no camera sees.
 
 use super::cloud::{BoxMap, Cloud};
 use super::color::Coloring;
@@ -6,17 +6,18 @@ use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::spatial::PointGrid;
 
-/// Maximum number of nearest points whose colours a vertex blends.
+/// Maximum number of nearest points from whose colours the colour of a vertex is blended.
 const BLENDED: usize = 4;
 /// Search radius for coloured points around a vertex, in mean spacings of the sampled points.
 const SEARCH_RADIUS: f32 = 2.0;
-/// Lower bound of the constant c in the weight 1/(d² + c) of a point at a distance d from a vertex, in squared box
-/// units: it keeps weights finite where points nearly coincide.
+/// Lower bound of the constant c in the weight 1/(d² + c) of a point at a distance d from a vertex, in squared units of
+/// the normalised box: it keeps weights finite where points nearly coincide.
 const MIN_SQUARED_DISTANCE: f32 = 1e-20;
-/// Vertices coloured in a slice of work: about ten milliseconds.
+/// Number of vertices coloured in one call of [`PointColors::advance`], which then takes about ten milliseconds.
 const SLICE: usize = 10_000;
 
-/// Interpolation of point colours at the vertices of a surface, slice by slice. Used when no camera sees the surface.
+/// Interpolation of point colours at the vertices of a surface, in slices of about ten milliseconds of work. Used when
+/// no camera sees the surface.
 pub struct PointColors {
     grid: PointGrid,
     colors: Vec<Vec3>,
@@ -34,8 +35,8 @@ impl PointColors {
     }
 
     /// Adds the colours of the nearest points to the next slice of vertices in `coloring`, each with the weight
-    /// `1/(d²+c)`, where d is its distance and c a quarter of the squared mean spacing; vertices with no point near get
-    /// no colour. Returns whether all vertices are done.
+    /// `1/(d²+c)`, where d is the distance of the point from the vertex and c a quarter of the squared mean spacing;
+    /// vertices with no point near get no colour. Returns whether all vertices are done.
     pub fn advance(&mut self, mesh: &TriangleMesh, map: &BoxMap, coloring: &mut Coloring) -> bool {
         // Half a spacing in quadrature with the distance; without it, each point leaves a spot.
         let least = (0.25 * self.spacing * self.spacing).clamp(MIN_SQUARED_DISTANCE, 1.0);

@@ -1,5 +1,5 @@
-//! Queries on a solved implicit surface: values and gradient of f, fitness to the points, sampling to a volume, and
-//! colouring.
+//! Queries on a solved implicit surface: values and gradient of the implicit function f, fitness to the points,
+//! sampling to a volume, and colouring.
 
 use super::camera::Camera;
 use super::fast::FastField;
@@ -37,14 +37,14 @@ impl ImplicitSurface {
         self.solved.as_ref().ok_or_else(|| MethodError::invalid(what, problem))
     }
 
-    /// Returns the centres of the surface constraints and of the exterior constraints, in world units; both are empty
-    /// until they are chosen.
+    /// Returns the centres of the surface constraints and of the exterior constraints, in world units; both lists are
+    /// empty until the constraints are made in the first steps.
     pub fn constraints(&self) -> [Vec<Vec3>; 2] {
         let (surface, outside) = self.constraints.centres.split_at(self.constraints.surface);
         [self.in_world(surface), self.in_world(outside)]
     }
 
-    /// Returns the input points with the edits applied: without those removed, with those added.
+    /// Returns the input points with the edits applied: without those removed, with those added; in world units.
     fn points(&self) -> Vec<Vec3> {
         let removed = self.edits.removed_positions(&self.original, &self.map);
         let stays = |p: &Vec3| removed.find(self.map.in_box(*p)).is_none();
@@ -52,8 +52,8 @@ impl ImplicitSurface {
         left.chain(self.edits.added.iter().copied()).collect()
     }
 
-    /// Measures how well the surface fits all points, including those not sampled as constraints: their distances from
-    /// it, and its mean curvature.
+    /// Measures how well the last finished surface fits all points, including those not sampled as constraints: their
+    /// distances from it, and its mean curvature.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no surface yet.
@@ -61,8 +61,8 @@ impl ImplicitSurface {
         Fitness::of(&self.points(), &self.mesh)
     }
 
-    /// Samples f minus the iso-value on a grid of `dims` voxels that covers points and surface, as input for methods
-    /// that work on volumes: positive inside, negative outside.
+    /// Samples the implicit function f minus the iso-value on a grid of `dims` voxels that covers points and surface,
+    /// as input for methods that work on volumes: positive inside, negative outside.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] before the system is solved, and for fewer than 2 voxels along an axis;
@@ -97,8 +97,8 @@ impl ImplicitSurface {
         })?)
     }
 
-    /// Returns the centre of the first voxel and the voxel size, in world units, of a grid of `dims` voxels around
-    /// points and surface.
+    /// Returns the centre of the first voxel and the voxel size, in world units, of a grid of `dims` voxels around the
+    /// points and the surface, for [`Self::to_volume`].
     fn grid(&self, dims: [usize; 3]) -> (DVec3, DVec3) {
         let bounds = Bounds::from_points(&self.points()).union(&Bounds::from_points(&self.mesh.positions));
         let margin = DVec3::splat(GRID_MARGIN * 2.0 / self.map.scale());
@@ -106,7 +106,8 @@ impl ImplicitSurface {
         (low, (high - low) / DVec3::from_array(dims.map(|n| (n - 1) as f64)))
     }
 
-    /// Colours the surface from the images of `cameras`. The colours stay unchanged if no camera sees any of it.
+    /// Colours the finished surface from the images of `cameras`. The colours stay unchanged if no camera sees any of
+    /// it.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no surface yet, or no camera has an image.
@@ -132,8 +133,9 @@ impl ImplicitSurface {
 /// bounding box: enough for the surface to close.
 const GRID_MARGIN: f64 = 0.1;
 
-/// Returns values at all nodes of a grid of `dims` nodes, x fastest. `row` writes the values of a row of nodes along x,
-/// given their positions in voxels. Fails with [`VolumeError::TooLarge`] if memory cannot be allocated.
+/// Returns the values of a function at all nodes of a grid of `dims` nodes, x fastest. `row` writes the values of a row
+/// of nodes along x, given their positions in voxels. Fails with [`VolumeError::TooLarge`] if memory cannot be
+/// allocated.
 fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
     let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();

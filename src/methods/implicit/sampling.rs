@@ -1,33 +1,37 @@
-//! Selection of the points that become surface constraints (paper, section VI-B): Poisson-disc sampling, slice by
-//! slice.
+//! Selection of the input points that become surface constraints, by Poisson-disc sampling in slices of about ten
+//! milliseconds of work (Dinh, Turk & Slabaugh, section VI-B).
 
 use super::cloud::{Cloud, largest_clusters, mean_spacing};
 use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
 use crate::spatial::PointGrid;
 
-/// Edge length of the grid cells that join points to clusters, in mean spacings of the points.
+/// Edge length of the grid cells by which points are grouped into clusters, in mean spacings of the points: the points
+/// of touching cells are in one cluster.
 const CLUSTER_CELL: f64 = 2.0;
-/// Points visited in a slice of work: about ten milliseconds.
+/// Number of points visited in one call of [`Sampling::advance`], which then takes about ten milliseconds.
 const SLICE: usize = 50_000;
-/// Maximum number of radii that are tried for Poisson-disc sampling.
+/// Maximum number of radii that are tried in Poisson-disc sampling, to find one that leaves the wanted number of
+/// points.
 const MAX_RADII: u32 = 16;
-/// Share of the maximum number of samples from which a radius is accepted: fewer samples mean that it is too large.
+/// Smallest share of the maximum number of samples for which the radius of Poisson-disc sampling is accepted: fewer
+/// samples mean that it is too large.
 const ACCEPTED_SHARE: f64 = 0.97;
 
-/// The sampled points, which become surface constraints.
+/// The input points that were selected to become surface constraints.
 #[derive(Clone, Debug)]
 pub struct Samples {
-    /// The samples, in random order.
+    /// The selected points with their attributes, in random order, in units of the normalised box.
     pub cloud: Cloud,
-    /// Mean distance of a sample from its nearest neighbour, estimated from at most 4000 samples, in box units.
+    /// Mean distance of a selected point from its nearest neighbour, estimated from at most 4000 samples, in units of
+    /// the normalised box (longest side 2).
     pub spacing: f64,
 }
 
-/// Selection of samples from a cloud, slice by slice.
+/// Selection of the points of a cloud that become surface constraints, in slices of about ten milliseconds of work.
 #[derive(Clone, Debug)]
 pub struct Sampling {
-    /// Number of clusters to keep, largest first; `None` keeps all.
+    /// Number of clusters of points to keep, largest first, to discard outliers; `None` keeps all points.
     keep: Option<usize>,
     most: usize,
     seed: u64,
@@ -35,13 +39,14 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// Starts the selection of at most `most` points from the `keep` largest clusters of points, or from all if `None`.
+    /// Starts the selection of at most `most` points from the `keep` largest clusters of points, or from all points if
+    /// `keep` is `None`; `seed` determines the random order.
     pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
         Self { keep, most, seed, poisson_disc: None }
     }
 
-    /// Does a slice of work on `cloud`, which must be the same in all calls. Returns the samples once they are
-    /// selected.
+    /// Continues the selection from `cloud` by one slice of work; it must be the same cloud in all calls. Returns the
+    /// samples once they are selected, `None` before.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if too few points are left, or all of them lie in one plane.
@@ -69,7 +74,7 @@ impl Sampling {
         Ok(kept)
     }
 
-    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
+    /// Returns the approximate share of the selection that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         self.poisson_disc.as_ref().map_or(0.0, |(_, poisson_disc)| poisson_disc.progress())
     }
@@ -84,11 +89,11 @@ struct PoissonDisc {
     most: usize,
     round: u32,
     radius: f32,
-    /// Largest radius known to leave more than `most` points; 0 if none is known.
+    /// Largest sampling radius known to leave more than `most` points; 0 if none is known.
     lower: f32,
-    /// Smallest radius known to leave at most `most` points; 0 if none is known.
+    /// Smallest sampling radius known to leave at most `most` points; 0 if none is known.
     upper: f32,
-    /// Indices of the points kept with the radius `upper`.
+    /// Indices of the points kept with the radius `upper`, the result so far.
     best: Vec<u32>,
     /// Number of points visited with the current radius.
     visited: usize,
@@ -122,7 +127,8 @@ impl PoissonDisc {
         self.kept.clear();
     }
 
-    /// Visits up to `count` points. Returns the indices of the samples, in random order, once the search ends.
+    /// Visits up to `count` points. Returns the indices of the samples, in random order, once the search for a radius
+    /// ends, `None` before.
     fn advance(&mut self, points: &[Vec3], count: usize) -> Option<Vec<u32>> {
         if self.order.len() <= self.most {
             return Some(self.order.clone());
@@ -161,9 +167,9 @@ impl PoissonDisc {
         None
     }
 
-    /// Returns the next radius to try; `count` points were kept with the last one. On a surface the number of samples
-    /// falls with the square of the radius; if the radius predicted by that is outside the bounds, their midpoint is
-    /// used, or twice the lower one if there is no upper.
+    /// Returns the next radius to try; `count` points were kept with the last radius. On a surface the number of
+    /// samples falls with the square of the radius; if the radius predicted by that is outside the bounds, their
+    /// midpoint is used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
         let target_count = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / target_count).sqrt();
@@ -176,14 +182,16 @@ impl PoissonDisc {
         }
     }
 
-    /// Returns the approximate share of the work that is done, below 1, as if a handful of rounds were needed.
+    /// Returns the approximate share of the work that is done, below 1, for progress bars. How many rounds are needed
+    /// is not known; a handful is assumed.
     fn progress(&self) -> f64 {
         let rounds = f64::from(self.round) + self.visited as f64 / self.order.len() as f64;
         rounds / (rounds + 2.0)
     }
 }
 
-/// Returns the indices of at most `most` points by Poisson-disc sampling, as [`Sampling`] selects them, in one call.
+/// Returns the indices of at most `most` points that are spread evenly over `points`, by Poisson-disc sampling, as
+/// [`Sampling`] selects them, in one call.
 pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
     let mut poisson_disc = PoissonDisc::new(points, most, seed);
     loop {

@@ -1,8 +1,8 @@
-//! Saving and restoring a run, bit for bit.
+//! Saving an implicit surface at any step, and restoring it so that it continues bit for bit.
 //!
-//! A state stores what is expensive to compute, the solution, and what cannot be recomputed, the last surface. The rest
-//! is recomputed from the same points, up to the same slice of work. The linear system that edits revise is rebuilt at
-//! the first edit.
+//! The saved state stores what is expensive to compute, the solution, and what cannot be recomputed, the last surface.
+//! The rest is recomputed from the same points, up to the same slice of work. The linear system that edits revise is
+//! rebuilt at the first edit.
 
 use super::kernel::Kernel;
 use super::solve::{Solution, SolverPosition};
@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLIMP\x02";
 
-/// The stage a saved run had reached, without the data of [`Stage`].
+/// The stage of the reconstruction that a saved run had reached: a [`Stage`] without its data.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum SavedStage {
     Subsample,
     Constrain,
-    /// Position of the solver, and whether it revises the system of the last full solve.
+    /// A solve: the position of the solver, and whether it revises the system of the last full solve.
     Solve(SolverPosition, bool),
     Extract,
     Color,
@@ -62,8 +62,8 @@ struct Surface {
 }
 
 impl ImplicitSurface {
-    /// Returns the run as bytes for [`Self::restore`], with its parameters and edits, but without points and other
-    /// options.
+    /// Returns the state of the reconstruction as bytes for [`Self::restore`], with its parameters and edits, but
+    /// without points and other options.
     pub fn save(&self) -> Vec<u8> {
         let mesh = &self.mesh;
         encode(
@@ -94,7 +94,7 @@ impl ImplicitSurface {
         )
     }
 
-    /// Continues a run from the bytes of [`Self::save`]; `self` must be made from the same points and options, except
+    /// Restores a run from the bytes of [`Self::save`]; `self` must be made from the same points and options, except
     /// parameters. Takes as long as the run had spent on choosing constraints and on its current stage; if it was
     /// colouring, on the extraction, too; if it was revising a system, on that system's matrix, too.
     ///
@@ -167,8 +167,8 @@ impl ImplicitSurface {
         Self { clock: self.clock, ..Self::from_parts(original, cloud, self.map, self.options.clone()) }
     }
 
-    /// Recomputes everything up to the stage `saved_stage`, and that stage up to the slice of work at which it was
-    /// saved: its position in a solve, the first `slices` in other stages.
+    /// Recomputes what a saved state does not store: everything up to the stage `saved_stage`, and that stage up to the
+    /// slice of work at which the run was saved: its position in a solve, the first `slices` in other stages.
     fn replay(&mut self, saved_stage: SavedStage, slices: u32) -> Result<(), MethodError> {
         while saved_stage != SavedStage::Subsample && matches!(self.stage, Stage::Subsample(_)) {
             self.advance()?;

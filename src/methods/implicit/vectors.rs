@@ -1,4 +1,5 @@
-//! Vector operations with a fixed order of summation, so that results are bit-identical natively and in wasm.
+//! Operations on vectors of numbers with a fixed order of summation, so that results are bit-identical natively and in
+//! wasm.
 
 /// A floating-point type for matrix entries, `f32` or `f64`; sums over them are taken in `f64`.
 pub trait MatrixScalar: Copy + Into<f64> {
@@ -33,7 +34,7 @@ pub fn dot<T: MatrixScalar>(a: &[T], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
 }
 
-/// Adds `weight` times `from` to `to`.
+/// Adds the vector `from`, multiplied by `weight`, to the vector `to`.
 pub fn add<T: MatrixScalar>(weight: f64, from: &[T], to: &mut [f64]) {
     to.iter_mut().zip(from).for_each(|(x, &y)| *x += weight * y.into());
 }

@@ -1,6 +1,6 @@
-//! Makes a base where none is given: the detailed surface is smoothed towards the ellipsoids as long as it can be
-//! described by distances along the normals of the result (Kobbelt, Bareuther & Seidel, end of section 2); without
-//! detail, a membrane is built around the ellipsoids.
+//! Makes the base M₀ of a model that is created without one: the detailed surface is smoothed towards the ellipsoids as
+//! long as it can be described by distances along the normals of the result (Kobbelt, Bareuther & Seidel, end of
+//! section 2); without a detailed surface, a membrane is built around the ellipsoids.
 
 use super::TOLERANCE;
 use super::correspondence::{BasePoint, normal_at};
@@ -16,16 +16,17 @@ use crate::spatial::SurfacePoint;
 use crate::volume::{Lattice, SurfaceExtractor};
 use std::rc::Rc;
 
-/// Maximum number of smoothing rounds of a decomposition; a bust settles in twelve.
+/// Maximum number of smoothing rounds in [`decomposition`]; a bust converges in twelve.
 const ROUNDS: usize = 40;
 
-/// Largest share of normals of a coarser surface that may miss the finer one or hit it from its back: undercuts of ears
-/// and nostrils account for some.
+/// Largest share of the normals of a coarser surface that may miss the next finer one or hit its back, for
+/// [`decomposition`] to accept the coarser one: undercuts of ears and nostrils account for some.
 const MAX_MISSED: f64 = 0.02;
 
-/// Decomposes `detail` into surfaces from coarse to fine, the base first and `detail` last, by smoothing it over the
-/// ellipsoids. Each is a graph over the one before: the normals of the one before hit it from its inside, except for a
-/// share of up to [`MAX_MISSED`] of them.
+/// Decomposes `detail`, the detailed surface of a model without a given base, into surfaces from coarse to fine, the
+/// base first and `detail` last, by smoothing it over the ellipsoids. Each surface but the base is a graph over the
+/// next coarser one: the normals of the coarser one hit it from its inside, except for a share of up to [`MAX_MISSED`]
+/// of them.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`] if
@@ -83,8 +84,8 @@ fn is_embedded(mesh: &Mesh) -> bool {
     guard.is_embedded(mesh)
 }
 
-/// Returns the share of triangles of `coarse` whose normal at the centroid misses the last of `bands` or hits it from
-/// its back.
+/// Returns the share of the triangles of `coarse` whose normal at the centroid misses the next finer surface, the last
+/// of `bands`, or hits its back: above [`MAX_MISSED`], `coarse` is too smooth.
 fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     let Some(fine) = bands.last() else { return 0.0 };
     let search_distance = search_distance(coarse, fine);
@@ -107,7 +108,8 @@ fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
 /// unless that would intersect itself.
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] if the ellipsoids span too many edges, see [`MAX_NODES`].
+/// [`MethodError::InvalidArgument`] if the lattice of [`union_of`] would have more than [`MAX_NODES`] nodes along an
+/// axis.
 pub(super) fn membrane_around(
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
@@ -118,7 +120,8 @@ pub(super) fn membrane_around(
     Ok(if is_embedded(&mesh) { mesh.to_triangles() } else { tight })
 }
 
-/// Returns the surface of the union of the ellipsoids, with edges of about `edge`, shorter for thin ellipsoids.
+/// Returns the surface of the union of the ellipsoids, from which [`membrane_around`] starts, with edges of about
+/// `edge`, in units of the mesh, shorter for thin ellipsoids.
 fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodError> {
     let centre = ellipsoids.iter().map(|e| e.center).sum::<DVec3>() / ellipsoids.len() as f64;
     let shortest_axis = ellipsoids.iter().map(Ellipsoid::shortest_axis).fold(f64::MAX, f64::min);
@@ -155,19 +158,21 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     Ok(mesh)
 }
 
-/// Longest edge of a lattice cell, as a share of the shortest semi-axis of all ellipsoids.
+/// Longest edge of a lattice cell in [`union_of`], as a share of the shortest semi-axis of all ellipsoids, so that the
+/// lattice resolves the thinnest.
 const CELL: f64 = 0.4;
 
-/// Maximum number of lattice nodes along an axis for the union of the ellipsoids: a surface across the whole lattice
-/// then has some ten million triangles.
+/// Maximum number of lattice nodes along an axis in [`union_of`]: a surface across the whole lattice then has some ten
+/// million triangles.
 const MAX_NODES: f64 = 1024.0;
 
-/// Returns the edge length of equilateral triangles of which `triangles` have the total area `area`.
+/// Returns the edge length of equilateral triangles of which `triangles` have the total area `area`; default edge
+/// bounds are derived from it.
 pub(super) fn edge_for(area: f64, triangles: f64) -> f64 {
     (area / triangles * 4.0 / 3.0_f64.sqrt()).sqrt()
 }
 
-/// Checks that a mesh has no self-intersections.
+/// Checks that a mesh, such as a base passed by the caller, has no self-intersections.
 ///
 /// # Errors
 /// [`MeshError::SelfIntersecting`] with the number of crossing pairs of triangles.

@@ -1,4 +1,4 @@
-//! Tests which ellipsoids have their centre inside a closed surface.
+//! Tests which control ellipsoids have their centre inside a closed surface, such as the membrane.
 
 use super::ellipsoid::Ellipsoid;
 use crate::math::triangle::Line;
@@ -23,19 +23,20 @@ pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<boo
     inside
 }
 
-/// The direction of the rays, not normalised. A ray along it seldom hits an edge of a regular mesh, which would count
-/// as two hits.
+/// The direction of the rays in [`contains_centres`], not normalised. A ray along it seldom hits an edge of a regular
+/// mesh, which would count as two hits.
 const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
 
-/// Two directions perpendicular to [`RAY`], the coordinate axes of points projected along it.
+/// Two directions perpendicular to [`RAY`], along which [`project_along_ray`] gives coordinates.
 const ACROSS: [Vec3; 2] = [Vec3::new(-0.6929, 0.5772, 0.0), Vec3::new(-0.2492, -0.2992, 0.8132)];
 
-/// Projects a point along the ray, to two coordinates.
+/// Projects a point along [`RAY`] to two coordinates, for the quick test of [`may_cover`].
 fn project_along_ray(p: Vec3) -> [f32; 2] {
     ACROSS.map(|axis| axis.dot(p))
 }
 
-/// Whether the projected bounding box of a triangle contains a projected point, up to rounding.
+/// Returns whether the bounding box of a projected triangle contains a projected point, up to rounding; if not, the ray
+/// from the point misses the triangle.
 fn may_cover(corners: &[[f32; 2]; 3], point: &[f32; 2]) -> bool {
     (0..2).all(|k| {
         let [a, b, c] = corners.map(|corner| corner[k]);

@@ -1,18 +1,19 @@
-//! The map T from the deformed surface S to the base M₀: projected from frame to frame by the operator P, and evened
-//! out by the operator D (Kobbelt, Bareuther & Seidel, sections 3 and 6).
+//! The map T from the deformed base S to the undeformed base M₀: carried over from frame to frame by the operator P,
+//! and evened out by the operator D (Kobbelt, Bareuther & Seidel, sections 3 and 6).
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{SurfacePoint, SurfaceWalker};
 
-/// A point on a surface of the decomposition, usually the base M₀, as a triangle and barycentric coordinates.
+/// A point on one of the surfaces into which the model's input is decomposed, usually the base M₀, as a triangle and
+/// barycentric coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BasePoint {
-    /// The index of a triangle that contains the point.
+    /// The triangle that contains the point, as an index into the triangles of the surface.
     pub triangle: u32,
-    /// The barycentric coordinates of the point in its triangle.
+    /// The barycentric coordinates of the point in `triangle`.
     pub weights: Vec3,
-    /// The position of the point.
+    /// The position of the point in space, in units of the mesh.
     pub point: Vec3,
 }
 
@@ -23,39 +24,40 @@ impl From<SurfacePoint> for BasePoint {
 }
 
 impl BasePoint {
-    /// Creates the point of `base` with these barycentric coordinates. Its position has the same bits whenever it is
-    /// computed, so that saved runs are restored exactly.
+    /// Creates the point of `base` with the barycentric coordinates `weights` in `triangle`. Its position has the same
+    /// bits whenever it is computed, so that saved runs are restored exactly.
     pub fn at(base: &SurfaceWalker, triangle: u32, weights: Vec3) -> Self {
         let [a, b, c] = base.corners(triangle);
         Self { triangle, weights, point: a * weights.x + b * weights.y + c * weights.z }
     }
 }
 
-/// Converts a closest point on the base to a [`BasePoint`], with its position computed as in [`BasePoint::at`].
+/// Converts a closest point on the base to a [`BasePoint`], with its position computed by [`BasePoint::at`], so that it
+/// has the same bits after a saved run is restored.
 fn to_base_point(base: &SurfaceWalker, found: &SurfacePoint) -> BasePoint {
     BasePoint::at(base, found.triangle, found.barycentric)
 }
 
-/// A point for every vertex, by slot: the map T from the deformed base S to the base M₀, or the points of the finest
-/// surface from which texture coordinates are taken.
+/// A surface point for every vertex of a mesh, by slot: the map T from the deformed base S to the base M₀, or the
+/// points of the finest surface from which texture coordinates are taken.
 pub(super) type Correspondence = Vec<BasePoint>;
 
 pub(super) const UNSET: BasePoint = BasePoint { triangle: 0, weights: Vec3::ZERO, point: Vec3::ZERO };
 
-/// S_current with its map T: the deformed base of the frame before, moved along with the ellipsoids. The next deformed
-/// base is projected onto it.
+/// S_current with its map T: the deformed base of the frame before, moved along with the ellipsoids. [`project`]
+/// carries T over from it to the next deformed base.
 pub(super) struct Current<'a> {
     pub walker: &'a SurfaceWalker,
-    /// The image of each vertex under T, in the order of the vertices of the surface.
+    /// The image of each vertex of S_current under T, in the order of the vertices of `walker`.
     pub correspondence: &'a [BasePoint],
 }
 
-/// Operator P: maps each vertex of `mesh` to the closest point of S_current, then by its barycentric coordinates to the
-/// point between the images of the triangle's corners under T, then to the closest point on the base. Returns the map T
-/// of `mesh`.
+/// Operator P: returns the map T of `mesh`, the next deformed base. Maps each vertex of `mesh` to the closest point of
+/// S_current, then by its barycentric coordinates to the point between the images of the triangle's corners under T,
+/// then to the closest point on the base M₀.
 ///
-/// A closest point on S_current found by a walk is searched again in a tree if it is farther away than `farthest`, in
-/// units of the mesh, or if its triangle faces the other way.
+/// A closest point on S_current found by a walk is searched for again in a tree if it is farther away than `farthest`,
+/// in units of the mesh, or if its triangle faces the other way.
 pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, farthest: f64) -> Correspondence {
     let mut correspondence = vec![UNSET; mesh.slots()];
     traverse(mesh, |v, start| {
@@ -66,9 +68,9 @@ pub(super) fn project(mesh: &Mesh, current: &Current, base: &SurfaceWalker, fart
     correspondence
 }
 
-/// Returns the closest point on S_current to a vertex of the next surface, by a walk from the triangle `start`. If the
-/// result is farther away than `farthest`, or its triangle faces away from the normal of the vertex, it is searched
-/// again in a tree. Without `start`, all triangles are tested.
+/// Returns the closest point on S_current to vertex `v` of `mesh`, the next deformed base: by a walk from the triangle
+/// `start`, or among all triangles if `start` is `None`. A tree is searched instead if the walk ends farther away than
+/// `farthest`, in units of the mesh, or on a triangle that faces away from the normal of `v`.
 fn nearest(
     mesh: &Mesh,
     walker: &SurfaceWalker,
@@ -93,7 +95,8 @@ fn nearest(
     }
 }
 
-/// Maps a point of S_current to the base, by the images of its triangle's corners under T.
+/// Maps a point of S_current to the base M₀, for the operator P: by its barycentric coordinates to the point between
+/// the images of its triangle's corners under T, then to the closest point on the base.
 fn carry_over(current: &Current, base: &SurfaceWalker, at: &SurfacePoint) -> BasePoint {
     let corners =
         current.walker.mesh().triangles[at.triangle as usize].map(|v| current.correspondence[v as usize]);
@@ -103,8 +106,8 @@ fn carry_over(current: &Current, base: &SurfaceWalker, at: &SurfacePoint) -> Bas
     to_base_point(base, &base.walk(corners[heaviest].triangle, point))
 }
 
-/// Visits every vertex, starting each component at any vertex and continuing with neighbours. `visit` is passed its
-/// result for a neighbour, from which to start the search, or `None` for the first vertex of a component.
+/// Calls `visit` for every vertex, breadth-first in each connected component, with the triangle that it returned for a
+/// neighbour, so that a walk can start there; with `None` for the first vertex of a component.
 fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     let mut seen = vec![false; mesh.slots()];
     let mut queue: Vec<(VertexId, u32)> = Vec::new();
@@ -126,8 +129,9 @@ fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     }
 }
 
-/// Operator D (Kobbelt, Bareuther & Seidel, equation 1): moves the image q of each vertex under T to Σ dⱼ qⱼ / Σ dⱼ
-/// over its neighbours, with the mean length dⱼ of the edges at qⱼ, then back onto the base. Evens out the map T.
+/// Applies the operator D once, which evens out the map T (Kobbelt, Bareuther & Seidel, equation 1): moves the image q
+/// of each vertex under T to Σ dⱼ qⱼ / Σ dⱼ over the images qⱼ of its neighbours, with the mean length dⱼ of the edges
+/// at qⱼ, then back onto the base.
 pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, correspondence: &mut Correspondence) {
     let densities: Vec<f32> =
         (0..mesh.slots()).map(|i| density(mesh, correspondence, VertexId::from_index(i))).collect();
@@ -136,15 +140,16 @@ pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, correspondence: &mut
     }
 }
 
-/// Returns dⱼ of the operator D: the mean distance on the base from the image of a vertex under T to the images of its
-/// neighbours.
+/// Returns dⱼ of the operator D for vertex `v`: the mean distance from its image on the base under T to the images of
+/// its neighbours; 0 for a free slot.
 fn density(mesh: &Mesh, correspondence: &Correspondence, v: VertexId) -> f32 {
     let (ring, here) = (mesh.ring(v).as_slice(), correspondence[v.index()].point);
     let sum: f32 = ring.iter().map(|w| here.distance(correspondence[w.index()].point)).sum();
     if ring.is_empty() { 0.0 } else { sum / ring.len() as f32 }
 }
 
-/// Returns the point of the base to which the operator D moves the image of one vertex.
+/// Returns the point of the base M₀ to which the operator D moves the image of vertex `v` under T; `density` returns dⱼ
+/// of a neighbour.
 fn distributed(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -161,7 +166,8 @@ fn distributed(
     if total > 0.0 { to_base_point(base, &base.walk(here.triangle, sum * (1.0 / total))) } else { here }
 }
 
-/// Whether the image of a triangle on the base is flipped or has no area.
+/// Returns whether the map T folds a triangle of the deformed base: whether its image on the base M₀ is flipped or has
+/// no area.
 fn is_folded(
     corners: [VertexId; 3],
     base: &SurfaceWalker,
@@ -173,7 +179,7 @@ fn is_folded(
     (b.point - a.point).cross(c.point - a.point).dot(outward) <= 0.0
 }
 
-/// Counts the triangles of the surface whose image on the base is flipped or has no area.
+/// Counts the triangles of the deformed base `mesh` whose image under T on the base M₀ is flipped or has no area.
 pub(super) fn folded(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -183,8 +189,8 @@ pub(super) fn folded(
     mesh.triangles().filter(|&corners| is_folded(corners, base, normals, correspondence)).count()
 }
 
-/// Applies the operator D only to the corners of folded triangles and their neighbours, at most [`UNFOLDINGS`] times,
-/// until no triangle is folded: flipped or without area on the base.
+/// Applies the operator D to the corners of folded triangles, whose image under the map T is flipped or has no area,
+/// and to the neighbours of these corners, until no triangle is folded, at most [`UNFOLDINGS`] times.
 pub(super) fn unfold(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -212,11 +218,12 @@ pub(super) fn unfold(
     }
 }
 
-/// Maximum number of passes that remove folds of T: a fold that remains has a topological cause, such as a cut neck.
+/// Maximum number of passes of [`unfold`], which removes folds of the map T: a fold that remains has a topological
+/// cause, such as a cut neck.
 const UNFOLDINGS: usize = 12;
 
-/// Returns the unit normal of a surface of the decomposition at a point, interpolated from `normals`, its vertex
-/// normals.
+/// Returns the unit normal at a point of a surface of the decomposition, interpolated from `normals`, the vertex
+/// normals of that surface; zero if they cancel.
 pub(super) fn normal_at(base: &SurfaceWalker, normals: &[Vec3], at: &BasePoint) -> Vec3 {
     let [a, b, c] = base.mesh().triangles[at.triangle as usize].map(|v| normals[v as usize]);
     (a * at.weights.x + b * at.weights.y + c * at.weights.z).normalize_or_zero()

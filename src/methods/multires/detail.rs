@@ -9,16 +9,19 @@ use crate::remesh::Embedding;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// One surface of the decomposition, with its vertex normals.
+/// One surface of the decomposition into base and detail, with its vertex normals.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
     pub walker: SurfaceWalker,
-    /// Unit vertex normals.
+    /// Unit vertex normals, by vertex index.
     pub normals: Vec<Vec3>,
 }
 
 impl Band {
-    /// Builds a band from a closed mesh.
+    /// Builds a band from a closed, oriented mesh.
+    ///
+    /// # Errors
+    /// As [`SurfaceWalker::new`].
     pub fn of(mesh: TriangleMesh) -> Result<Rc<Self>, MeshError> {
         let walker = SurfaceWalker::new(mesh)?;
         let normals = walker.mesh().vertex_normals();
@@ -37,13 +40,14 @@ pub(super) struct Bands {
 /// Finds where the normals of one surface of a decomposition hit the next finer one.
 #[derive(Clone, Debug)]
 struct BandLookup {
-    /// The largest distance at which a hit counts; farther ones belong to another part of the surface.
+    /// The largest distance along a normal at which a hit counts, in units of the mesh; farther hits belong to another
+    /// part of the surface.
     search_distance: f64,
     prisms: PrismLookup,
 }
 
 impl Bands {
-    /// Prepares the surfaces of a decomposition, from coarse to fine; the first is the base.
+    /// Prepares the surfaces of a decomposition, from coarse to fine with the base first, for [`Self::detail_at`].
     pub fn new(all: Vec<Rc<Band>>) -> Self {
         let lookup = |pair: &[Rc<Band>]| {
             let search_distance = search_distance(&pair[0], &pair[1]);
@@ -60,8 +64,8 @@ impl Bands {
         &self.all[self.all.len() - 1]
     }
 
-    /// Returns the detail at a point of the base: for each band but the first, its distance from the band before along
-    /// the normal, positive outwards.
+    /// Returns the detail at a point of the base: for each band above the base, its signed distance from the next
+    /// coarser band along the normal of that band, positive outwards.
     pub fn detail_at(&self, at: &BasePoint) -> Detail {
         let mut detail = Detail { last: *at, ..NOTHING };
         for (k, BandLookup { search_distance, prisms }) in self.lookups.iter().enumerate() {
@@ -78,30 +82,32 @@ impl Bands {
     }
 }
 
-/// The search distance along a normal, as a multiple of the largest distance between the two surfaces.
+/// The largest distance along the normals of a band at which a hit on the next finer band counts, as a multiple of the
+/// largest distance between the two.
 const SEARCH_FACTOR: f64 = 2.0;
 
-/// Returns the search distance for hits along the normals of `from` on `to`.
+/// Returns the largest distance along a normal of `from` at which a hit on `to` counts, in units of the mesh.
 pub(super) fn search_distance(from: &Band, to: &Band) -> f64 {
     SEARCH_FACTOR * hausdorff_bound(from, to)
 }
 
-/// Maximum number of bands above the base.
+/// Maximum number of bands above the base: the number of distances that a [`Detail`] has space for.
 pub(super) const MAX_BANDS: usize = 8;
 
-/// The detail at a point of the base: for each band above the base, its signed distance from the band before.
+/// The detail at a point of the base: for each band above the base, its signed distance from the next coarser band
+/// along the normal of that band, in units of the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Detail {
     lambdas: [f32; MAX_BANDS],
-    /// Whether a normal did not hit its surface and the closest point was used instead.
+    /// Whether the normal of some band did not hit the next finer one, so that the closest point was used instead.
     pub is_missed: bool,
-    /// The corresponding point on the finest surface.
+    /// The corresponding point on the finest surface of the decomposition, from which texture coordinates are taken.
     pub last: BasePoint,
 }
 
 impl Band {
-    /// Returns the closest point of this surface to `origin`, and its signed distance along `normal`: the fallback
-    /// where the normal hits nothing.
+    /// Returns the signed distance along `normal` from `origin` to the closest point of this surface, and that point:
+    /// the fallback where the normal of the next coarser band hits nothing.
     fn closest_fallback(&self, origin: Vec3, normal: Vec3) -> (f32, BasePoint) {
         match self.walker.closest(origin) {
             Some(found) => ((found.point - origin).dot(normal), found.into()),
@@ -110,7 +116,7 @@ impl Band {
     }
 }
 
-/// Returns the largest distance from a vertex of either surface to the other surface.
+/// Returns the largest distance from a vertex of either surface to the other surface, for [`search_distance`].
 fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
     let one_way = |from: &Band, to: &Band| {
         let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
@@ -122,28 +128,27 @@ fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
 /// The deformed base with its detail, as reconstructed by [`detailed`].
 pub(super) struct Detailed {
     pub mesh: Mesh,
-    /// The corresponding point on the finest surface for each vertex, by slot; for texture coordinates.
+    /// The corresponding point on the finest surface for each vertex of `mesh`, by slot; for texture coordinates.
     pub points: Correspondence,
-    /// Number of vertices whose normal missed a finer surface, so that the closest point was used instead.
+    /// Number of vertices at which a normal missed the next finer surface, so that the closest point was used instead.
     pub unmatched_vertices: usize,
-    /// Number of vertices that moved by less than their displacement, to avoid self-intersections, summed over the
-    /// bands.
+    /// Number of vertices whose displacement was shortened to avoid self-intersections, summed over the bands.
     pub held_vertices: usize,
 }
 
-/// How finely the deformed base is sampled for the detail.
+/// How finely [`detailed`] subdivides the deformed base before it adds the detail.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DetailSampling {
-    /// Edges that are longer than this once their ends are displaced by the detail are split, in units of the mesh; so
-    /// are shorter ones if the detail at their midpoint deviates, see [`MAX_DEVIATION`].
+    /// Length, in units of the mesh, above which an edge is split, measured between its ends displaced by the detail.
+    /// Shorter edges are split if the detail at their midpoint deviates, see [`MAX_DEVIATION`].
     pub longest: f32,
     /// How often an edge of the deformed base may be halved; 0 adds no vertices.
     pub rounds: u32,
 }
 
-/// Reconstructs the detail on the deformed base `surface`, refined according to `sampling`: band by band, along the
-/// normals of the result so far. Vertices move only as far as no triangles intersect. If the refinement itself causes
-/// intersections, it is left out.
+/// Reconstructs the detail on the deformed base `surface`, subdivided according to `sampling`: band by band, along the
+/// normals of the surface displaced so far. `guard` shortens displacements that would make triangles intersect. If the
+/// subdivision itself causes intersections, it is left out.
 pub(super) fn detailed(
     surface: &Mesh,
     correspondence: &Correspondence,
@@ -163,7 +168,8 @@ pub(super) fn detailed(
     detailed
 }
 
-/// Displaces the samples by their detail, band by band, guarded against self-intersections.
+/// Displaces the vertices of `samples` by their detail, band by band; `guard` shortens displacements that would cause
+/// self-intersections.
 fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Detailed {
     let DetailSamples { mut mesh, normals, details: detail, .. } = samples;
     let mut held_vertices = 0;
@@ -191,13 +197,15 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
     }
 }
 
-/// Number of rings of neighbours around a held-back vertex that are moved back partly as well; without them, the
-/// surface has a crease around it.
+/// Number of rings of neighbours around a held vertex (one whose displacement was shortened to avoid
+/// self-intersections) that [`spread_hold_back`] moves back partly as well; without them, the surface has a crease
+/// around it.
 const SOFT_RINGS: usize = 4;
 
-/// Returns corrections, by slot, that move the neighbours of held-back vertices back as well, less with every ring.
-/// `displacements` are the intended displacements of all vertices, and `held_back` the share of its displacement by
-/// which each held-back vertex moved.
+/// Returns corrections, by slot, that move the neighbours of held vertices back as well, less with every ring. Held are
+/// the vertices whose displacement was shortened to avoid self-intersections: `held_back` lists them, each with the
+/// share of its displacement by which it moved. `displacements` are the intended displacements of all vertices, by
+/// slot.
 fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId, f32)]) -> Vec<Vec3> {
     let mut missing = vec![0.0_f32; mesh.slots()];
     held_back.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
@@ -218,7 +226,8 @@ fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId,
     displacements.iter().zip(went.iter().zip(&missing)).map(back).collect()
 }
 
-/// The vertices of the deformed base, with those added by edge splits, and the detail at each; by slot.
+/// The vertices of the deformed base, with those that [`DetailSamples::refine`] adds by edge splits, and the detail at
+/// each; by slot.
 struct DetailSamples {
     mesh: Mesh,
     correspondence: Correspondence,
@@ -247,7 +256,8 @@ impl DetailSamples {
         }
     }
 
-    /// Returns the approximate position of a vertex with its detail: all bands along the normal of the deformed base.
+    /// Returns the approximate position of vertex `v` with its detail, for decisions on edge splits: all bands are
+    /// added along the normal of the deformed base.
     fn detailed_position(&self, v: VertexId) -> Vec3 {
         self.position_with(self.mesh.position(v), self.normals[v.index()], &self.details[v.index()])
     }
@@ -281,7 +291,7 @@ impl DetailSamples {
         }
     }
 
-    /// Returns the midpoint of an edge, with its detail.
+    /// Returns the midpoint of the edge `uv` of the deformed base, with the detail there.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.correspondence[u.index()], &self.correspondence[v.index()]);
         let on_base = bands.base().walker.walk(from.triangle, (from.point + to.point) * 0.5);
@@ -295,7 +305,7 @@ impl DetailSamples {
     }
 }
 
-/// A point of the deformed base, with its detail.
+/// The midpoint of an edge of the deformed base, with the detail there: a new vertex if the edge is split.
 struct Sample {
     position: Vec3,
     normal: Vec3,
@@ -303,7 +313,7 @@ struct Sample {
     detail: Detail,
 }
 
-/// The detail of a free slot.
+/// No detail: the value at vertex slots that are free.
 const NOTHING: Detail = Detail { lambdas: [0.0; MAX_BANDS], is_missed: false, last: UNSET };
 
 #[cfg(test)]

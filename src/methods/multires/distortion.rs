@@ -1,4 +1,5 @@
-//! Distortion of the map T, which the operator D keeps low (Kobbelt, Bareuther & Seidel, section 3).
+//! Distortion of area and angles by the map T from the deformed base to the base M₀, which the operator D keeps low
+//! (Kobbelt, Bareuther & Seidel, section 3).
 
 use super::correspondence::Correspondence;
 use crate::math::{DVec3, triangle};
@@ -11,8 +12,8 @@ pub struct Distortion {
     /// Area of the adjacent triangles on the base M₀, divided by their area on the deformed base; 1 where area is
     /// preserved.
     pub area: Vec<f64>,
-    /// Ratio of the largest to the smallest stretch, at most 1000, as an area-weighted mean over the adjacent
-    /// triangles; 1 where angles are preserved.
+    /// Ratio of the largest to the smallest stretch of a triangle under T, at most 1000, as an area-weighted mean over
+    /// the adjacent triangles; 1 where angles are preserved.
     pub angle: Vec<f64>,
 }
 
@@ -39,7 +40,7 @@ pub(super) fn distortion(mesh: &Mesh, correspondence: &Correspondence) -> Distor
 }
 
 /// Returns the ratio of the larger to the smaller singular value of the affine map from one triangle to another, at
-/// most [`MAX_ANISOTROPY`]; 1 for a similarity.
+/// most [`MAX_ANISOTROPY`]; 1 for a similarity. It measures the distortion of angles.
 fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
     // In the plane of the first triangle, with one edge along x, the linear part is a 3 × 2 matrix with columns p and
     // q.

@@ -5,7 +5,7 @@ use crate::math::{DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 
-/// A solid control ellipsoid as passed by the caller.
+/// A control ellipsoid, a solid that pushes the membrane outwards, as passed by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControlEllipsoid {
     /// The centre, in units of the mesh.
@@ -14,10 +14,10 @@ pub struct ControlEllipsoid {
     pub axes: [[f64; 3]; 3],
 }
 
-/// Largest cosine between two axes that counts as a right angle: rounding to `f32` stays far below.
+/// Largest absolute cosine between two axes that are accepted as orthogonal: rounding to `f32` stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
-/// Largest ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
+/// Largest accepted ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
 const MAX_AXIS_RATIO: f64 = 1e3;
 
 /// Shortest accepted semi-axis, in units of the mesh: squares and cubes of lengths stay within the range of `f32`.
@@ -26,8 +26,8 @@ const SHORTEST: f64 = 1e-9;
 const LONGEST: f64 = 1e9;
 
 impl ControlEllipsoid {
-    /// Checks that the centre is in range, and that the axes span an ellipsoid: their lengths, the ratio of lengths and
-    /// the angles.
+    /// Checks that the centre is in range, and that the axes span an ellipsoid: their lengths, the ratio of the longest
+    /// to the shortest, and the angles between them.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming `ellipsoids`, and the one at fault by its `index`.
@@ -61,7 +61,7 @@ impl ControlEllipsoid {
     }
 }
 
-/// Checks that there is at least one ellipsoid, and that each is valid.
+/// Checks that there is at least one ellipsoid, and that each passes [`ControlEllipsoid::validate`].
 ///
 /// # Errors
 /// As [`ControlEllipsoid::validate`], and for an empty list.
@@ -77,20 +77,20 @@ pub(super) fn check_ellipsoids(given: &[ControlEllipsoid]) -> Result<(), MethodE
 #[serde(from = "Shape", into = "Shape")]
 pub(super) struct Ellipsoid {
     shape: Shape,
-    /// Maps offsets from the centre to the frame in which the ellipsoid is the unit ball. Precomputed, because
-    /// divisions by the semi-axes took a large part of a frame.
+    /// Maps offsets from the centre to coordinates in which the ellipsoid is the unit ball. Precomputed, because
+    /// divisions by the semi-axes took a large part of the time per frame of the model.
     to_unit: DMat3,
     /// The square of the longest semi-axis: points farther from the centre are outside.
     bounding_radius_squared: f64,
 }
 
-/// The geometry of an ellipsoid: centre, orientation and semi-axes.
+/// The geometry of an ellipsoid, from which all other values are computed: centre, orientation and semi-axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Shape {
     pub center: DVec3,
     /// Unit directions of the axes as columns; right-handed.
     pub rotation: DMat3,
-    /// The lengths of the semi-axes.
+    /// The lengths of the semi-axes, in units of the mesh.
     pub lengths: DVec3,
 }
 
@@ -116,17 +116,17 @@ impl std::ops::Deref for Ellipsoid {
     }
 }
 
-/// Maximum number of Newton steps for the closest point: from a point near the surface two or three are enough, from
-/// anywhere 60.
+/// Maximum number of Newton steps in [`largest_root`], which finds the closest point of an ellipsoid: from a point near
+/// its surface two or three are enough, from anywhere 60.
 const STEPS: usize = 100;
 
-/// Newton's method stops after a relative step of at most this: convergence is quadratic, so that the result has twice
-/// as many correct digits.
+/// Newton's method in [`largest_root`] stops after a relative step of at most this: convergence is quadratic, so that
+/// the result has twice as many correct digits.
 const LAST_STEP: f64 = 1e-5;
 
 impl Ellipsoid {
-    /// Creates an ellipsoid from validated axes. A left-handed set gets its third axis reversed, which is the same
-    /// ellipsoid.
+    /// Creates an ellipsoid from axes that passed [`ControlEllipsoid::validate`]. The third of three left-handed axes
+    /// is reversed, which gives the same ellipsoid.
     pub fn new(given: &ControlEllipsoid) -> Self {
         let axes = given.axes.map(DVec3::from);
         let x = axes[0].normalize();
@@ -136,24 +136,24 @@ impl Ellipsoid {
         Shape { center: given.center.into(), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
     }
 
-    /// Returns the ellipsoid with all semi-axes multiplied by `factor`.
+    /// Returns the ellipsoid with all semi-axes multiplied by `factor`, about the same centre.
     pub fn scaled(&self, factor: f64) -> Self {
         Shape { lengths: self.lengths * factor, ..self.shape }.into()
     }
 
-    /// Converts the ellipsoid back to a [`ControlEllipsoid`].
+    /// Converts the ellipsoid back to the form in which callers pass and receive it.
     pub fn control(&self) -> ControlEllipsoid {
         let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
         ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
     }
 
-    /// Returns the coordinates of `p` along the axes, relative to the centre.
+    /// Returns the coordinates of `p` along the axes of the ellipsoid, relative to its centre, in units of the mesh.
     #[inline]
     fn local(&self, p: DVec3) -> DVec3 {
         self.rotation.transpose() * (p - self.center)
     }
 
-    /// Maps coordinates along the axes, relative to the centre, back to the world.
+    /// Maps coordinates along the axes of the ellipsoid, relative to its centre, back to the space of the mesh.
     #[inline]
     fn world(&self, local: DVec3) -> DVec3 {
         self.center + self.rotation * local
@@ -175,7 +175,7 @@ impl Ellipsoid {
             && (self.to_unit * seen).length_squared() < OUTSIDE * OUTSIDE
     }
 
-    /// Maps a point from the unit-ball frame of [`Self::unit`] to the world.
+    /// Maps a point from the unit-ball frame of [`Self::unit`] back to the space of the mesh.
     pub fn at_unit(&self, unit: DVec3) -> DVec3 {
         self.world(unit * self.lengths)
     }
@@ -185,13 +185,14 @@ impl Ellipsoid {
         self.lengths.min_element()
     }
 
-    /// Returns the smallest radius of curvature, that of the sharpest tip.
+    /// Returns the smallest radius of curvature, that of the sharpest tip, which limits the edge length of the
+    /// membrane.
     pub fn min_radius(&self) -> f64 {
         self.shortest_axis() * self.shortest_axis() / self.lengths.max_element()
     }
 
-    /// Returns the distance from `p` to the surface along the ray from `p` to the centre, an upper bound of the
-    /// distance to the ellipsoid; 0 inside.
+    /// Returns the distance from `p` to the surface of the ellipsoid along the ray from `p` to the centre, an upper
+    /// bound of the distance to the ellipsoid; 0 inside.
     pub fn ray_distance(&self, p: DVec3) -> f64 {
         let size = self.unit(p).length();
         if size > 1.0 { p.distance(self.center) * (1.0 - 1.0 / size) } else { 0.0 }
@@ -224,8 +225,8 @@ impl Ellipsoid {
     }
 }
 
-/// Returns the largest t with Σ (w / (s + t))² = 1, for the weights w and squares s, by Newton's method; the sum is
-/// decreasing and convex from −`least` on, `least` being the smallest s.
+/// Returns the largest t with Σ (w / (s + t))² = 1, for the weights w and squares s, by Newton's method, for
+/// [`Ellipsoid::nearest`]; the sum is decreasing and convex from −`least` on, `least` being the smallest s.
 fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
     // A lower bound of the root: no single term may exceed 1.
     let floor = (0..3).map(|k| weights[k].abs() - squares[k]).fold(-least, f64::max);
@@ -245,7 +246,8 @@ fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
     t
 }
 
-/// Checks that a membrane with edges up to `longest` can hold on to each of the ellipsoids.
+/// Checks that a membrane with edges up to `longest`, in units of the mesh, stays on the tips of all ellipsoids, see
+/// [`MAX_EDGE_PER_RADIUS`].
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] naming the first ellipsoid that the membrane would slip off.
@@ -262,8 +264,9 @@ pub(super) fn check_tips(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), M
     Err(MethodError::invalid("ellipsoids", problem))
 }
 
-/// Longest edge that holds on to a tip, as a multiple of its radius of curvature. Only vertices are pushed out, not
-/// triangles: with much longer edges the tip pierces a triangle, and the membrane retracts from it.
+/// Longest edge of a membrane that stays on the tip of an ellipsoid, as a multiple of the tip's radius of curvature.
+/// Only vertices are pushed out, not triangles: with much longer edges the tip pierces a triangle, and the membrane
+/// retracts from it.
 const MAX_EDGE_PER_RADIUS: f64 = 1.6;
 
 /// Returns `p` moved out of all ellipsoids, by repeated pushes out of the one that it is deepest in; `p` itself if it
@@ -283,12 +286,12 @@ pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     push_straight(ellipsoids, at)
 }
 
-/// Maximum number of pushes out of one ellipsoid after the other; in a crease of 90°, each further correct digit takes
-/// some three pushes.
+/// Maximum number of pushes in [`pushed_out`], each out of one ellipsoid; in a crease of 90° between two, each further
+/// correct digit takes some three pushes.
 const PUSHES: usize = 12;
 
-/// A point at least this far from the centre in the unit-ball frame counts as outside: rounding puts surface points
-/// slightly off 1.
+/// Distance from the centre, in the unit-ball frame of an ellipsoid, from which on a point counts as outside: rounding
+/// puts surface points slightly off 1.
 const OUTSIDE: f64 = 1.0 - 1e-7;
 
 /// Returns the index of the ellipsoid that `p` is deepest in, and the point of its surface closest to `p`; `None`
@@ -299,7 +302,8 @@ fn deepest(ellipsoids: &[Ellipsoid], p: DVec3) -> Option<(usize, DVec3)> {
     nearest.max_by(|a, b| a.1.distance_squared(p).total_cmp(&b.1.distance_squared(p)))
 }
 
-/// Moves `p` along the sum of the normals of all ellipsoids that contain it until it is outside of every one.
+/// Moves `p` along the sum of the normals of all ellipsoids that contain it until it is outside of every one: the last
+/// resort of [`pushed_out`].
 fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     let containing = ellipsoids.iter().filter(|e| e.contains(p));
     let away = |e: &Ellipsoid| (e.rotation * (e.unit(p) / e.lengths)).normalize_or_zero();
@@ -312,8 +316,8 @@ fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     p + direction * distance
 }
 
-/// Returns the distance from `p` at which the ray along `direction` leaves the ellipsoid; `None` if the point of the
-/// ray at `distance` is not inside.
+/// Returns the distance from `p` at which the ray along the unit vector `direction` leaves the ellipsoid `e`; `None` if
+/// the point of the ray at `distance` from `p` is not inside `e`.
 fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Option<f64> {
     if e.unit(p + direction * distance).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
@@ -341,10 +345,10 @@ pub(super) fn move_with(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> V
     }
     if total > 0.0 { (p + sum / total).as_vec3() } else { p.as_vec3() }
 }
-/// Added to the squared distance from an ellipsoid, in units of its shortest semi-axis; the inverse of the sum is its
-/// weight in [`move_with`]. So an ellipsoid that contains the point weighs eleven times as much as one that is its own
-/// shortest semi-axis away. With a larger ratio, all stretching falls on the crease between two ellipsoids that
-/// separate, and the map folds there; with a smaller one, detail slides on the ellipsoids.
+/// Constant in the weights of [`move_with`]: an ellipsoid weighs 1 / (`SOFTNESS` + d²), with its distance d from the
+/// point in units of its shortest semi-axis. So an ellipsoid that contains the point weighs eleven times as much as one
+/// with d = 1. With a larger ratio, all stretching falls on the crease between two ellipsoids that separate, and the
+/// map folds there; with a smaller one, detail slides on the ellipsoids.
 const SOFTNESS: f64 = 0.1;
 
 #[cfg(test)]
@@ -417,7 +421,8 @@ mod tests {
         }
     }
 
-    /// Stopping at the first ellipsoid that contains a point would leave it inside the second.
+    /// Tests [`pushed_out`] with nested and overlapping ellipsoids: stopping outside the first one that contains a
+    /// point would leave it inside the second.
     #[test]
     fn nested_and_crossing_ones_are_left_together() {
         let ball = |x: f64, r: f64| {

@@ -1,4 +1,5 @@
-//! One frame of the model: moves the ellipsoids, updates the membrane and its map T, and reconstructs the detail.
+//! One frame of the multiresolution model: moves the ellipsoids, updates the membrane and its map T to the base, and
+//! reconstructs the detail.
 
 use super::containment::contains_centres;
 use super::correspondence::{BasePoint, Current, distribute, project, unfold};
@@ -12,24 +13,25 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, EdgeBounds, Resolver};
 use crate::spatial::SurfaceWalker;
 
-/// Largest factor by which the mean edge changes in one frame: a mesh much finer or coarser than its bounds can neither
-/// be guarded nor solved in bounded time.
+/// Largest factor by which the mean edge of the deformed base changes in one frame: a mesh much finer or coarser than
+/// its edge bounds can neither be guarded against self-intersections nor solved in bounded time.
 const MAX_CHANGE: f64 = 2.0;
 
-/// Largest residual, as a share of the target edge, with which a membrane may be refreshed on one level while
-/// ellipsoids move: three times as fast as a solve on all levels.
+/// Largest residual, as a share of the target edge, at which a membrane may be refreshed, on the finest level only,
+/// while ellipsoids move: three times as fast as a solve on all levels.
 const REFRESH_TOLERANCE: f64 = 3.0 * TOLERANCE;
 
-/// Depth by which rounding may put vertices inside an ellipsoid, as a share of the target edge; a rigid motion stays
-/// below. After a larger one the membrane is solved once the ellipsoids stop.
+/// Depth, as a share of the target edge, up to which vertices may be inside an ellipsoid by rounding; a rigid motion
+/// stays below. After a frame with a deeper vertex, the membrane is solved once the ellipsoids stop.
 const ROUNDING: f64 = 1e-3;
 
-/// Maximum number of frames in a row that only refresh the membrane, so that wide saddles between ellipsoids do not lag
-/// far behind.
+/// Maximum number of frames in a row that only refresh the membrane, on the finest level, so that wide saddles between
+/// ellipsoids do not lag far behind.
 const MAX_REFRESHED_FRAMES: u32 = 3;
 
 impl MultiresolutionModel {
-    /// Returns the parameters with edge bounds that one frame can reach: within a factor of 2 of the current mean edge.
+    /// Returns the parameters for the next frame: edge bounds scaled so that one frame can reach them, to a target edge
+    /// within a factor of 2 of the current mean edge of the deformed base.
     pub(super) fn params_now(&self) -> MultiresParams {
         let ratio = self.params.target() / mean_edge(&self.surface);
         let factor = if ratio > MAX_CHANGE {
@@ -43,7 +45,8 @@ impl MultiresolutionModel {
         MultiresParams { edge_min, edge_max, ..self.params.clone() }
     }
 
-    /// Advances the model by one frame. If it fails, nothing has changed.
+    /// Advances the model by one frame, adds the duration of each part to `times`, and returns the edits made. If it
+    /// fails, nothing has changed.
     pub(super) fn frame(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let mut lap = Lap::new(self.clock, times);
         let mut moving = self.ellipsoids.clone();
@@ -71,8 +74,10 @@ impl MultiresolutionModel {
         residual(mesh, ellipsoids, self.params.energy) / self.params.target()
     }
 
-    /// Predicts the membrane for the next positions `ellipsoids_after` of the ellipsoids; an error if it is too large
-    /// for its edge bounds.
+    /// Predicts the membrane for the next positions of the ellipsoids, `ellipsoids_after`, at the start of a frame.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`] if the predicted membrane is too large for its edge bounds.
     fn predict(&self, ellipsoids_after: Vec<Ellipsoid>) -> Result<Prediction, MethodError> {
         let before = self.ellipsoids.now();
         let mut predicted = self.surface.clone();
@@ -85,10 +90,10 @@ impl MultiresolutionModel {
         Ok(Prediction { ellipsoids_before: before, ellipsoids_after, predicted, residual, params })
     }
 
-    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small,
-    /// nearly all edges are within bounds, no vertex is deep inside an ellipsoid, none is held back by the collision
-    /// guard, and no solve is due because the ellipsoids have stopped. This makes rigid motions exact. `None` if the
-    /// membrane has to be solved.
+    /// Returns the membrane moved along with the ellipsoids, if the frame needs no more than that: its residual is
+    /// small, nearly all edges are within bounds, no vertex is deep inside an ellipsoid, no displacement is shortened
+    /// to avoid self-intersections, and no solve is due because the ellipsoids have stopped. This makes rigid motions
+    /// exact. `None` if the membrane has to be solved.
     fn predict_only(&mut self, prediction: &Prediction) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !prediction.moves() && self.refreshed_frames > 0;
@@ -117,7 +122,8 @@ impl MultiresolutionModel {
         Some(next)
     }
 
-    /// Computes a new membrane over the ellipsoids, and its map T.
+    /// Computes a new membrane over the ellipsoids, and its map T, in a frame for which [`Self::predict_only`] returns
+    /// `None`. Returns the edits made.
     fn solve(&mut self, prediction: &Prediction, lap: &mut Lap) -> Result<Changes, MethodError> {
         let walker = SurfaceWalker::new(prediction.predicted.to_triangles())?;
         let (next, changes) = self.solved(prediction);
@@ -137,9 +143,9 @@ impl MultiresolutionModel {
         Ok(changes)
     }
 
-    /// Returns the membrane for the next positions of the ellipsoids: refreshed if that is sufficient, else solved on
-    /// all levels. If that intersects itself or slips off an ellipsoid, the current membrane is moved under the
-    /// collision guard instead.
+    /// Returns the membrane for the next positions of the ellipsoids, and the edits made: refreshed on the finest level
+    /// if that is sufficient, else solved on all levels. If the result intersects itself or slips off an ellipsoid, the
+    /// current membrane is moved instead, with displacements shortened to avoid self-intersections.
     fn solved(&mut self, prediction: &Prediction) -> (Mesh, Changes) {
         let (next, changes) = self
             .refresh(prediction)
@@ -151,9 +157,9 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// Returns the predicted membrane refreshed on one level; `None` unless the ellipsoids move, the parameters have
-    /// coarse levels, the residual is small and [`Self::with_threads_cut`] accepts the result, and after
-    /// [`MAX_REFRESHED_FRAMES`] such frames in a row.
+    /// Returns the predicted membrane refreshed on the finest level only, and the edits made. `None` unless the
+    /// ellipsoids move, the parameters have coarse levels, the residual is at most [`REFRESH_TOLERANCE`] and
+    /// [`Self::with_threads_cut`] accepts the result, and after [`MAX_REFRESHED_FRAMES`] such frames in a row.
     fn refresh(&mut self, prediction: &Prediction) -> Option<(Mesh, Changes)> {
         let may_refresh =
             prediction.moves() && prediction.params.levels > 0 && prediction.residual <= REFRESH_TOLERANCE;
@@ -188,8 +194,9 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// Cuts thin necks of a membrane that was made without collision tests, if the parameters allow it. `None` if it
-    /// intersects itself, or if it no longer contains the centre of an ellipsoid that it contained before.
+    /// Cuts thin necks of a new membrane that was made without collision tests, if the parameters allow it; returns the
+    /// membrane and all edits. `None` if the membrane intersects itself, or does not contain the centre of an ellipsoid
+    /// that the current membrane contains.
     fn with_threads_cut(
         &mut self,
         mut mesh: Mesh,
@@ -213,17 +220,15 @@ impl MultiresolutionModel {
     }
 }
 
-/// The prediction that a frame starts from.
+/// The predicted membrane that a frame starts from, with the ellipsoids and parameters of the frame.
 struct Prediction {
-    /// The ellipsoids before the frame.
     ellipsoids_before: Vec<Ellipsoid>,
-    /// The ellipsoids after the frame.
     ellipsoids_after: Vec<Ellipsoid>,
-    /// The membrane moved along with the ellipsoids.
+    /// The current membrane moved along with the ellipsoids, by [`move_with`].
     predicted: Mesh,
-    /// The residual of the predicted membrane, as a share of the target edge.
+    /// The residual of `predicted`, as a share of the target edge.
     residual: f64,
-    /// The parameters, with edge bounds that one frame can reach.
+    /// The parameters of the model, with edge bounds that one frame can reach.
     params: MultiresParams,
 }
 
@@ -245,7 +250,7 @@ impl<'a> Lap<'a> {
         Self { clock, start: clock(), times }
     }
 
-    /// Adds the time since the last call, or since the start, to the time of `part`.
+    /// Adds the time since the last call, or since the lap was created, to the time of `part`, in milliseconds.
     fn end(&mut self, part: &'static str) {
         let now = (self.clock)();
         self.times.add(part, now - self.start);
@@ -253,7 +258,8 @@ impl<'a> Lap<'a> {
     }
 }
 
-/// Whether a share of at most [`MAX_OUT_OF_BOUNDS`] of the edges is shorter or longer than `bounds`.
+/// Returns whether a share of at most [`MAX_OUT_OF_BOUNDS`] of the edges is shorter or longer than `bounds`, so that
+/// the mesh needs no remeshing.
 fn edges_within_bounds(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
     let outside = mesh.edges().filter(|&(u, v)| {
@@ -263,5 +269,6 @@ fn edges_within_bounds(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     outside.count() as f64 <= MAX_OUT_OF_BOUNDS * mesh.edge_count() as f64
 }
 
-/// Largest share of edges that may be out of bounds without remeshing. Restructuring leaves some thousandths.
+/// Largest share of edges out of bounds with which the membrane is kept without remeshing. Restructuring itself leaves
+/// some thousandths.
 const MAX_OUT_OF_BOUNDS: f64 = 0.02;

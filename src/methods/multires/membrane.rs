@@ -7,20 +7,20 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 
-/// Longest edge of a coarse level, as a share of the shortest semi-axis of all ellipsoids: a much coarser mesh would
-/// slip off the thinnest.
+/// Longest edge of a coarse level of the solver, as a share of the shortest semi-axis of all ellipsoids: a much coarser
+/// mesh would slip off the thinnest.
 const MAX_EDGE_PER_AXIS: f64 = 0.8;
 
-/// The iterations of a refresh, or of a level finer than the coarsest, end when one of them moves vertices by no more
-/// than this share of the level's target edge, as a root mean square: from there on they slide along the surface, and a
-/// tenth of that motion is normal to it.
+/// Tolerance of a refresh, and of each level of the solver finer than the coarsest, as a share of the level's target
+/// edge: iterations end when the root mean square of their displacements is at most this. From there on vertices slide
+/// along the surface, and a tenth of that motion is normal to it.
 const LEVEL_TOLERANCE: f64 = 0.025;
 
-/// Minimum number of vertices of a coarse level: fewer do not represent the shape.
+/// Minimum number of vertices of a coarse level of the solver: fewer do not represent the shape.
 const MIN_VERTICES: f64 = 60.0;
 
-/// Solves the membrane on meshes from coarse to fine, with up to `levels` coarse levels before the target resolution,
-/// which `mesh` has in the end.
+/// Solves the membrane over the ellipsoids on meshes from coarse to fine, with up to `levels` coarse levels before the
+/// target resolution, which `mesh` has in the end. Returns the edits made.
 ///
 /// Edits are made without collision tests; the caller checks the result for self-intersections.
 pub(super) fn solve(
@@ -32,7 +32,7 @@ pub(super) fn solve(
     solve_with(mesh, ellipsoids, params, levels, |_| {})
 }
 
-/// As [`solve`], and calls `visit` with the mesh of each level when it is solved.
+/// Solves the membrane as [`solve`] does, and calls `visit` with the mesh of each level when it is solved, to show it.
 pub(super) fn solve_with(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -55,7 +55,7 @@ pub(super) fn solve_with(
 }
 
 /// Refreshes a membrane that has nearly converged, on the target resolution only: restructures its edges and reduces
-/// the small residual.
+/// the small residual. Returns the edits made.
 pub(super) fn refresh(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Changes {
     let bounds = params.bounds();
     let mut changes = solve_level(mesh, ellipsoids, params, bounds, LEVEL_TOLERANCE * params.target());
@@ -64,7 +64,7 @@ pub(super) fn refresh(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &Multir
 }
 
 /// Solves the membrane on one level: restructures the edges to `bounds`, and moves the vertices as [`relaxed`] does
-/// with `tolerance`.
+/// with `tolerance`. Returns the edits made.
 fn solve_level(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -78,8 +78,8 @@ fn solve_level(
     changes
 }
 
-/// Restructures the edges once more, as the last level leaves some too short or too long, and pushes the new midpoints
-/// out of the ellipsoids.
+/// Restructures the edges after the last level, which leaves some too short or too long, and pushes new edge midpoints
+/// out of the ellipsoids. Returns the edits made.
 fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Changes {
     let changes = restructure(mesh, bounds, &mut Unchecked);
     let positions = pushed_positions(mesh, ellipsoids);
@@ -87,8 +87,8 @@ fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Chan
     changes
 }
 
-/// Returns the coarsest usable level, at most `levels`: fine enough for the thinnest ellipsoid, and with enough
-/// vertices. 0 is the target resolution.
+/// Returns the coarsest usable level of the solver, at most `levels`: its edges are short enough for the thinnest
+/// ellipsoid, and it has at least about [`MIN_VERTICES`] vertices. Level 0 is the target resolution.
 fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, levels: u32) -> u32 {
     let thinnest = ellipsoids.iter().map(Ellipsoid::shortest_axis).fold(f64::MAX, f64::min);
     let fits = |level: u32| {
@@ -99,8 +99,8 @@ fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, leve
     (0..=levels).rev().find(|&level| level == 0 || fits(level)).unwrap_or(0)
 }
 
-/// Performs one Gauss–Seidel iteration: moves every vertex to its energy minimum with all others fixed, then out of the
-/// ellipsoids. Returns the root mean square of the displacements.
+/// Performs one Gauss–Seidel iteration on `positions`, by slot: moves every vertex to its energy minimum with all
+/// others fixed, then out of the ellipsoids. Returns the root mean square of the displacements, in units of the mesh.
 fn sweep(mesh: &Mesh, positions: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let mut sum = 0.0;
     for v in mesh.vertices() {
@@ -111,7 +111,7 @@ fn sweep(mesh: &Mesh, positions: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: 
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Returns the position of a vertex with the least energy, with all others fixed.
+/// Returns the position of vertex `v` with the least energy, with all other vertices fixed at `positions`.
 fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
     match energy {
         Energy::Membrane => neighbour_mean(mesh, positions, v),
@@ -119,16 +119,18 @@ fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Ve
     }
 }
 
-/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (Kobbelt, Bareuther & Seidel, equation 2).
+/// Returns the mean position of the neighbours of `v`, where its energy is least for [`Energy::Membrane`], by the
+/// umbrella operator p ← Σ pᵢ / n (Kobbelt, Bareuther & Seidel, equation 2).
 #[inline]
 fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     ring.iter().fold(Vec3::ZERO, |sum, w| sum + positions[w.index()]) * (1.0 / ring.len() as f32)
 }
 
-/// Returns the position with the least bending energy, all others fixed: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p,
-/// U²(p) = Σ U(pᵢ) / n − U(p), and ν = 1 + (Σ 1/nᵢ) / n, where nᵢ is the valence of the neighbour pᵢ (Kobbelt et al.,
-/// *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
+/// Returns the position of `v` with the least bending energy, all others fixed, for [`Energy::ThinPlate`]: p ← p −
+/// U²(p) / ν, with U(p) = Σ pᵢ / n − p, U²(p) = Σ U(pᵢ) / n − U(p), and ν = 1 + (Σ 1/nᵢ) / n, where n is the number of
+/// neighbours pᵢ of p, and nᵢ that of pᵢ (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*,
+/// 1998).
 fn min_bending_position(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let umbrella = |w: VertexId| neighbour_mean(mesh, positions, w) - positions[w.index()];
     let ring = mesh.ring(v).as_slice();
@@ -147,8 +149,8 @@ fn pushed(ellipsoids: &[Ellipsoid], p: Vec3) -> Vec3 {
     pushed_out(ellipsoids, p.as_dvec3()).as_vec3()
 }
 
-/// Returns the residual, in units of the mesh: the root mean square of the displacements along the normals that one
-/// more iteration would make.
+/// Returns the residual of a membrane, in units of the mesh: the root mean square of the displacements along the
+/// normals that one more iteration would make, each with all other vertices fixed.
 pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let positions = mesh.positions();
     let mut sum = 0.0;
@@ -160,9 +162,9 @@ pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) ->
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Returns the positions after the iterations of one level, by slot, without changes of connectivity:
-/// [`MultiresParams::smoothing`] iterations, or fewer if one moves the vertices by no more than `tolerance`, as a root
-/// mean square.
+/// Returns the positions, by slot, after the iterations on one level of the solver, without changes of connectivity:
+/// [`MultiresParams::smoothing`] iterations, or fewer if the root mean square of the displacements of one is at most
+/// `tolerance`, in units of the mesh.
 pub(super) fn relaxed(
     mesh: &Mesh,
     ellipsoids: &[Ellipsoid],
@@ -178,7 +180,7 @@ pub(super) fn relaxed(
     positions
 }
 
-/// Returns the position of each vertex pushed out of the ellipsoids, by slot.
+/// Returns the positions of all vertices, by slot, with those inside an ellipsoid moved out of all ellipsoids.
 pub(super) fn pushed_positions(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<Vec3> {
     mesh.positions().iter().map(|&p| pushed(ellipsoids, p)).collect()
 }

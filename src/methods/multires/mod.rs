@@ -51,12 +51,12 @@ use topology::displacements_to;
 /// Options to create a [`MultiresolutionModel`].
 #[derive(Clone, Debug, Default)]
 pub struct MultiresOptions {
-    /// The detailed surface M₁. Without it the model is a membrane without detail.
+    /// The detailed surface M₁, which is deformed. Without it the model is a membrane without detail.
     pub detail: Option<TriangleMesh>,
-    /// The base M₀, a low-frequency approximation of the detailed surface. By default it is made from that surface, or
-    /// around the ellipsoids.
+    /// The base M₀, a low-frequency approximation of the detailed surface. By default it is made from the detailed
+    /// surface, or around the ellipsoids if there is none.
     pub base: Option<TriangleMesh>,
-    /// The control ellipsoids that the membrane is spanned over.
+    /// The control ellipsoids that the membrane is spanned over, at their initial positions.
     pub ellipsoids: Vec<ControlEllipsoid>,
     /// The parameters. If both edge bounds are 0, they are derived from the area of the base, else of the detail, else
     /// of the ellipsoids; a single one that is 0 is derived from the other.
@@ -67,7 +67,7 @@ pub struct MultiresOptions {
 /// most this share of the target edge, as a root mean square.
 const TOLERANCE: f64 = 0.01;
 
-/// The largest number of vertices of the deformed base.
+/// The largest number of vertices of the deformed base; a larger one is rejected with [`MethodError::TooManyVertices`].
 const MAX_VERTICES: usize = 200_000;
 
 /// A surface that is deformed by control ellipsoids and keeps its detail.
@@ -75,18 +75,18 @@ pub struct MultiresolutionModel {
     bands: Bands,
     ellipsoids: MovingEllipsoids,
     params: MultiresParams,
-    /// The deformed base S.
+    /// The deformed base S, a membrane over the ellipsoids.
     surface: Mesh,
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
     correspondence: Correspondence,
     detailed: Detailed,
-    /// The collision guard, which keeps triangles from intersecting. Only its memory is reused between frames, not its
-    /// state.
+    /// The collision guard, which shortens displacements so that no triangles intersect. Only its memory is reused
+    /// between frames, not its state.
     guard: Embedding,
     components: u32,
     iteration: u32,
     /// Number of frames in a row that refreshed the membrane on the finest level only, 0 after a solve on all levels;
-    /// at least 1 if a solve is due once the ellipsoids stop.
+    /// at least 1 if such a solve is due once the ellipsoids stop.
     refreshed_frames: u32,
     residual: f64,
     clock: fn() -> f64,
@@ -99,7 +99,7 @@ impl MultiresolutionModel {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted;
     /// [`MethodError::Mesh`] for a detail or a base that is invalid, open or not manifold, or for a base that
-    /// intersects itself; [`MethodError::TooManyVertices`] if the edges are too short.
+    /// intersects itself; [`MethodError::TooManyVertices`] if the edge bounds are too short for the area of the base.
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
@@ -154,7 +154,7 @@ impl MultiresolutionModel {
         self.clock = clock;
     }
 
-    /// Returns the deformed surface with its detail.
+    /// Returns the deformed surface with its detail, the result of the model.
     pub fn mesh(&self) -> &Mesh {
         &self.detailed.mesh
     }
@@ -169,8 +169,8 @@ impl MultiresolutionModel {
         mesh
     }
 
-    /// Solves a copy of the membrane for the current ellipsoids on every usable level, and returns the mesh of each,
-    /// from coarse to fine (figure 8 of Kobbelt, Bareuther & Seidel).
+    /// Solves a copy of the membrane for the current ellipsoids, and returns its mesh on each level of the solver, from
+    /// coarse to fine, to show how the solver works (figure 8 of Kobbelt, Bareuther & Seidel).
     pub fn levels(&self) -> Vec<TriangleMesh> {
         let mut levels = Vec::new();
         let ellipsoids = self.ellipsoids.now();
@@ -181,7 +181,7 @@ impl MultiresolutionModel {
         levels
     }
 
-    /// Returns how much the map T from the deformed base to the base M₀ distorts area and angles.
+    /// Returns how much the map T from the deformed base to the base M₀ distorts area and angles, per vertex.
     pub fn distortion(&self) -> Distortion {
         distortion::distortion(&self.surface, &self.correspondence)
     }
@@ -191,8 +191,8 @@ impl MultiresolutionModel {
         &self.surface
     }
 
-    /// Returns the image of the deformed base under the map T: the triangles of [`Self::base_mesh`] with each vertex at
-    /// its corresponding point on the undeformed base M₀.
+    /// Returns the image of the deformed base under the map T, to show the correspondence: the triangles of
+    /// [`Self::base_mesh`] with each vertex at its corresponding point on the undeformed base M₀.
     pub fn link_mesh(&self) -> TriangleMesh {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
@@ -205,12 +205,12 @@ impl MultiresolutionModel {
         &self.params
     }
 
-    /// Sets the parameters, also during a run.
+    /// Sets the parameters, also during a run. On an error they are unchanged.
     ///
     /// # Errors
     /// As [`MultiresParams::validate`]; [`MethodError::InvalidArgument`] if the edges are too long for the membrane to
-    /// hold on to the tips of an ellipsoid, and [`MethodError::TooManyVertices`] if they are too short. Nothing has
-    /// changed then.
+    /// hold on to the tips of an ellipsoid, and [`MethodError::TooManyVertices`] if they are too short for the area of
+    /// the deformed base.
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
         check_tips(&self.ellipsoids.targets(), params.edge_max)?;
@@ -222,8 +222,8 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// Applies changed parameters: a change of `supersample` alone only reconstructs the detail, any other makes the
-    /// model solve again.
+    /// Applies parameters that differ from those `before`: a change of `supersample` alone only reconstructs the
+    /// detail, after any other the next steps solve the membrane again.
     fn apply_params(&mut self, before: &MultiresParams) {
         let supersample = self.params.supersample;
         if self.params == (MultiresParams { supersample, ..before.clone() }) {
@@ -233,13 +233,14 @@ impl MultiresolutionModel {
         }
     }
 
-    /// Sets new target ellipsoids, matched by index; the model moves towards them step by step. An additional ellipsoid
-    /// grows at its target, or emerges from the nearest ellipsoid if the target is outside the membrane; one that is
-    /// left out shrinks and is removed.
+    /// Sets new target ellipsoids, matched by index to the current ones, which move towards them step by step. An
+    /// additional ellipsoid grows at its target, or emerges from the nearest ellipsoid if the centre of its target is
+    /// outside the membrane; an ellipsoid without a target in `given` shrinks and is removed. On an error nothing
+    /// changes.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for an empty list, for a centre out of range, for axes that span no ellipsoid,
-    /// and for tips too sharp for the edges; nothing has changed then.
+    /// and for tips too sharp for the edges of the membrane.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
@@ -250,7 +251,8 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// Returns the ellipsoids at their current positions, including those that are being removed.
+    /// Returns the ellipsoids in their current state, which steps move towards the targets, including those that are
+    /// being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
         self.ellipsoids.now().iter().map(Ellipsoid::control).collect()
     }
@@ -260,25 +262,27 @@ impl MultiresolutionModel {
         self.ellipsoids.targets().iter().map(Ellipsoid::control).collect()
     }
 
-    /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area.
+    /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area; 0 if the
+    /// map is free of folds.
     pub fn folded(&self) -> usize {
         let base = self.bands.base();
         folded(&self.surface, &base.walker, &base.normals, &self.correspondence)
     }
 
-    /// Returns the number of surfaces in the decomposition, including the base.
+    /// Returns the number of surfaces in the decomposition of the input, including the base and the detailed surface.
     pub fn band_count(&self) -> usize {
         self.bands.all.len()
     }
 
-    /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit a
-    /// finer surface, and those held back to avoid self-intersections, summed over the bands.
+    /// Returns two counts of vertices from the last reconstruction of the detail: those where a normal did not hit the
+    /// next finer surface, and those whose displacement was shortened to avoid self-intersections, summed over the
+    /// bands.
     pub fn detail_counts(&self) -> [usize; 2] {
         [self.detailed.unmatched_vertices, self.detailed.held_vertices]
     }
 
-    /// Advances by one frame: moves the ellipsoids as far as the membrane can follow, and updates the membrane and its
-    /// detail. Does nothing once the model has converged.
+    /// Advances the model by one frame: moves the ellipsoids towards their targets as far as the membrane can follow,
+    /// and updates the membrane and its detail. Does nothing once the model has converged.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`] if the membrane would grow too large for its edge bounds; [`MethodError::Mesh`]
@@ -300,7 +304,7 @@ impl MultiresolutionModel {
         self.surface.vertex_count() == 0 || self.ellipsoids.have_arrived() && has_converged
     }
 
-    /// Reconstructs the detail on the deformed base.
+    /// Reconstructs the detail on the deformed base, after a change of the base or of the parameters for the detail.
     fn reconstruct_detail(&mut self) {
         let detailed = detailed(
             &self.surface,

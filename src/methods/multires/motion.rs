@@ -1,4 +1,4 @@
-//! Moves the ellipsoids towards their targets, in each step only as far as the membrane can follow.
+//! Moves the control ellipsoids towards their targets, in each step only as far as the membrane can follow.
 
 use super::ellipsoid::{ControlEllipsoid, Ellipsoid, Shape};
 use crate::math::{DMat3, DVec3};
@@ -6,22 +6,21 @@ use glam::DQuat;
 use serde::{Deserialize, Serialize};
 
 /// Largest displacement of an ellipsoid's centre in one step, as a share of its shortest semi-axis or that of its
-/// target, whichever is longer. With more, the surfaces before and after are too far apart for closest points to
+/// target, whichever is longer. With more, the membranes before and after are too far apart for closest points to
 /// correspond; with less, drags take more steps.
 const MAX_SHIFT: f64 = 0.5;
 
-/// Largest rotation of an ellipsoid in one step, in radians. It also applies to a sphere, whose points on the axis of
-/// rotation do not move at all.
+/// Largest rotation of an ellipsoid in one step, in radians. It applies to spheres, too, as the membrane turns along
+/// with them.
 const MAX_TURN: f64 = 0.35;
 
-/// Size at which a new ellipsoid starts, as a share of its target, and shortest semi-axis at which a removed one
-/// disappears, as a share of the longest of the targets' shortest semi-axes.
+/// Size at which a new ellipsoid starts, as a share of its target. An ellipsoid that is being removed disappears when
+/// its shortest semi-axis is at most this share of the longest of the targets' shortest semi-axes.
 const START_SIZE: f64 = 0.05;
 
 /// Largest factor by which a semi-axis grows or shrinks in one step.
 const MAX_GROWTH: f64 = 1.5;
 
-/// One ellipsoid with its current state and its target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct MovingEllipsoid {
     now: Ellipsoid,
@@ -29,7 +28,7 @@ struct MovingEllipsoid {
     target: Option<Ellipsoid>,
 }
 
-/// All ellipsoids of a model, with their targets, and those being removed, which have none.
+/// All control ellipsoids of a model with their targets; those that are being removed have none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct MovingEllipsoids(Vec<MovingEllipsoid>);
 
@@ -44,7 +43,8 @@ impl MovingEllipsoids {
     }
 
     /// Sets new targets, matched by index. A new ellipsoid starts at a twentieth of its size if the membrane `holds`
-    /// the centre of its target, else inside the nearest ellipsoid; one that is left out shrinks until it is removed.
+    /// the centre of its target, else inside the nearest ellipsoid; an ellipsoid without a target in `given` shrinks
+    /// until it is removed.
     pub fn set_targets(&mut self, given: &[ControlEllipsoid], holds: impl Fn(&Ellipsoid) -> bool) {
         let kept = self.0.len().min(given.len());
         let mut moving: Vec<MovingEllipsoid> = Vec::with_capacity(given.len().max(self.0.len()));
@@ -63,9 +63,9 @@ impl MovingEllipsoids {
         self.0 = moving;
     }
 
-    /// Returns the state in which a new ellipsoid starts: small at its target, or inside the nearest ellipsoid if its
-    /// target is outside of the membrane. Growing there, it would push the membrane away instead of being covered by
-    /// it.
+    /// Returns the state in which a new ellipsoid starts: small at its target, or inside the nearest ellipsoid if the
+    /// centre of its target is outside of the membrane. An ellipsoid that grew outside would push the membrane away
+    /// instead of being covered by it.
     fn initial_state(&self, target: &Ellipsoid, holds: impl Fn(&Ellipsoid) -> bool) -> Ellipsoid {
         let away = |ellipsoid: &MovingEllipsoid| ellipsoid.now.ray_distance(target.center);
         let nearest = self.0.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -78,23 +78,25 @@ impl MovingEllipsoids {
         }
     }
 
-    /// Returns whether there is at least one ellipsoid and all are valid; those of a saved state may not be.
+    /// Returns whether there is at least one ellipsoid, and all current states and targets pass
+    /// [`ControlEllipsoid::validate`]; those of a saved state may not.
     pub fn are_valid(&self) -> bool {
         let all = self.0.iter().flat_map(|ellipsoid| std::iter::once(ellipsoid.now).chain(ellipsoid.target));
         !self.0.is_empty() && all.into_iter().all(|e| e.control().validate(0).is_ok())
     }
 
-    /// Returns all ellipsoids in their current state.
+    /// Returns all ellipsoids in their current state, including those that are being removed.
     pub fn now(&self) -> Vec<Ellipsoid> {
         self.0.iter().map(|ellipsoid| ellipsoid.now).collect()
     }
 
-    /// Returns the targets, without the ellipsoids that are being removed.
+    /// Returns the target ellipsoids; those that are being removed have none.
     pub fn targets(&self) -> Vec<Ellipsoid> {
         self.0.iter().filter_map(|ellipsoid| ellipsoid.target).collect()
     }
 
-    /// Whether all ellipsoids are at their targets, and none is being removed.
+    /// Returns whether all ellipsoids are at their targets, and none is being removed: only then can the model
+    /// converge.
     pub fn have_arrived(&self) -> bool {
         self.0.iter().all(|ellipsoid| ellipsoid.target == Some(ellipsoid.now))
     }
@@ -108,8 +110,8 @@ impl MovingEllipsoids {
             .fold(0.0, f64::max)
     }
 
-    /// Moves all ellipsoids by one step, by the same share of their remaining motion, so that those that move together
-    /// stay together; shrinks those that are being removed by the factor [`MAX_GROWTH`].
+    /// Moves all ellipsoids by one step, each by the same share of its remaining motion, so that ellipsoids that move
+    /// together stay together. Those that are being removed shrink by the factor [`MAX_GROWTH`].
     pub fn advance(&mut self) {
         let share = 1.0 / self.steps_left().max(1.0);
         for moving in &mut self.0 {
@@ -121,7 +123,7 @@ impl MovingEllipsoids {
         }
     }
 
-    /// Drops the ellipsoids that are being removed and have shrunk to [`START_SIZE`].
+    /// Drops the ellipsoids that are being removed and are small enough, see [`START_SIZE`].
     pub fn drop_vanished(&mut self) {
         let is_kept = |ellipsoid: &MovingEllipsoid, all: f64| {
             ellipsoid.target.is_some() || ellipsoid.now.shortest_axis() > START_SIZE * all
@@ -132,8 +134,8 @@ impl MovingEllipsoids {
     }
 }
 
-/// Returns the number of steps, possibly fractional, from one ellipsoid to another: the maximum over translation,
-/// rotation and growth.
+/// Returns the number of steps, possibly fractional, that an ellipsoid takes from one state to another: the maximum
+/// over translation, rotation and growth.
 fn steps_between(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     let max_shift = MAX_SHIFT * from.shortest_axis().max(to.shortest_axis());
     let shift = from.center.distance(to.center) / max_shift;
@@ -143,8 +145,8 @@ fn steps_between(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     shift.max(turns).max(libm::log(growth) / libm::log(MAX_GROWTH))
 }
 
-/// Returns the ellipsoid at `share` (0..1) of the way between two: centres are interpolated linearly, orientations
-/// about one axis, lengths geometrically.
+/// Returns the state of an ellipsoid after a `share` (0..1) of the motion from one state to another: centres are
+/// interpolated linearly, orientations about one axis, lengths geometrically.
 fn between(from: &Ellipsoid, to: &Ellipsoid, share: f64) -> Ellipsoid {
     let rotation = slerp(quaternion(from), quaternion(to), share);
     let lengths = [0, 1, 2].map(|k| from.lengths[k] * libm::pow(to.lengths[k] / from.lengths[k], share));
@@ -159,7 +161,8 @@ fn quaternion(e: &Ellipsoid) -> DQuat {
     DQuat::from_mat3(&e.rotation)
 }
 
-/// Interpolates rotations along the shorter arc. Written out because the platform's sine differs between machines.
+/// Interpolates between two rotations along the shorter arc, from `a` at 0 to `b` at 1. Written out because the
+/// platform's sine differs between machines.
 fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
     let b = if a.dot(b) < 0.0 { -b } else { b };
     let angle = libm::acos(a.dot(b).min(1.0));

@@ -8,49 +8,52 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct MultiresParams {
-    /// ε_min: shorter edges are collapsed, in units of the mesh.
+    /// ε_min, in units of the mesh: shorter edges of the deformed base are collapsed.
     pub edge_min: f64,
-    /// ε_max: longer edges are split, in units of the mesh; more than twice `edge_min`.
+    /// ε_max, in units of the mesh: longer edges of the deformed base are split; more than twice `edge_min`.
     pub edge_max: f64,
-    /// Maximum number of coarser levels that the membrane is solved on first; 0 solves on the target resolution only.
+    /// Maximum number of coarser meshes on which the membrane is solved first; 0 solves on the target resolution only.
     pub levels: u32,
-    /// q: the factor, below 1, by which the edge bounds shrink from one level to the next finer one.
+    /// q: the factor, below 1, by which the edge bounds shrink from one level of the solver to the next finer one.
     pub refine_factor: f64,
-    /// Maximum number of Gauss–Seidel iterations per level of a solve; finer levels may end earlier.
+    /// Maximum number of Gauss–Seidel iterations on each level when the membrane is solved; finer levels may end
+    /// earlier.
     pub smoothing: u32,
-    /// Applications of the operator D, which evens out the map T, per solve.
+    /// Number of times that the operator D, which evens out the map T from the deformed base to M₀, is applied after
+    /// each solve of the membrane.
     pub distribute: u32,
-    /// How often an edge of the deformed base may be halved where the detail needs more vertices.
+    /// How often an edge of the deformed base may be halved, where the detail that is added to it needs more vertices.
     pub supersample: u32,
-    /// The energy that the surface minimises between the ellipsoids.
+    /// The energy that the deformed base minimises where it spans between the ellipsoids.
     pub energy: Energy,
-    /// Which topology changes are made at necks and contacts.
+    /// Which topology changes the deformed base may undergo: cuts of thin necks, joins of parts in contact.
     pub topology: Topology,
 }
 
-/// The energy that the surface minimises between the ellipsoids.
+/// The energy that the deformed base minimises where it spans between the ellipsoids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Energy {
-    /// Area, like a soap film.
+    /// The deformed base minimises its area, like a soap film.
     Membrane,
-    /// Bending, like a thin plate: the surface leaves an ellipsoid smoothly.
+    /// The deformed base minimises its bending, like a thin plate, so that it leaves an ellipsoid smoothly.
     ThinPlate,
 }
 
-/// Which topology changes are made at necks and contacts.
+/// Which topology changes the deformed base may undergo: cuts of thin necks, joins of parts in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// None, as in Kobbelt, Bareuther & Seidel: thin necks stay and parts never join.
+    /// No topology changes, as in Kobbelt, Bareuther & Seidel: thin necks stay and parts in contact are not joined.
     Never,
-    /// A neck too thin for the shortest edge is cut.
+    /// Necks too thin for the shortest edge, ε_min, are cut.
     Split,
-    /// Necks are cut, and parts in contact are joined.
+    /// Necks too thin for the shortest edge, ε_min, are cut, and parts in contact are joined.
     SplitAndJoin,
 }
 
-/// Default ε_min as a share of the target edge. The ratio of the default bounds, 2.23, leaves no short edges behind.
+/// Default ε_min as a share of the target edge. With the default ratio of the two bounds, 2.23, splits of long edges
+/// leave no short ones behind.
 const MIN_SHARE: f64 = 0.65;
 /// Default ε_max as a share of the target edge.
 const MAX_SHARE: f64 = 1.45;
@@ -72,7 +75,7 @@ impl Default for MultiresParams {
 }
 
 impl MultiresParams {
-    /// Checks every value against its range, and that ε_max > 2 ε_min.
+    /// Checks that every parameter is in its range, and that ε_max > 2 ε_min.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted, and its range.
@@ -95,7 +98,8 @@ impl MultiresParams {
         Err(MethodError::invalid("edgeMax", problem))
     }
 
-    /// Replaces edge bounds of 0: one is derived from the other, or both from the target edge length `edge`.
+    /// Returns the parameters with edge bounds of 0, which mean the default, replaced: one is derived from the other,
+    /// or both from the target edge length `edge`, in units of the mesh.
     pub fn with_target(mut self, edge: f64) -> Self {
         match (self.edge_min > 0.0, self.edge_max > 0.0) {
             (true, false) => self.edge_max = self.edge_min * (MAX_SHARE / MIN_SHARE),
@@ -106,18 +110,18 @@ impl MultiresParams {
         self
     }
 
-    /// Returns ε_min and ε_max.
+    /// Returns the edge bounds ε_min and ε_max, in units of the mesh, for remeshing.
     pub fn bounds(&self) -> EdgeBounds {
         EdgeBounds { min: self.edge_min as f32, max: self.edge_max as f32 }
     }
 
-    /// Returns the target edge length: the mean edge that the bounds correspond to.
+    /// Returns the target edge length, in units of the mesh: the mean edge that the edge bounds correspond to.
     pub fn target(&self) -> f64 {
         0.5 * (self.edge_min + self.edge_max) / (0.5 * (MIN_SHARE + MAX_SHARE))
     }
 }
 
-/// Returns the descriptions of the parameters, in the order in which a page should show them.
+/// Returns the descriptions of the parameters, in the order in which a user interface should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

@@ -1,5 +1,6 @@
-//! Lists, for each triangle of a coarser surface, the triangles of the finer one that its normals can hit. Testing a
-//! line against these few replaces a tree query, which took half of the time of a frame with much detail.
+//! Lists, for each triangle of a coarser surface, the triangles of the next finer one that the normals of the coarser
+//! one can hit. Testing a line against these few replaces a tree query, which took half of the time of a frame with
+//! much detail.
 
 use super::correspondence::{BasePoint, normal_at};
 use super::detail::Band;
@@ -12,25 +13,27 @@ use crate::spatial::{NearestHit, SurfacePoint};
 /// along these normals.
 #[derive(Clone, Debug)]
 pub(super) struct PrismLookup {
-    /// Start of each triangle's list in `candidates`, and the end of the last.
+    /// By triangle, the start of its list in `candidates`; one more entry is the end of the last list.
     first: Vec<u32>,
     candidates: Vec<u32>,
     depths: Vec<f32>,
 }
 
-/// Depth of a prism, as a multiple of the largest distance to the other surface along the normals at its corners and
-/// centroid. With less, more normals fall back to the tree; with more, the lists grow long.
+/// Depth of the prism of a triangle, as a multiple of the largest distance to the other surface along the normals at
+/// its corners and centroid. With less, more normals fall back to the tree; with more, the lists of candidates grow
+/// long.
 const DEPTH: f64 = 1.5;
 
-/// Widening of a prism against rounding, as a share of its largest coordinate in absolute value.
+/// Widening of a prism against rounding, as a share of the largest absolute value of its coordinates.
 const ROUNDING: f64 = 1e-5;
 
-/// Smallest cosine between the normals at two corners: with more divergent normals the prism would be much too wide,
-/// and the tree is used.
+/// Smallest cosine between the normals at two corners of a triangle for which a prism is made: with more divergent
+/// normals it would be much too wide, and the tree is used.
 const MIN_COSINE: f32 = 0.1;
 
 impl PrismLookup {
-    /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `search_distance`.
+    /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `search_distance`,
+    /// in units of the mesh.
     pub fn new(from: &Band, to: &Band, search_distance: f64) -> Self {
         let count = from.walker.mesh().triangles.len();
         let mut prisms = Self { first: vec![0], candidates: Vec::new(), depths: Vec::with_capacity(count) };
@@ -51,8 +54,8 @@ impl PrismLookup {
     }
 
     /// Returns the intersection of the surface `to` with the line through `at` along `normal` that is nearest to `at`,
-    /// on either side and no farther away than `search_distance`. The same result as the tree's, which is queried if
-    /// the lists have none.
+    /// on either side and no farther away than `search_distance`; `None` if there is none. The result is that of the
+    /// tree of `to`, which is queried only if the lists of candidates contain no hit.
     pub fn line_hit(
         &self,
         to: &Band,
@@ -71,8 +74,8 @@ impl PrismLookup {
     }
 }
 
-/// Returns the depth of the prism of a triangle; 0, for no prism, if the normals at its corners diverge too much, or
-/// neither they nor the one at its centroid hit `to`.
+/// Returns the depth of the prism of triangle `t`, in units of the mesh; 0, for no prism, if the normals at its corners
+/// diverge too much, or no normal at its corners and centroid hits `to`.
 fn depth(from: &Band, to: &Band, search_distance: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
@@ -89,15 +92,16 @@ fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
     from.walker.mesh().triangles[t as usize].map(|v| from.normals[v as usize])
 }
 
-/// A convex body that contains all points of a triangle moved along its interpolated normals.
+/// A convex body that contains all points of a triangle moved along its interpolated normals by up to a given depth.
 ///
-/// A normal is n = Σ wᵢ nᵢ / s with the barycentric weights w and s² = |Σ wᵢ nᵢ|² ≥ min nᵢ·nⱼ. Moved by d, a point is
-/// at Σ wᵢ (cᵢ + (d/s) nᵢ): between the corners, each moved along its own normal by no more than d/s.
+/// A normal is n = Σ wᵢ nᵢ / s with the barycentric weights w, the normals nᵢ at the corners cᵢ, and s² = |Σ wᵢ nᵢ|² ≥
+/// min nᵢ·nⱼ. Moved by d, a point is at Σ wᵢ (cᵢ + (d/s) nᵢ): between the corners, each moved along its own normal by
+/// no more than d/s.
 struct Prism {
-    /// The corners moved to either side.
+    /// The three corners of the triangle moved outwards along their normals, then the three moved inwards.
     points: [DVec3; 6],
-    /// For each edge, the outward unit vector at right angles to it and to the mean normal: approximately the normal of
-    /// the lateral face.
+    /// For each edge of the triangle, the outward unit vector at right angles to it and to the mean normal:
+    /// approximately the normal of the lateral face of the prism.
     axes: [DVec3; 3],
     margin: f64,
 }
@@ -126,8 +130,8 @@ impl Prism {
         Bounds { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
     }
 
-    /// Whether no plane at right angles to one of `axes`, about parallel to a lateral face, separates a triangle from
-    /// the prism. The caller has tested the bounding boxes.
+    /// Returns whether a triangle may intersect the prism: false if a plane at right angles to one of `axes`, about
+    /// parallel to a lateral face, separates the two. The caller has tested the bounding boxes.
     fn may_intersect(&self, corners: [Vec3; 3]) -> bool {
         self.axes.iter().all(|axis| {
             let (least, most) = extent(axis, &self.points);
@@ -149,7 +153,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A smooth sphere, and one with waves.
+    /// Returns two bands with the same centre: a smooth sphere, and one with waves.
     fn pair() -> (Band, Band) {
         let ball = |edge: f32| Mesh::icosphere(Vec3::new(3.0, 0.0, 0.0), 1.0, edge).unwrap().to_triangles();
         let mut wavy = ball(0.07);

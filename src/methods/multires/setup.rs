@@ -1,4 +1,4 @@
-//! Validates the input of a model, and prepares its decomposition and parameters.
+//! Validates the input of a new model, and prepares its decomposition into surfaces and its parameters.
 
 use super::base::{check_embedded, decomposition, edge_for, membrane_around};
 use super::correspondence::{BasePoint, UNSET};
@@ -12,15 +12,16 @@ use crate::methods::caller_mesh::check_edges;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// Number of triangles of the base if no edge bounds are given: the "moderately complex models" of Kobbelt, Bareuther &
-/// Seidel.
+/// Number of triangles of the base if the caller gives no edge bounds: the "moderately complex models" of Kobbelt,
+/// Bareuther & Seidel.
 const DEFAULT_TRIANGLES: f64 = 10_000.0;
 
-/// Returns the bands from coarse to fine, and the parameters with edge bounds filled in.
+/// Validates the input of a new model. Returns the surfaces of its decomposition from coarse to fine, and the
+/// parameters with edge bounds of 0 replaced by defaults.
 ///
 /// # Errors
-/// [`MethodError::Mesh`] and [`MethodError::InvalidArgument`] for surfaces, ellipsoids or parameters that cannot be
-/// used; [`MethodError::TooManyVertices`] for edges that are too short.
+/// [`MethodError::Mesh`] and [`MethodError::InvalidArgument`] for surfaces, ellipsoids or parameters that are not
+/// accepted; [`MethodError::TooManyVertices`] for edge bounds that are too short.
 pub(super) fn set_up(
     detail: Option<TriangleMesh>,
     base: Option<TriangleMesh>,
@@ -73,8 +74,11 @@ fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<Triang
     Ok(mesh)
 }
 
-/// Checks that at least one ellipsoid comes within a target edge length of a vertex of the base: otherwise nothing
-/// would hold the membrane.
+/// Checks that at least one ellipsoid contains a vertex of the base, or is within a target edge length of one:
+/// otherwise nothing would hold the membrane.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] naming `ellipsoids`.
 fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
     let near = |p: &Vec3| {
         let p: DVec3 = p.as_dvec3();
@@ -86,7 +90,11 @@ fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -
     Err(MethodError::invalid("ellipsoids", "at least one must touch the base"))
 }
 
-/// Checks that a surface of this area has at most [`MAX_VERTICES`] vertices at the target edge length.
+/// Checks that a surface of the given area, in squared units of the mesh, has at most [`MAX_VERTICES`] vertices at the
+/// target edge length.
+///
+/// # Errors
+/// [`MethodError::TooManyVertices`] otherwise.
 pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), MethodError> {
     let triangle = 0.25 * 3.0_f64.sqrt() * params.target() * params.target();
     if area / triangle <= 2.0 * MAX_VERTICES as f64 {
@@ -95,7 +103,8 @@ pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), Metho
     Err(MethodError::TooManyVertices { most: MAX_VERTICES })
 }
 
-/// Returns the identity map from the base to itself: the base point of each vertex is the vertex.
+/// Returns the identity map from the base M₀ to itself, from which the initial map T is projected: the base point of
+/// each vertex is the vertex.
 pub(super) fn identity(walker: &SurfaceWalker) -> Vec<BasePoint> {
     let mut correspondence = vec![UNSET; walker.mesh().positions.len()];
     for (t, corners) in walker.mesh().triangles.iter().enumerate() {

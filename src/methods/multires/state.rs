@@ -1,5 +1,5 @@
-//! Saves a run and restores it bit for bit. A state holds the deformed base and its map T; the decomposition is made
-//! again from the same options, and the detail reconstructed.
+//! Saves a run of a model and restores it bit for bit. The saved state holds the deformed base and its map T; the
+//! decomposition is made again from the same options, and the detail is reconstructed.
 
 use super::correspondence::{BasePoint, Correspondence};
 use super::motion::MovingEllipsoids;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLMRS\x02";
 
-/// The saved state: everything of a run but its decomposition.
+/// The saved state: everything of a run but the decomposition of its input surfaces.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -28,7 +28,7 @@ struct State {
 }
 
 impl MultiresolutionModel {
-    /// Serialises the run, without the surfaces that it was made from.
+    /// Serialises the run for [`Self::restore`], without the surfaces that the model was made from.
     pub fn save(&self) -> Vec<u8> {
         encode(
             &MAGIC,
@@ -46,8 +46,8 @@ impl MultiresolutionModel {
         )
     }
 
-    /// Restores a run from the bytes of [`Self::save`], for a model with the same surfaces, given or derived; derived
-    /// ones depend on the initial ellipsoids and parameters.
+    /// Restores a run from the bytes of [`Self::save`]. This model must have the same surfaces as the saved one;
+    /// surfaces that were derived instead of given depend on the initial ellipsoids and parameters.
     ///
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
@@ -77,8 +77,8 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// Restores the points of the map T; `None` if one refers to a triangle that does not exist, or its coordinates are
-    /// not finite.
+    /// Restores the points of the map T from their saved form; `None` if one refers to a triangle that does not exist,
+    /// or its coordinates are not finite.
     fn correspondence_of(&self, points: &[(u32, Vec3)]) -> Option<Correspondence> {
         let base = &self.bands.base().walker;
         let count = base.mesh().triangles.len();
@@ -89,7 +89,8 @@ impl MultiresolutionModel {
         points.iter().map(point).collect()
     }
 
-    /// Returns a hash of the positions and triangles of all surfaces, which identifies the decomposition.
+    /// Returns a hash of the positions and triangles of all surfaces of the decomposition, so that a saved state is
+    /// restored only with the same surfaces.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         for band in &self.bands.all {

@@ -1,18 +1,19 @@
-//! Texture coordinates of the deformed surface, taken from the corresponding points of the finest surface; seams are
-//! respected (Kobbelt, Bareuther & Seidel, section 7).
+//! Texture coordinates of the deformed surface, taken from the corresponding points of the finest surface of the
+//! decomposition; seams are respected (Kobbelt, Bareuther & Seidel, section 7).
 
 use super::correspondence::{BasePoint, Correspondence};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::spatial::SurfaceWalker;
 
-/// A triangle is taken to cross a seam if its texture coordinates are farther apart than this multiple of what its size
-/// implies. With a smaller value, stretched texture is mistaken for a seam; with a much larger one, narrow strips of
-/// the whole texture appear along it.
+/// A triangle of the deformed surface is taken to cross a texture seam if its texture coordinates are farther apart
+/// than this multiple of the distance that its size implies. With a smaller value, stretched texture is mistaken for a
+/// seam; with a much larger one, narrow strips of the whole texture appear along it.
 const SEAM_RATIO: f32 = 6.0;
 
-/// Returns texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; `None` if the finest
-/// surface has none. `points` are the corresponding points on the finest surface, by slot.
+/// Returns texture coordinates for the corners of each triangle of the deformed surface, in the order of
+/// [`Mesh::triangles`]; `None` if the finest surface of the decomposition has none. `points` are the corresponding
+/// points on the finest surface, by slot.
 pub(super) fn corner_uvs(
     mesh: &Mesh,
     points: &Correspondence,
@@ -56,7 +57,8 @@ fn uv_at(mesh: &TriangleMesh, at: &BasePoint) -> Vec2 {
     blend(triangle_uvs(mesh, at.triangle), at.weights)
 }
 
-/// Returns the longest edge of a triangle of the finest surface in the texture, divided by its longest edge in space.
+/// Returns the scale of the texture on a triangle of the finest surface: its longest edge in texture coordinates,
+/// divided by its longest edge in space.
 fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
     let [p, q, r] = finest.corners(triangle);
@@ -64,7 +66,8 @@ fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     in_texture / p.distance(q).max(q.distance(r)).max(r.distance(p)).max(f32::MIN_POSITIVE)
 }
 
-/// Extrapolates the texture coordinates of a triangle to a point beside it, projected onto its plane.
+/// Extrapolates the texture coordinates of a triangle of the finest surface to a point beside it, projected onto its
+/// plane.
 fn extrapolated_uv(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
     let [a, b, c] = finest.corners(triangle);
     let normal = (b - a).cross(c - a);

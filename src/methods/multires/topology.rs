@@ -1,7 +1,8 @@
-//! Moves the membrane under the collision guard, and cuts necks and joins contacts where it comes near itself.
+//! Moves the membrane with displacements shortened to avoid self-intersections, and cuts necks and joins contacts where
+//! it comes near itself.
 //!
-//! `membrane` is faster: it makes a new mesh in every frame, which is used if it has no self-intersections. Otherwise
-//! the mesh of the frame before is moved here, guarded, and annular and axial changes cut and join it.
+//! The module `membrane` is faster: it makes a new mesh in every frame, which is used if it has no self-intersections.
+//! Otherwise the mesh of the frame before is moved here, and annular and axial changes cut and join it.
 
 use super::ellipsoid::Ellipsoid;
 use super::membrane::{pushed_positions, relaxed};
@@ -10,11 +11,11 @@ use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::remesh::{Changes, ContactPolicy, EdgeBounds, Resolver, Sampling, restructure};
 
-/// Rounds of moves and remeshing in a frame. With one, edges out of bounds remain.
+/// Rounds of motion and remeshing in one call of [`move_guarded`]. With one, edges out of bounds remain.
 const ROUNDS: usize = 2;
 
-/// Moves `mesh` under the guard to the `predicted` positions, one for each slot, and on towards the membrane's energy
-/// minimum.
+/// Moves `mesh`, the membrane of the frame before, to the `predicted` positions, by slot, and on towards the membrane's
+/// energy minimum, and remeshes it. Displacements are shortened to avoid self-intersections. Returns the edits made.
 pub(super) fn move_guarded(
     mesh: &mut Mesh,
     predicted: &[Vec3],
@@ -36,7 +37,8 @@ pub(super) fn move_guarded(
     changes
 }
 
-/// Restores the edge bounds, and makes the topology changes at necks and contacts that the parameters allow.
+/// Restores the edge bounds of the membrane after a motion, and makes the topology changes at necks and contacts that
+/// the parameters allow. Returns the edits made.
 fn remesh_and_resolve(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Changes {
     let bounds = params.bounds();
     let mut changes = restructure(mesh, bounds, resolver.embedding(mesh, sampling(bounds)));
@@ -49,8 +51,9 @@ fn remesh_and_resolve(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut R
     changes
 }
 
-/// Cuts thin necks of `mesh`, which must not intersect itself, unless the parameters forbid topology changes; joins
-/// contacts around them if the parameters allow it. Edges are not split beyond `most_vertices` vertices.
+/// Cuts thin necks of the membrane `mesh`, which must not intersect itself, unless the parameters forbid topology
+/// changes; joins contacts around them if the parameters allow it. Edges are split only up to `most_vertices` vertices
+/// in all. Returns the edits made.
 pub(super) fn cut_threads(mesh: &mut Mesh, params: &MultiresParams, most_vertices: usize) -> Changes {
     let active = pinched(mesh, params.bounds());
     if params.topology == Topology::Never || active.is_empty() {
@@ -70,14 +73,14 @@ fn resolve(
     resolver.resolve(mesh, sampling(params.bounds()), active)
 }
 
-/// Returns the edge lengths for topology changes, from ε_min to 2.5 ε_min: the upper bound is slightly higher than that
-/// of the default parameters.
+/// Returns the edge lengths that the resolver restores around topology changes, from ε_min to 2.5 ε_min: the upper
+/// bound is slightly higher than the default ε_max, 2.23 ε_min.
 fn sampling(bounds: EdgeBounds) -> Sampling {
     Sampling::new(bounds.min)
 }
 
-/// Returns the vertices with a short edge that cannot be collapsed, because a neck is in the way or the component is a
-/// tetrahedron.
+/// Returns the vertices with an edge shorter than ε_min that cannot be collapsed, because it is on a neck or on an
+/// isolated tetrahedron: topology changes are tried around them.
 fn pinched(mesh: &Mesh, bounds: EdgeBounds) -> Vec<VertexId> {
     let shortest = bounds.min * bounds.min;
     let is_pinched = |u: VertexId, v: VertexId| {
@@ -92,7 +95,7 @@ fn move_to(mesh: &mut Mesh, positions: &[Vec3], resolver: &mut Resolver, samplin
     resolver.move_all(mesh, sampling, &mut displacements);
 }
 
-/// Returns the displacement of each vertex to its position in `positions`, by slot.
+/// Returns the displacement of each vertex of `mesh` to its position in `positions`, both by slot; zero for free slots.
 pub(super) fn displacements_to(mesh: &Mesh, positions: &[Vec3]) -> Vec<Vec3> {
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     // Free slots have no position.

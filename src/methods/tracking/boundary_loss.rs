@@ -1,7 +1,7 @@
-//! Handles parts of the surface that have lost their boundary in the image, or have none yet. Where two walls have met,
-//! inside and outside have the same intensity: the surface between them would remain as a sheet without volume, which
-//! causes folds, so it is collapsed. Where a gap opens, the bright region advances faster than boundary points can
-//! attract the surface, so the surface grows into it.
+//! Handles parts of the tracked surface that have lost their boundary (step in intensity) in the image, or have none
+//! yet. Where two walls have met, inside and outside have the same intensity: the surface between them would remain as
+//! a sheet without volume, which causes folds, so it is collapsed. Where a gap opens, the bright region advances faster
+//! than boundary points can attract the surface, so the surface grows into it.
 
 use super::frame_tracker::{FrameContext, FrameStatistics, FrameTracker, Support, neighbour_mean};
 use super::project::Onto;
@@ -12,31 +12,36 @@ use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
 use std::collections::BTreeSet;
 
-/// Maximum number of rounds in a frame that search for vertices at which the image shows no boundary.
+/// Maximum number of rounds in a frame that search for vertices at which the image shows no boundary, and collapse,
+/// grow or smooth the surface there.
 const ROUNDS: usize = 10;
-/// Minimum number of these rounds while there are vertices without a boundary.
+/// Minimum number of rounds in a frame that treat vertices at which the image shows no boundary, as long as there are
+/// such vertices.
 const MIN_ROUNDS: usize = 2;
 
-/// After [`MIN_ROUNDS`], rounds end when at least this share of the vertices without a boundary remains from the round
-/// before.
+/// Rounds that treat vertices at which the image shows no boundary end, after [`MIN_ROUNDS`], when at least this share
+/// of these vertices is left from one round to the next.
 const LITTLE_PROGRESS: f64 = 0.9;
 
-/// Number of times that the vertices without a boundary are moved in each round.
+/// Number of times that the vertices at which the image shows no boundary are moved in each round that treats them.
 const MOVES: usize = 2;
 
-/// Largest distance between the two walls of a sheet, in units of the shortest side of a voxel.
+/// Largest distance between the two walls of a sheet, which is what remains of the surface between two regions that
+/// have met; in units of the shortest side of a voxel.
 const THICKNESS: f64 = 1.5;
 
-/// Largest cosine between the normals of the two walls of a sheet, which face away from each other.
+/// Largest cosine between the normals of the two walls of a sheet, which face away from each other; a sheet is what
+/// remains of the surface between two regions that have met.
 const OPPOSITE: f32 = -0.3;
 
-/// Share of the displacement to the mean of its neighbours that is added to the outward displacement of a vertex that
-/// grows.
+/// Share of the displacement to the mean of its neighbours that is added to the outward displacement of a vertex where
+/// the surface grows into a bright region, to keep the surface smooth.
 const SMOOTHING: f32 = 0.5;
 
 impl FrameTracker {
-    /// Collapses sheets between walls that have met, grows the surface into bright regions, and smooths the other
-    /// vertices without a boundary. Counts them in `statistics`, and returns the edits.
+    /// Treats the vertices at which the image shows no boundary: collapses sheets between walls that have met, grows
+    /// the surface into bright regions, and smooths the rest. Counts these vertices in `statistics`, and returns the
+    /// edits of the mesh.
     pub fn resolve_boundary_loss(
         &mut self,
         mesh: &mut Mesh,
@@ -74,8 +79,9 @@ impl FrameTracker {
         changes
     }
 
-    /// Moves vertices without a boundary: outwards if the image is bright on both sides of them and they are on no
-    /// sheet, else to the mean of their neighbours. Returns the vertices chosen to move outwards.
+    /// Moves the vertices at which the image shows no boundary: outwards if the image is bright on both sides of them
+    /// and they are on no sheet between walls that have met, else to the mean of their neighbours. Returns the vertices
+    /// chosen to move outwards.
     fn move_without_boundary(&mut self, mesh: &mut Mesh, context: &FrameContext) -> Vec<VertexId> {
         let without_boundary = without_boundary(mesh, context);
         let sheets = on_sheets(mesh, &without_boundary, context);
@@ -96,8 +102,8 @@ impl FrameTracker {
         grown
     }
 
-    /// Collapses the vertices of sheets into their neighbours, from the innermost to the rim; returns the number of
-    /// collapses.
+    /// Collapses the vertices `sheets`, which are on sheets between walls that have met, into their neighbours, from
+    /// the innermost vertices to the rim; returns the number of collapses.
     fn collapse_sheets(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
         self.guard.sync_with_edge(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
@@ -119,14 +125,14 @@ impl FrameTracker {
     }
 }
 
-/// Returns the vertices without a boundary, each with its [`Support`].
+/// Returns the vertices at which the image shows no boundary, each with what it shows instead (its [`Support`]).
 fn without_boundary(mesh: &Mesh, context: &FrameContext) -> Vec<(VertexId, Support)> {
     let support = |v: VertexId| (v, context.classify(mesh.position(v), mesh.area_normal(v)));
     mesh.vertices().map(support).filter(|(_, support)| *support != Support::Boundary).collect()
 }
 
-/// Returns the vertices among `without_boundary`, in ascending order, that are on a sheet: another one within
-/// [`THICKNESS`] faces the opposite way.
+/// Returns the vertices among `without_boundary`, in ascending order, that are on a sheet between walls that have met:
+/// another vertex of `without_boundary` within [`THICKNESS`] faces the opposite way.
 fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &FrameContext) -> Vec<VertexId> {
     let thickness = (THICKNESS * context.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();
@@ -144,8 +150,8 @@ fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &Fr
     (0..without_boundary.len()).filter(|&i| has_opposite(i)).map(|i| without_boundary[i].0).collect()
 }
 
-/// Returns for each vertex of the sheets the number of edges to the nearest vertex off the sheets, by slot: `u32::MAX`
-/// if there is none, 0 for other vertices.
+/// Returns for each vertex of `sheets` the number of edges to the nearest vertex that is not in `sheets`, indexed by
+/// vertex slot, as the order of collapses: `u32::MAX` if there is none, 0 for vertices that are not in `sheets`.
 fn depths(mesh: &Mesh, sheets: &[VertexId]) -> Vec<u32> {
     let mut depth = vec![0; mesh.slots()];
     sheets.iter().for_each(|v| depth[v.index()] = u32::MAX);

@@ -1,6 +1,6 @@
-//! The sides of the box as boundary where they cut a bright region. Blood continues from one chamber into the next
-//! without a step in intensity, so the box ends the region: its sides get faces of full weight there, and the surface
-//! is closed.
+//! The sides of the box in which a surface is tracked are a boundary where they cut a bright region. Blood continues
+//! from one chamber into the next without a step in intensity, so the box ends the region: its sides get faces of full
+//! weight there, and the surface is closed.
 
 use super::labelling::{VoxelBox, label_bright, label_bright_by_level};
 use super::region::Region;
@@ -14,7 +14,8 @@ impl Region {
         (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]))
     }
 
-    /// Returns the voxels before and after a face; the same voxel twice for a face along time.
+    /// Returns the coordinates of the voxels before and after the face in `direction` after `voxel`; the same voxel
+    /// twice for a face along time.
     fn voxels_at_face(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
         let before = self.voxel(voxel);
         let mut after = before;
@@ -24,7 +25,8 @@ impl Region {
         [before, after]
     }
 
-    /// Returns the outward direction through a face in a side of the box; `None` for all other faces.
+    /// Returns the direction out of the box through the face in `direction` after `voxel`, if the face is in a side of
+    /// the box; `None` for all other faces.
     pub fn outward_at_box_side(&self, direction: usize, voxel: u32) -> Option<DVec3> {
         match self.voxels_at_face(direction, voxel).map(|at| self.is_inside(at)) {
             [true, false] => Some(DVec3::AXES[direction]),
@@ -33,8 +35,9 @@ impl Region {
         }
     }
 
-    /// Returns the distance from a voxel's centre to the box along the axis where it is largest, in world units;
-    /// negative infinity for voxels of the box.
+    /// Returns the distance from a voxel's centre to the box in which a surface is tracked, along the axis where it is
+    /// largest, in world units; negative infinity for voxels of the box. Used to put everything beyond the box outside
+    /// of the surface.
     pub fn distance_outside_box(&self, at: [usize; 3]) -> f64 {
         let [first, last] = self.inner;
         let beyond = |axis: usize| {
@@ -44,7 +47,8 @@ impl Region {
         (0..3).map(beyond).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Returns the index of the voxel of the box nearest to a position outside; `None` for positions inside.
+    /// Returns the index of the voxel of the box that is nearest to `position` if that is outside the box; `None` if it
+    /// is inside. Shows whether a surface point is at a side of the box.
     pub fn clamp_into_box(&self, position: DVec3) -> Option<u32> {
         let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
         let at = position / self.spacing;
@@ -54,7 +58,8 @@ impl Region {
         (!is_inside).then_some((z * ny + y) * nx + x)
     }
 
-    /// Removes the faces beyond the box, and adds faces of weight 1 in its sides where the frame is bright.
+    /// Removes the faces beyond the box from `faces`, and adds faces of weight 1 in the sides of the box where the
+    /// frame is bright, so that the surface is closed there.
     pub fn clip_to_box(&self, frame: usize, faces: &mut Faces) {
         for (direction, list) in faces.iter_mut().enumerate() {
             list.retain(|face| {
@@ -83,8 +88,9 @@ impl Region {
         faces.iter_mut().zip(added).for_each(|(list, added)| list.extend(added));
     }
 
-    /// Returns faces in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer of the
-    /// voxels before the faces. Both are indices along `direction`.
+    /// Returns faces of weight 1 in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer
+    /// of the voxels before the faces. Both are indices along `direction`. `fallback` labels the voxels of the box as
+    /// bright or dark if no boundary crosses the side.
     fn box_side_faces<'a>(
         &self,
         frame: usize,
@@ -111,7 +117,8 @@ impl Region {
         bright.map(|i| Face { voxel: voxel(i), weight: 1.0 }).collect()
     }
 
-    /// Returns the indices of the voxels of the box that are adjacent to faces in its sides, sorted.
+    /// Returns the indices, sorted, of the voxels of the box that are adjacent to faces in its sides: there, the image
+    /// is bright up to the side, which is a boundary of the surface.
     pub fn bright_box_side_voxels(&self, faces: &Faces) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let mut voxels = Vec::new();

@@ -1,30 +1,35 @@
-//! The weighted least-squares plane through the boundary points around a position (section 3), in space or in
-//! space-time.
+//! The weighted least-squares plane through the boundary points around a position (section 3 of the paper that
+//! `tracking` follows), in space or in space-time.
 
 use super::samples::Sums;
 use crate::math::{DVec3, symmetric};
 
-/// A least-squares plane through the points around a position.
+/// A least-squares plane through the boundary points around a position, in space or in space-time; a surface point is
+/// projected onto it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PlaneFit {
-    /// The spatial part of the normal, of unit length together with `along_time`; its sign is arbitrary.
+    /// The spatial part of the normal of the fitted plane, of unit length together with `along_time`; its sign is
+    /// arbitrary.
     pub normal: DVec3,
-    /// The temporal component of the normal, with time measured as c·t; 0 for a plane in space.
+    /// The temporal component of the normal of the fitted plane, with time measured as a length, c·t; 0 for a plane in
+    /// space.
     pub along_time: f64,
-    /// Signed distance from the position to the plane, positive if the plane is on the side that the normal points to.
+    /// Signed distance from the position around which it was fitted to the plane, in world units, positive if the plane
+    /// is on the side that the normal points to.
     pub distance: f64,
-    /// Total weight of the points.
+    /// Total weight of the points to which the plane was fitted.
     pub weight: f64,
 }
 
-/// Smallest total weight of points that a plane is fitted to.
+/// Smallest total weight of points that a plane is fitted to; with less, there is no fit.
 const MIN_WEIGHT: f64 = 1e-3;
 
-/// Points whose variance in time is at most this share of their variance in space are fitted in space only.
+/// Largest ratio of the points' variance in time to their variance in space at which a plane is fitted in space only,
+/// as they are of a single frame.
 const MIN_TIME_SPREAD: f64 = 1e-6;
 
-/// Fits a plane in space to the points summed in `sums`: its normal is the direction of least variance. `None` if there
-/// are too few points.
+/// Fits a plane in space to the boundary points summed in `sums`: its normal is the direction of least variance. `None`
+/// if there are too few points.
 pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
     let [mean, covariance] = mean_and_covariance(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
@@ -33,8 +38,8 @@ pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
     Some(PlaneFit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
 
-/// Fits a hyperplane in space-time to the points summed in `sums`, or a plane in space if all are of a single moment.
-/// `None` if there are too few points.
+/// Fits a hyperplane in space-time to the boundary points summed in `sums`, or a plane in space if all points are of a
+/// single time. `None` if there are too few points.
 pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
     let [mean, c] = mean_and_covariance(sums)?;
     // All points are of a single moment: in space-time every hyperplane through their plane would fit.
@@ -52,8 +57,8 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
     Some(PlaneFit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }
 
-/// Returns the mean, in the first four numbers, and the covariance, with products in the order of [`Sums::second`];
-/// `None` if there are too few points.
+/// Returns the mean of the points summed in `sums`, in the first four numbers, and their covariance, with products in
+/// the order of [`Sums::second`]; `None` if there are too few points.
 fn mean_and_covariance(sums: &Sums) -> Option<[[f64; 10]; 2]> {
     if sums.weight < MIN_WEIGHT {
         return None;

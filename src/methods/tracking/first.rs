@@ -1,5 +1,5 @@
-//! The mesh of the first frame (section 4.1): a signed distance from the boundary points, and its zero level by
-//! marching cubes.
+//! The mesh of the first frame (section 4.1 of the paper that `tracking` follows): a signed distance from the boundary
+//! points, and its zero level by marching cubes.
 
 use super::extremal::plane;
 use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
@@ -11,22 +11,22 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Grid, marching_cubes};
 
-/// Half-width of the band around the boundary points in which the distance from their planes is used, as a share of the
-/// radius; elsewhere only the inside/outside labelling counts.
+/// Half-width of the band around the boundary points in which the distance from the planes fitted to them is used, as a
+/// share of the radius of the plane fits; elsewhere only the inside/outside labelling counts.
 const BAND: f64 = 0.8;
 
-/// Voxels to either side over which the intensity gradient is estimated.
+/// Number of voxels to either side of a voxel over which the intensity gradient is estimated, to orient normals.
 const SLOPE_RADIUS: usize = 2;
 
-/// A boundary point with its normal, which points from bright to dark.
+/// A boundary point with its unit normal, which points from bright to dark.
 struct Oriented {
     at: DVec3,
     normal: DVec3,
     weight: f64,
 }
 
-/// Extracts the closed surface around all bright regions of the first frame, in world coordinates; empty without a
-/// boundary.
+/// Extracts the closed surfaces around all bright regions of the first frame, in world coordinates; an empty mesh if
+/// the image has no boundary.
 pub(super) fn extract_bright_surface(
     region: &Region,
     faces: &Faces,
@@ -49,8 +49,9 @@ pub(super) fn extract_bright_surface(
     Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
 }
 
-/// Returns the centres of the faces of walls, those with a weight of at least [`MIN_WEIGHT`], with the normals of their
-/// fitted planes, oriented towards falling intensity, or outwards in the sides of the box.
+/// Returns the centres of the faces that separate bright from dark in the first frame, those with a weight of at least
+/// [`MIN_WEIGHT`], with the normals of the planes fitted around them, oriented towards falling intensity, or outwards
+/// in the sides of the box.
 fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
@@ -68,8 +69,8 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     points
 }
 
-/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame: a multiple of the
-/// covariance of intensity and position.
+/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame, to orient
+/// normals: a multiple of the covariance of intensity and position.
 fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
     let range =
@@ -90,8 +91,9 @@ fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     sum - first * (mean / count)
 }
 
-/// Returns for each voxel within `band` of a boundary point the weighted mean of its signed distances to the planes of
-/// such points, in world units, positive inside; `None` for other voxels.
+/// Returns for each voxel within `band` of boundary points the weighted mean of its signed distances to the planes
+/// through these points, in world units, positive inside; `None` for other voxels. The surface of the first frame is
+/// the zero level of these distances.
 fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];

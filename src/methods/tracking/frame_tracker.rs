@@ -1,5 +1,5 @@
-//! Tracks the mesh from one frame to the next (section 4): prediction, projection, parts without a boundary, folds, and
-//! connectivity.
+//! Tracks the surface mesh from one frame to the next (section 4 of the paper that `tracking` follows): prediction,
+//! projection, parts without a boundary in the image, folded triangles, and edge bounds.
 
 use super::TrackingParams;
 use super::project::{Onto, SpaceTimeSamples};
@@ -10,27 +10,30 @@ use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 
-/// Smoothing passes over the mesh for predictions and curvature corrections: unsmoothed, either does more harm than
-/// good.
+/// Number of times that predicted displacements and curvature corrections of the vertices are averaged over neighbours:
+/// unsmoothed, either does more harm than good.
 const SMOOTHINGS: usize = 5;
 
-/// Largest curvature correction of a vertex, in units of the shortest side of a voxel; larger ones occur at sharp
-/// corners.
+/// Largest displacement of a vertex that corrects the inward bias of planes fitted to curved surfaces, in units of the
+/// shortest side of a voxel; larger corrections occur at sharp corners.
 const MAX_CURVATURE_CORRECTION: f64 = 0.3;
 
-/// Maximum number of passes that smooth folded triangles in a frame.
+/// Maximum number of passes over the mesh that smooth folded triangles in a frame.
 const UNFOLDINGS: usize = 3;
 
-/// Number of times that the mesh is projected in the first frame: it comes from a grid, not from a tracked frame.
+/// Number of times that the mesh is projected onto the boundary in the first frame: it comes from a grid, not from a
+/// tracked frame.
 const FIRST_FRAME_PASSES: usize = 3;
 
-/// A vertex is on a boundary if intensity falls by at least this share of τ from one voxel inside to one voxel outside.
+/// A vertex is on a boundary of the image if intensity falls by at least this share of the edge threshold τ from one
+/// voxel inside to one voxel outside.
 const MIN_STEP: f64 = 0.3;
 
-/// Share of the tangential displacement to the mean of the neighbours by which vertices are spaced in each frame.
+/// Share of the tangential displacement to the mean of its neighbours by which each vertex is moved in each frame, to
+/// space vertices evenly.
 const SPACING: f32 = 0.5;
 
-/// Measurements of the surface in one frame, and counts of what tracking did there.
+/// Measurements of the tracked surface in one frame, and counts of what tracking did there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct FrameStatistics {
@@ -38,23 +41,24 @@ pub struct FrameStatistics {
     pub volume: f64,
     /// Area of the surface, in squared world units.
     pub area: f64,
-    /// Number of triangles.
+    /// Number of triangles of the surface.
     pub triangles: usize,
-    /// Number of triangles that stay folded: they face away from the sum of the normals of the three triangles beside
-    /// them.
+    /// Number of triangles that are still folded at the end: they face away from the sum of the normals of the three
+    /// triangles beside them.
     pub folded: usize,
-    /// Number of projections that failed: there were too few points, the hyperplane was nearly parallel to the frame,
-    /// or the vertex moved too far.
+    /// Number of projections of vertices onto the boundary that failed: there were too few boundary points around the
+    /// vertex, the fitted space-time hyperplane was nearly parallel to the frame, or the vertex moved too far.
     pub rejected: usize,
-    /// Number of vertex moves in projections and curvature corrections that were shortened to avoid self-intersections.
+    /// Number of displacements of vertices in projections and curvature corrections that were shortened to avoid
+    /// self-intersections.
     pub held_moves: usize,
     /// Number of vertices at which the image shows no boundary: collapsed between walls that have met, grown into gaps
     /// that open, else smoothed.
     pub without_boundary: usize,
-    /// Mean number of projection steps per vertex, summed over the projections of all vertices onto space-time and onto
-    /// the frame.
+    /// Mean number of projection steps per vertex, summed over the projections of all vertices onto the extremal
+    /// surface in space-time and in the frame.
     pub steps: f64,
-    /// Mean displacement by the last projection of all vertices, in world units.
+    /// Mean displacement of a vertex by the last projection of all vertices in this frame, in world units.
     pub mean_final_correction: f64,
 }
 
@@ -63,26 +67,29 @@ pub(super) struct FrameContext<'a> {
     pub region: &'a Region,
     pub params: &'a TrackingParams,
     pub frame: usize,
-    /// The boundary points around that frame in time.
+    /// The boundary points around `frame` in time.
     pub samples: &'a SpaceTimeSamples,
-    /// The voting, whose levels between bright and dark are known for that frame.
+    /// The boundary votes, with the level between bright and dark in each window of `frame`.
     pub voting: &'a BoundaryVoting,
 }
 
-/// The image around a point of the surface: whether there is a boundary, and if not, whether it is bright.
+/// How the image classifies a point of the surface: on a boundary, or if there is none, whether both sides are bright.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Support {
-    /// Intensity falls from inside to outside, or the point is at a side of the box that cuts a bright region.
+    /// Intensity falls from inside to outside, or the point is at a side of the processed box that cuts a bright
+    /// region.
     Boundary,
-    /// No boundary, and both sides are brighter than the level between bright and dark.
+    /// No boundary, and both sides are brighter than the level between bright and dark in the window around it; the
+    /// surface grows there.
     Bright,
-    /// No boundary, and not bright on both sides; also outside the box, unless the box cuts a bright region there.
+    /// No boundary, and not bright on both sides; also outside the processed box, unless the box cuts a bright region
+    /// there.
     Dark,
 }
 
 impl FrameContext<'_> {
-    /// Classifies a point of the surface by the intensities at two points on its normal, inside and outside by the
-    /// shortest side of a voxel.
+    /// Classifies a point of the surface, in world coordinates, by the intensities at two points on its normal: inside
+    /// and outside, at a distance of the shortest side of a voxel.
     pub fn classify(&self, at: Vec3, normal: Vec3) -> Support {
         let region = self.region;
         let displacement = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
@@ -103,11 +110,11 @@ impl FrameContext<'_> {
     }
 }
 
-/// Tracks one mesh, in world coordinates, through the frames.
+/// Tracks one mesh, in world coordinates, through the frames of a 4D image.
 #[derive(Clone, Debug)]
 pub(super) struct FrameTracker {
     pub(super) guard: Embedding,
-    /// Mean edge length of the mesh in the first frame; the edge bounds are multiples of it.
+    /// Mean edge length of the mesh in the first frame, in world units; the edge bounds are multiples of it.
     pub edge: f64,
     pub(super) bounds: EdgeBounds,
 }
@@ -117,8 +124,9 @@ impl FrameTracker {
         Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
     }
 
-    /// Moves the mesh into the next frame, predicted from the samples of the frame before if there are any and the
-    /// parameters ask for it. Returns the edits and the statistics of the frame.
+    /// Moves the mesh into the frame of `context`. If the parameters say so, it starts from the displacements predicted
+    /// from `from`, the boundary points around the frame before, `None` in the first frame. Returns the edits of the
+    /// mesh and the statistics of the frame.
     pub fn track_frame(
         &mut self,
         mesh: &mut Mesh,
@@ -145,8 +153,9 @@ impl FrameTracker {
         (changes, statistics)
     }
 
-    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, restores its edge bounds, and treats the
-    /// vertices without a boundary. Returns the edits.
+    /// Projects the mesh, displaced by `offsets` (indexed by vertex slot), onto the extremal surface of the boundary
+    /// points of a frame, restores its edge bounds, and treats the vertices at which the image shows no boundary.
+    /// Returns the edits of the mesh.
     fn project_and_restructure(
         &mut self,
         mesh: &mut Mesh,
@@ -187,8 +196,8 @@ impl FrameTracker {
         statistics.held_moves += self.move_vertices(mesh, displacements);
     }
 
-    /// Moves the vertices of folded triangles to the mean of their neighbours. Returns the number of triangles that
-    /// stay folded.
+    /// Moves the vertices of folded triangles, which face away from those around them, to the mean of their neighbours.
+    /// Returns the number of triangles that stay folded.
     fn unfold(&mut self, mesh: &mut Mesh) -> usize {
         let mut folds = folded(mesh);
         for _ in 0..UNFOLDINGS {
@@ -205,8 +214,9 @@ impl FrameTracker {
         folds.len()
     }
 
-    /// Projects all vertices, each displaced by `offsets` first; adds the mean number of steps to `statistics`, and
-    /// sets the mean displacement there.
+    /// Projects all vertices, each displaced by `offsets` (by vertex slot) first, onto the extremal surface of the
+    /// boundary points. Adds the mean number of steps per vertex to `statistics.steps`, and sets
+    /// `statistics.mean_final_correction`.
     fn project_all(
         &mut self,
         mesh: &mut Mesh,
@@ -222,9 +232,10 @@ impl FrameTracker {
         statistics.mean_final_correction = total / count;
     }
 
-    /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. Where that fails, a vertex
-    /// moves by the mean of its neighbours' displacements. All move at once, with one collision test. Returns the total
-    /// number of steps, and the total displacement by the projection.
+    /// Projects `vertices`, each displaced by `offsets` (by vertex slot) first, onto the extremal surface of the
+    /// boundary points of a frame. A vertex whose projection fails moves by the mean of its neighbours' displacements.
+    /// All vertices move at once, with one collision test. Returns the total number of projection steps, and the total
+    /// displacement by the projections, in world units.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
@@ -254,16 +265,16 @@ impl FrameTracker {
         (steps, sum)
     }
 
-    /// Moves the vertices by `displacements` as far as the surface does not intersect itself. Returns the number of
-    /// those held back.
+    /// Moves the vertices by `displacements` (by vertex slot), shortened where the surface would intersect itself.
+    /// Returns the number of vertices whose displacements were shortened.
     pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
         self.guard.sync_with_edge(mesh, self.bounds.max);
         self.guard.move_all(mesh, &mut displacements).len()
     }
 }
 
-/// Predicts the displacement of each vertex to the next frame, by slot, from the slope of the space-time surface;
-/// smoothed over the mesh.
+/// Predicts the displacement of each vertex to the next frame, indexed by vertex slot, from the slope of the extremal
+/// surface in space-time; it is smoothed over the mesh.
 fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<Vec3> {
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
@@ -274,7 +285,8 @@ fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<V
     (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements))
 }
 
-/// Returns tangential displacements towards the mean of the neighbours, by slot, which even out the vertices.
+/// Returns for each vertex a tangential displacement towards the mean of its neighbours, indexed by vertex slot, to
+/// space vertices evenly.
 fn tangential_displacements(mesh: &Mesh) -> Vec<Vec3> {
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
@@ -290,7 +302,8 @@ pub(super) fn neighbour_mean(mesh: &Mesh, v: VertexId) -> Vec3 {
     ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }
 
-/// Returns for each vertex the mean of its neighbours' displacements, by slot.
+/// Returns for each vertex the mean of its neighbours' displacements, indexed by vertex slot, to smooth displacements
+/// over the mesh.
 fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; displacements.len()];
     for v in mesh.vertices() {
@@ -301,8 +314,8 @@ fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
     out
 }
 
-/// Returns the displacements, by slot, with that of each `rejected` vertex replaced by the mean of its neighbours'
-/// known ones.
+/// Returns `displacements`, indexed by vertex slot, where each vertex in `rejected`, whose projection failed, gets the
+/// mean of its neighbours' known displacements; 0 without any.
 fn fill_rejected(mesh: &Mesh, displacements: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
     let mut out: Vec<Vec3> =
         displacements.iter().map(|displacement| displacement.unwrap_or(Vec3::ZERO)).collect();
@@ -315,7 +328,7 @@ fn fill_rejected(mesh: &Mesh, displacements: &[Option<Vec3>], rejected: &[Vertex
     out
 }
 
-/// Returns the triangles that face away from the sum of the normals of the three triangles beside them.
+/// Returns the folded triangles, those that face away from the sum of the normals of the three triangles beside them.
 fn folded(mesh: &Mesh) -> Vec<[VertexId; 3]> {
     let normal = |[a, b, c]: [VertexId; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.position(v));

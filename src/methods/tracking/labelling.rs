@@ -1,27 +1,30 @@
-//! Inside/outside labelling: which voxels are on the bright side of the boundary.
+//! Inside/outside labelling: finds which voxels are on the bright side of the boundary, to extract the surface of the
+//! first frame and to close it at the sides of the box.
 //!
-//! No intensity threshold can separate them: far from a coil, bright regions are as dark as dark regions near it. So an
-//! image is reconstructed from the boundary votes alone. Every face contributes a step in intensity by its votes; the
-//! image whose differences are nearest to these steps (a Poisson equation) has steps of about 1 at all walls, flat
-//! parts between, and hardly any trace of isolated votes. A voxel is bright if it is above the middle of the step at
-//! the nearest wall.
+//! No intensity threshold can separate bright from dark: far from a coil, bright regions are as dark as dark regions
+//! near it. So an image is reconstructed from the boundary votes alone. Every face contributes a step in intensity by
+//! its votes; the image whose differences are nearest to these steps (a Poisson equation) has steps of about 1 at all
+//! walls, flat parts between, and hardly any trace of isolated votes. A voxel is bright if it is above the middle of
+//! the step at the nearest wall.
 
 use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
 
-/// Smallest weight, as a share of votes, with which a face is part of a wall.
+/// Smallest weight of a face between two voxels, the share of windows that vote for it, with which the face counts as
+/// part of a wall between bright and dark.
 pub(super) const MIN_WEIGHT: f32 = 0.3;
 
-/// Relative residual at which conjugate gradients stop.
+/// Relative residual at which the conjugate gradients stop that solve the Poisson equation of the labelling.
 const TOLERANCE: f64 = 1e-3;
 
-/// Maximum number of conjugate gradient iterations: a box of 64 voxels a side needs a hundred.
+/// Maximum number of conjugate gradient iterations for the Poisson equation of the labelling: a box of 64 voxels a side
+/// needs a hundred.
 const ITERATIONS: usize = 400;
 
-/// A box of voxels within a region.
+/// A box of voxels within a [`Region`], whose voxels are labelled bright or dark.
 #[derive(Clone, Copy)]
 pub(super) struct VoxelBox {
-    /// First and last voxel, inclusive.
+    /// First and last voxel of the box, both inclusive, in the coordinates of the region.
     pub ends: [[usize; 3]; 2],
 }
 
@@ -30,18 +33,18 @@ impl VoxelBox {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
 
-    /// Returns the number of voxels.
+    /// Returns the number of voxels in the box.
     pub fn len(&self) -> usize {
         self.dims().iter().product()
     }
 
-    /// Returns the region coordinates of the voxel with an index in the box, x fastest.
+    /// Returns the coordinates in the region of the voxel with the given index in the box, x fastest.
     pub fn at(&self, index: usize) -> [usize; 3] {
         let ([nx, ny, _], [x, y, z]) = (self.dims(), self.ends[0]);
         [x + index % nx, y + index / nx % ny, z + index / (nx * ny)]
     }
 
-    /// Returns the index in the box of a voxel given by region coordinates; `None` outside.
+    /// Returns the index in the box of a voxel given by region coordinates; `None` outside the box.
     pub fn index(&self, at: [usize; 3]) -> Option<usize> {
         let [first, last] = self.ends;
         let is_inside = (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]));
@@ -50,7 +53,8 @@ impl VoxelBox {
     }
 }
 
-/// Labels the voxels of a box in one frame: true on the bright side of the boundary. `None` if there are no walls.
+/// Labels the voxels of a box in one frame: true on the bright side of the boundary. The labels are in the order of
+/// [`VoxelBox::index`]; `None` if no faces have enough votes to be part of a boundary.
 pub(super) fn label_bright(
     region: &Region,
     frame: usize,
@@ -79,8 +83,9 @@ pub(super) fn label_bright(
     Some(reconstructed.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// Labels the voxels of a box as [`label_bright`] does, but by comparing each intensity with the middle of the step at
-/// the nearest wall. Solves no equations, but is only right where the signal is as strong as at that wall.
+/// Labels the voxels of a box as [`label_bright`] does, but by comparing each intensity with the middle of the
+/// intensity step at the nearest boundary. Solves no equations, but is only right where the signal is as strong as at
+/// that boundary.
 pub(super) fn label_bright_by_level(
     region: &Region,
     frame: usize,
@@ -103,8 +108,9 @@ pub(super) fn label_bright_by_level(
     Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
 }
 
-/// Returns the steps at the faces within a box: the indices in the box of the voxels before and after, and the share of
-/// votes, negative if intensity falls.
+/// Returns the steps in intensity at the faces within a box of voxels, of which an image is reconstructed: the indices
+/// in the box of the voxels before and after the face, and its share of votes as the height of the step, negative if
+/// intensity falls.
 fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) -> Vec<(usize, usize, f32)> {
     let image = &region.frames[frame];
     let mut steps = Vec::new();
@@ -122,8 +128,8 @@ fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) ->
     steps
 }
 
-/// Solves the Poisson equation for the image whose graph Laplacian, see [`laplacian`], is `source`, by conjugate
-/// gradients.
+/// Solves the Poisson equation of the labelling for the image whose graph Laplacian, see [`laplacian`], is `source`, by
+/// conjugate gradients.
 fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let mut solution = vec![0.0; source.len()];
@@ -147,8 +153,8 @@ fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     solution
 }
 
-/// Writes for each voxel the sum of its differences from its neighbours, its own value minus theirs: the graph
-/// Laplacian.
+/// Writes for each voxel of a box to `out` the sum of its differences from its neighbours, its own entry in `values`
+/// minus theirs: the graph Laplacian.
 fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let mut add = |i: usize, j: usize| {
@@ -170,8 +176,8 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Extends known values to all voxels: each takes that of the voxel fewest steps along the axes away. `None` if no
-/// value is known.
+/// Extends values that are known at some voxels of a box to all: each voxel takes the value of the known voxel fewest
+/// steps along the axes away. `None` if no value is known.
 fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
@@ -216,7 +222,7 @@ mod tests {
         RADIUS - DVec3::new(x, y, z).distance(CENTER)
     }
 
-    /// A ball that becomes darker along z: its far end is darker than the background at its near end.
+    /// A test image of a ball that becomes darker along z: its far end is darker than the background at its near end.
     fn shaded() -> Region {
         let mut random = Random::new(3);
         let value = |i: usize| {

@@ -45,46 +45,49 @@ use region::Region;
 use samples::{Falloff, SampleField};
 use vote::{BoundaryVoting, Faces, Window};
 
-/// Selects which surface of the first frame is tracked.
+/// Selects which connected surface of the first frame is tracked, if there are several.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Component {
     /// The surface that encloses the largest volume.
     #[default]
     Largest,
-    /// The surface that contains a point in world coordinates, or has the vertex nearest to it.
+    /// The surface that encloses a point, given in world coordinates, or has the vertex nearest to it.
     Nearest(DVec3),
 }
 
-/// The region of a volume that is processed.
+/// The region of a 4D image in which a surface is tracked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// The corners of a box with the least and the largest world coordinates; voxels whose centres are inside are
-    /// processed. If the voxel axes are rotated, the bounding box along the voxel axes is used.
+    /// Two corners of a box, those with the least and the largest world coordinates; voxels whose centres are inside
+    /// are processed. If the voxel axes are rotated, the bounding box of this box along the voxel axes is used.
     World([DVec3; 2]),
-    /// The first and the last voxel along x, y and z, both inclusive.
+    /// The first and the last voxel of the region along x, y and z, both inclusive.
     Voxels([[usize; 3]; 2]),
 }
 
 /// Options to create a [`SurfaceTracker`].
 #[derive(Clone, Debug)]
 pub struct TrackingOptions {
-    /// The 4D image, of two frames or more.
+    /// The 4D image in which a surface is tracked, of two frames or more.
     pub volume: Volume,
-    /// The region that is processed; by default the whole volume. The surface is closed where its sides cut a bright
-    /// region.
+    /// The region of the image that is processed; by default the whole volume. The surface is closed where the sides of
+    /// the region cut a bright region.
     pub bounds: Option<Bounds>,
-    /// Which surface is tracked.
+    /// Which surface of the first frame is tracked, if it has several; ignored if there is a `start`.
     pub component: Component,
-    /// The surface in the first frame, in world coordinates; by default it is extracted from the image.
+    /// The surface in the first frame, from which tracking starts, in world coordinates; by default it is extracted
+    /// from the image.
     pub start: Option<TriangleMesh>,
-    /// The parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
+    /// The initial parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
 }
 
-/// A projection has converged after a step no longer than this, in units of the shortest side of a voxel.
+/// The projection of a vertex onto the boundary has converged after a step shorter than this, in units of the shortest
+/// side of a voxel.
 const CONVERGED_STEP: f64 = 0.012;
 
-/// Projections that move a vertex by more than this are rejected, in units of the shortest side of a voxel.
+/// Projections onto the boundary that move a vertex by more than this are rejected, in units of the shortest side of a
+/// voxel.
 const MAX_DISPLACEMENT: f64 = 4.8;
 
 /// Tracks a closed surface through the frames of a 4D image.
@@ -95,16 +98,16 @@ pub struct SurfaceTracker {
     /// The caller's mesh for the first frame; empty without one.
     start: Mesh,
     params: TrackingParams,
-    /// Properties of the image that default parameters are derived from.
     image: ImageStatistics,
     voting: BoundaryVoting,
-    /// The boundary votes by frame, for the frames processed so far.
+    /// By frame, the faces between voxels that have boundary votes, for the frames in which they have been found so
+    /// far.
     faces: Vec<Faces>,
     frame_tracker: Option<FrameTracker>,
-    /// The boundary points around the newest frame.
+    /// The boundary points around the newest tracked frame in time, `None` before the first.
     samples: Option<SpaceTimeSamples>,
     mesh: Mesh,
-    /// The surface of each frame so far, in world coordinates.
+    /// The surface of each frame tracked so far, in world coordinates.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
     cycle_closure_error: Option<f64>,
@@ -112,26 +115,26 @@ pub struct SurfaceTracker {
     clock: fn() -> f64,
 }
 
-/// Properties of the image that default parameters are derived from.
+/// Properties of the image from which default tracking parameters are derived.
 #[derive(Clone, Copy, Debug)]
 struct ImageStatistics {
     /// The shortest side of a voxel, in world units.
     shortest_side: f64,
-    /// The longest side of a voxel among axes with more than one voxel, in world units.
+    /// The longest side of a voxel among axes along which the processed box has more than one voxel, in world units.
     longest_side: f64,
-    /// The standard deviation of the noise, in intensity.
+    /// The standard deviation of the noise in the image, in units of intensity.
     noise: f64,
-    /// The difference between the largest and the smallest intensity, without outliers.
+    /// The difference between the largest and the smallest intensity in the processed box, without outliers.
     range: f64,
 }
 
 impl SurfaceTracker {
-    /// Creates a tracker before its first step.
+    /// Creates a tracker, which [`Self::step`] then takes through the frames.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for parameters that are not accepted, for a volume with one frame, without
-    /// contrast or with axes that are not at right angles, for a box outside of it, with too few voxels or with too
-    /// many for memory, and for a start that is empty, inside out, without a vertex in the box, or has a mean edge
+    /// contrast or with axes that are not at right angles, for a box outside of the volume, with too few voxels or with
+    /// too many for memory, and for a start that is empty, inside out, without a vertex in the box, or has a mean edge
     /// below a tenth of a voxel; [`MethodError::Mesh`] for a start that is not a closed surface, or intersects itself;
     /// [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
@@ -174,7 +177,7 @@ impl SurfaceTracker {
         Ok(tracker)
     }
 
-    /// Derives `threshold`, `radius` and `time_scale` from the volume if they are 0.
+    /// Returns `params` with `threshold`, `radius` and `time_scale` derived from the volume if they are 0.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for parameters that are not accepted, among them a radius outside the range for
@@ -213,11 +216,11 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
     }
 
-    /// Sets the parameters during a run. A change of the boundary (`threshold`, `window`, `window_frames`, `cyclic`)
-    /// restarts the run; other changes apply from the next frame on.
+    /// Sets the parameters during a run. A change of parameters that affect the boundary in the image (`threshold`,
+    /// `window`, `window_frames`, `cyclic`) restarts the run; other changes apply from the next frame on.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`]; nothing has changed then.
+    /// [`MethodError::InvalidArgument`] for parameters that are not accepted; nothing has changed then.
     pub fn set_params(&mut self, params: TrackingParams) -> Result<(), MethodError> {
         let params = self.with_defaults(params)?;
         let keeps_boundary = params.same_boundary(&self.params);
@@ -230,17 +233,19 @@ impl SurfaceTracker {
         Ok(())
     }
 
-    /// Sets the clock, in milliseconds, for [`StepReport::times`]. By default all times are 0.
+    /// Sets the clock, a function that returns the time in milliseconds, for [`StepReport::times`]. By default all
+    /// times are 0.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 
-    /// Returns the parameters, including those derived from the volume.
+    /// Returns the current parameters, including those derived from the volume.
     pub fn params(&self) -> &TrackingParams {
         &self.params
     }
 
-    /// Returns the estimated standard deviation of the noise, in intensity; for choosing the threshold.
+    /// Returns the estimated standard deviation of the noise in the image, in units of intensity; for choosing the
+    /// parameter `threshold`.
     pub fn noise(&self) -> f64 {
         self.image.noise
     }
@@ -251,12 +256,12 @@ impl SurfaceTracker {
         &self.mesh
     }
 
-    /// Returns the surface of each frame so far, in world coordinates; positions and triangles only.
+    /// Returns the surface of each frame tracked so far, in world coordinates; positions and triangles only.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
 
-    /// Returns measurements and counts for each frame so far.
+    /// Returns the measurements of the surface and the counts of what tracking did, for each frame tracked so far.
     pub fn statistics(&self) -> &[FrameStatistics] {
         &self.statistics
     }
@@ -266,7 +271,7 @@ impl SurfaceTracker {
         self.meshes.len().saturating_sub(1)
     }
 
-    /// Returns the volume enclosed by the surface in each frame so far, in cubed world units.
+    /// Returns the volume enclosed by the surface in each frame tracked so far, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
         self.statistics.iter().map(|statistics| statistics.volume).collect()
     }
@@ -277,13 +282,14 @@ impl SurfaceTracker {
         self.cycle_closure_error
     }
 
-    /// Returns the number of frames, from the first on, whose boundary has been found.
+    /// Returns the number of frames, from the first on, whose boundary in the image has been found, for progress
+    /// displays.
     pub fn frames_with_boundary(&self) -> usize {
         self.faces.len()
     }
 
-    /// Returns the boundary points of a frame: x, y, z in world coordinates, t in frames, and the weight. Empty until
-    /// the boundary of the frame has been found.
+    /// Returns the boundary points of a frame: x, y, z in world coordinates, t in frames, and the weight (share of
+    /// votes, up to 1), for display. Empty until the boundary of the frame has been found.
     pub fn boundary(&self, frame: usize) -> Vec<[f32; 5]> {
         let Some(faces) = self.faces.get(frame) else { return Vec::new() };
         let mut points = Vec::new();
@@ -297,14 +303,14 @@ impl SurfaceTracker {
         points
     }
 
-    /// Whether all frames are done, and the closure error of a cyclic sequence is known.
+    /// Returns whether all frames are tracked, and the closure error of a cyclic sequence is known.
     pub fn is_done(&self) -> bool {
         self.meshes.len() == self.frames() && (self.cycle_closure_error.is_some() || !self.params.cyclic)
     }
 
-    /// Runs one step: finds the boundary in the next frame, until it is known in all frames; then tracks the surface
-    /// into the next frame; and finally, in a cyclic sequence, from the last frame to the first. Once that is done,
-    /// calls change nothing and report `done`.
+    /// Runs one step of tracking: finds the boundary in the next frame, until it is known in all frames; then tracks
+    /// the surface into the next frame; and finally, in a cyclic sequence, from the last frame to the first. Once that
+    /// is done, calls change nothing and report `done`.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
@@ -337,7 +343,8 @@ impl SurfaceTracker {
         self.region.frames.len()
     }
 
-    /// Tracks the surface into the next frame. If it fails, nothing has changed.
+    /// Tracks the surface into the next frame, or extracts it in the first; returns the edits of the mesh. If this
+    /// fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
         let mut tracker = match self.frame_tracker.take() {
@@ -365,8 +372,8 @@ impl SurfaceTracker {
         Ok(changes)
     }
 
-    /// Tracks a copy of the last frame's surface on to the first frame, and measures its mean distance from the surface
-    /// there.
+    /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean
+    /// distance from the surface there.
     fn close_cycle(&mut self) {
         let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
             return;
@@ -386,12 +393,12 @@ impl SurfaceTracker {
         self.cycle_closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
-    /// Collects the boundary points around the newest frame; `None` before the first.
+    /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
     fn newest_samples(&self) -> Option<SpaceTimeSamples> {
         self.meshes.len().checked_sub(1).map(|frame| self.samples_around(frame))
     }
 
-    /// Collects the boundary points of a frame and of those around it in time.
+    /// Collects the boundary points of a frame and of those around it in time, for plane fits in that frame.
     fn samples_around(&self, frame: usize) -> SpaceTimeSamples {
         let (count, falloff) = (self.frames(), self.falloff());
         let mut field = SampleField::new(&self.region, falloff);

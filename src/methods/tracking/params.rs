@@ -9,25 +9,31 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default, deny_unknown_fields)]
 pub struct TrackingParams {
-    /// τ: the means of the two clusters of a window must differ by more than this, in intensity.
+    /// Edge threshold τ: the means of the two clusters of a window must differ by more than this, in units of
+    /// intensity, to count as a boundary.
     pub threshold: f64,
-    /// k: a window is (2k + 1) voxels wide along each axis.
+    /// Half-width k of the windows in which the image is split into bright and dark: a window is (2k + 1) voxels wide
+    /// along each axis.
     pub window: u32,
-    /// Frames to either side that a window includes; with 0 each frame is processed on its own.
+    /// Number of frames to either side that a window, which is split into bright and dark, includes; with 0 each frame
+    /// is processed on its own.
     pub window_frames: u32,
-    /// Radius at which the weight of a point ends, in world units: 2h of θ(r) = exp(−r²/h²).
+    /// Radius of the plane fits, in world units: the weight θ(r) = exp(−r²/h²) of a boundary point ends at this
+    /// distance, 2h.
     pub radius: f64,
-    /// c: the distance that one frame counts as, in world units.
+    /// Time scale c: the distance in space, in world units, that a difference of one frame counts as in plane fits.
     pub time_scale: f64,
-    /// β: the step number i of a projection, from 0 on, is scaled by βⁱ, but by at least 0.2.
+    /// Damping β: step number i of the projection of a vertex onto the boundary, from 0 on, is scaled by βⁱ, but by at
+    /// least 0.2.
     pub damping: f64,
-    /// c_min: shorter edges are collapsed, as a multiple of the mean edge in the first frame.
+    /// c_min: shorter edges of the mesh are collapsed; given as a multiple of the mean edge length in the first frame.
     pub edge_min: f64,
-    /// c_max: longer edges are split, as a multiple of the mean edge in the first frame.
+    /// c_max: longer edges of the mesh are split; given as a multiple of the mean edge length in the first frame.
     pub edge_max: f64,
-    /// Whether a frame starts from the predicted surface; otherwise it starts from the surface of the frame before.
+    /// Whether tracking in a frame starts from the predicted surface; otherwise it starts from the surface of the frame
+    /// before.
     pub prediction: bool,
-    /// Whether the last frame is followed by the first.
+    /// Whether the last frame is followed by the first, as in a heartbeat.
     pub cyclic: bool,
 }
 
@@ -48,28 +54,29 @@ impl Default for TrackingParams {
     }
 }
 
-/// Default τ in standard deviations of the noise: in windows of noise alone the cluster means differ by 1.6 of them, so
-/// hardly any such window passes.
+/// Default edge threshold τ, in standard deviations of the noise: in windows of noise alone the cluster means differ by
+/// 1.6 standard deviations, so hardly any such window passes.
 const THRESHOLD_IN_NOISE: f64 = 4.0;
 
-/// Smallest default τ, as a share of the intensity range: images without noise need a threshold as well.
+/// Smallest default edge threshold τ, as a share of the image's intensity range: images without noise need a threshold
+/// as well.
 const MIN_THRESHOLD: f64 = 0.05;
 
-/// Default radius in units of the shortest side of a voxel, about two voxels and a half: a smaller one follows noise, a
-/// larger one rounds off details of that thickness.
+/// Default radius of the plane fits, in units of the shortest side of a voxel, about two voxels and a half: a smaller
+/// one follows noise, a larger one rounds off details of that thickness.
 const RADIUS_IN_PIXELS: f64 = 2.4;
 
-/// Smallest default radius in units of the longest side of a voxel: with a radius below the slice distance, all points
-/// would be of one slice and the plane fitted to them would be the slice itself.
+/// Smallest default radius of the plane fits, in units of the longest side of a voxel: with a radius below the slice
+/// distance, all points would be of one slice and the plane fitted to them would be the slice itself.
 const RADIUS_IN_SLICES: f64 = 1.2;
 
-/// Default c as a share of the radius: neighbouring frames then have next to no weight, unlike the temporal faces half
-/// a frame away, so fast motion is followed.
+/// Default time scale c, as a share of the radius of the plane fits: neighbouring frames then have next to no weight,
+/// unlike the faces between frames, half a frame away, so fast motion is followed.
 const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
 impl TrackingParams {
-    /// Checks all values, but accepts 0 for `threshold`, `radius` and `time_scale`, which are then derived from the
-    /// volume.
+    /// Checks all parameters against their ranges, but accepts 0 for `threshold`, `radius` and `time_scale`, which are
+    /// then derived from the volume.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted.
@@ -94,7 +101,7 @@ impl TrackingParams {
         [threshold, window, frames, radius, time_scale, damping, edge_min, edge_max]
     }
 
-    /// Whether these parameters give the same boundary votes as `others`, so that those already found remain valid.
+    /// Returns whether these parameters give the same boundary votes as `others`, so that votes already found are kept.
     pub(super) fn same_boundary(&self, others: &Self) -> bool {
         let key = |p: &Self| (p.threshold.to_bits(), p.window, p.window_frames, p.cyclic);
         key(self) == key(others)
@@ -112,7 +119,8 @@ impl TrackingParams {
     }
 }
 
-/// Returns the descriptions of the parameters, in the order in which a page should show them.
+/// Returns the specification of each parameter (range, default, label, help), in the order in which a user interface
+/// should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

@@ -1,45 +1,47 @@
-//! Restricted projection onto the space-time surface within one frame (section 3.3), and prediction of the next frame
-//! (section 4.2).
+//! Projection of surface points onto the extremal surface of the boundary points in space-time, restricted to one frame
+//! (section 3.3 of the paper that `tracking` follows), and prediction of the surface in the next frame (section 4.2).
 
 use super::extremal::{PlaneFit, hyperplane, plane};
 use super::samples::SampleField;
 use crate::math::DVec3;
 
-/// Smallest factor by which a step of a projection is scaled: that of step i, from 0 on, is βⁱ until then.
+/// Lower bound of the factor by which a step of a projection is scaled: step i, from 0 on, is scaled by βⁱ, with the
+/// parameter β, until the factor falls to this.
 const MIN_DAMPING: f64 = 0.2;
 
-/// Maximum number of steps of one projection.
+/// Maximum number of steps of the projection of one vertex onto the boundary.
 const STEPS: usize = 30;
 
-/// Smallest |n₃|², the squared spatial part of the normal, for a projection: below, the hyperplane is nearly parallel
-/// to the frame, and cuts it in no well-defined plane.
+/// Smallest |n₃|², the squared length of the spatial part of a space-time hyperplane's unit normal, for a projection
+/// onto it: below, the hyperplane is nearly parallel to the frame, and cuts it in no well-defined plane.
 const MIN_SPATIAL_NORMAL_SQUARED: f64 = 0.05;
 
-/// The boundary points around one frame in time, and the parameters of projections there.
+/// The boundary points around one frame in time, and the parameters of projections of the surface onto them.
 #[derive(Clone, Debug)]
 pub(super) struct SpaceTimeSamples {
-    /// Points of the frame and of those around it in time, for fits in space-time.
+    /// Boundary points of the frame and of those around it in time, for fits in space-time.
     pub field: SampleField,
-    /// Points of the frame alone, for fits in space.
+    /// Boundary points of the frame alone, for fits in space.
     pub own: SampleField,
-    /// Indices of the voxels of the frame that are bright at a side of the box, sorted.
+    /// Indices of the voxels of the frame that are bright up to a side of the processed box, which is a boundary there,
+    /// sorted.
     pub box_side_voxels: Vec<u32>,
-    /// c: the distance that one frame counts as, in world units.
+    /// Time scale c: the distance in space, in world units, that a difference of one frame counts as in plane fits.
     pub time_scale: f64,
     pub damping: f64,
-    /// A projection has converged after a step no longer than this, in world units.
+    /// A projection has converged after a step shorter than this, in world units.
     pub tolerance: f64,
-    /// Projections that move farther than this are rejected, in world units.
+    /// Projections that move a point farther than this are rejected, in world units.
     pub max_displacement: f64,
 }
 
-/// The surface that a point is projected onto.
+/// The extremal surface that a point of the mesh is projected onto.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Onto {
-    /// The space-time surface, restricted to the frame. It is found from farther away, but lags behind accelerating
-    /// motion.
+    /// The extremal surface of all points in space-time, restricted to the frame. It is found from farther away, but
+    /// lags behind accelerating motion.
     SpaceTime,
-    /// The surface of the frame's own points, in space.
+    /// The extremal surface of the frame's own points, in space; the final projection of a frame is onto it.
     Frame,
 }
 
@@ -52,9 +54,10 @@ impl SpaceTimeSamples {
         }
     }
 
-    /// Projects a point onto the surface, and returns its position and the number of steps. If it has not converged
-    /// after [`STEPS`], its last position is returned. `None` if there are too few points around it, the hyperplane is
-    /// nearly parallel to the frame, or it moves further than `max_displacement`.
+    /// Projects a point of the mesh onto the extremal surface that `onto` selects; returns its new position and the
+    /// number of steps. If it has not converged after [`STEPS`], its last position is returned. `None` if there are too
+    /// few boundary points around it, the space-time hyperplane fitted to them is nearly parallel to the frame, or it
+    /// moves farther than `max_displacement`.
     pub fn project(&self, p: DVec3, onto: Onto) -> Option<(DVec3, usize)> {
         let mut x = p;
         let mut damping: f64 = 1.0;
@@ -78,9 +81,9 @@ impl SpaceTimeSamples {
         Some((x, STEPS))
     }
 
-    /// Predicts the displacement of the surface from a point to the next frame by the slope of the space-time surface:
-    /// −c·nₜ·n₃ / |n₃|², in world units. `None` if there are too few points, or the hyperplane is nearly parallel to
-    /// the frame.
+    /// Predicts the displacement of the surface from a point to the next frame by the slope of the extremal surface in
+    /// space-time: −c·nₜ·n₃ / |n₃|², in world units. `None` if there are too few boundary points around it, or the
+    /// hyperplane fitted to them is nearly parallel to the frame.
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
         let fit = self.fit(at, Onto::SpaceTime)?;
         let square = fit.normal.length_squared();
@@ -114,7 +117,8 @@ mod tests {
         }
     }
 
-    /// Faces near the plane n·x = distance + speed·t, with weights that fall off with distance.
+    /// Returns test faces near the moving plane n·x = distance + speed·t, with weights that fall off with the distance
+    /// from it.
     fn plane_faces(region: &Region, normal: DVec3, distance: f64, speed: f64, frame: f64) -> Faces {
         let mut faces = Faces::default();
         let [nx, ny, nz] = region.dims;
@@ -132,7 +136,6 @@ mod tests {
 
     const FALLOFF: Falloff = Falloff { radius: 4.0, time_scale: C };
 
-    /// Samples of a plane that moves along its normal.
     fn moving_plane(normal: DVec3, distance: f64, speed: f64) -> SpaceTimeSamples {
         let region = region();
         let mut field = SampleField::new(&region, FALLOFF);

@@ -1,4 +1,4 @@
-//! The region of a 4D image that is processed, with its intensities quantised to one byte.
+//! The region of a 4D image in which a surface is tracked, with its intensities quantised to one byte.
 
 use super::Bounds;
 use super::vote::TIME;
@@ -6,52 +6,56 @@ use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, trilinear};
 
-/// Highest quantised intensity: levels 0 to 254, one byte per voxel.
+/// Highest quantised intensity: intensities are quantised to 0 to 254, one byte per voxel.
 const MAX_LEVEL: f64 = 254.0;
 
 /// Share of the region's voxels, one in a thousand, that may be below the quantised range of intensities, and above it;
-/// they are clamped to it.
+/// their intensities are clamped to this range.
 const OUTLIERS: f64 = 1e-3;
 
-/// Bins of the histogram that determines the range of intensities.
+/// Number of bins of the histogram from which the range of intensities that is quantised is determined.
 const BINS: usize = 4096;
 
-/// Padding around the bounds, in voxels, for the windows of voxels at the border.
+/// Number of voxels that are added on every side of the processed box, so that windows around its outermost voxels
+/// extend beyond it.
 const PADDING: usize = 2;
 
-/// Minimum number of voxels along at least two axes; a single slice is accepted.
+/// Minimum number of voxels that the processed box must have along at least two axes; a single slice is accepted.
 const MIN_VOXELS: usize = 5;
 
-/// Upper bounds of the memory per voxel, in bytes: first, once, for the weights around two frames; second, for each
-/// frame, for intensity and level.
+/// Upper bounds of the memory that tracking needs per voxel of the region, in bytes. The first, once: weights of the
+/// boundary points around two frames; the second, for each frame: quantised intensity and level between bright and
+/// dark.
 const BYTES: [u64; 2] = [140, 2];
 
-/// Maximum memory for a region, in bytes: what a browser gives to one page, less the volume.
+/// Maximum memory for tracking in a region, in bytes: what a browser gives to one page, less the volume.
 const MAX_BYTES: u64 = 3_000_000_000;
 
-/// Largest absolute cosine between two voxel axes that counts as a right angle: rounding in headers stays far below.
+/// Largest absolute cosine of the angle between two voxel axes that counts as a right angle: the rounding of axes in
+/// file headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
-/// A box of voxels of a 4D image, in all frames, with quantised intensities. Padding around the box lets windows extend
-/// beyond it; outside of the image, the border is replicated.
+/// A box of voxels of a 4D image, in all frames, with quantised intensities, in which a surface is tracked. Padding
+/// around the box lets windows extend beyond it; outside of the image, the border is replicated.
 ///
-/// Positions in the region are in world units (millimetres) along the voxel axes, from the centre of its first voxel.
+/// Positions in the region are in world units (millimetres) along the voxel axes, from the centre of the first voxel of
+/// the padded box.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub dims: [usize; 3],
-    /// The first and the last voxel of the box, without the padding.
+    /// The first and the last voxel of the box without its padding, in coordinates of the padded grid.
     pub inner: [[usize; 3]; 2],
     /// Side lengths of a voxel, in world units.
     pub spacing: DVec3,
-    /// Maps positions in the region to the world.
+    /// Maps positions in the region, along the voxel axes, to world coordinates.
     pub to_world: DAffine3,
-    /// Maps the world to positions in the region.
+    /// Maps world coordinates to positions in the region, along the voxel axes.
     pub from_world: DAffine3,
-    /// Quantised intensities by frame, x fastest.
+    /// Quantised intensities of the padded box for each frame, x fastest.
     pub frames: Vec<Vec<u8>>,
-    /// The difference in intensity of one quantisation step.
+    /// The difference in intensity that one step of the quantised intensities stands for.
     pub quantum: f64,
-    /// τ, in quantisation steps.
+    /// The edge threshold τ, in steps of the quantised intensities.
     pub threshold: f64,
 }
 
@@ -120,7 +124,7 @@ impl Region {
         Ok(())
     }
 
-    /// Calls `visit` with each row of the region along x in a frame, in intensities from 0 to 1.
+    /// Calls `visit` with each row of the region along x in a frame, as intensities in 0..1, the range of the volume.
     fn for_each_row(
         &self,
         volume: &Volume,
@@ -146,30 +150,33 @@ impl Region {
         Ok(())
     }
 
-    /// Returns the longest side of a voxel among axes along which the box has more than one voxel, in world units.
+    /// Returns the longest side of a voxel among axes along which the box has more than one voxel, in world units; the
+    /// default radius of plane fits depends on it.
     pub fn longest_side(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
     }
 
-    /// Returns the difference between the largest and the smallest intensity, without outliers.
+    /// Returns the difference between the largest and the smallest intensity in the region, without outliers, in the
+    /// intensity units of the image.
     pub fn span(&self) -> f64 {
         MAX_LEVEL * self.quantum
     }
 
-    /// Returns the grid coordinates of a voxel given by its index.
+    /// Returns the coordinates, in the region's grid, of the voxel with the given index.
     pub fn voxel(&self, index: u32) -> [usize; 3] {
         let ([nx, ny, _], i) = (self.dims, index as usize);
         [i % nx, i / nx % ny, i / (nx * ny)]
     }
 
-    /// Returns the grid coordinates of the voxel nearest to a position.
+    /// Returns the coordinates, in the region's grid, of the voxel nearest to a position.
     pub fn nearest(&self, position: DVec3) -> [usize; 3] {
         let last = DVec3::from(self.dims.map(|n| (n - 1) as f64));
         (position / self.spacing).clamp(DVec3::ZERO, last).round().to_array().map(|i| i as usize)
     }
 
-    /// Returns the centre of the face after a voxel along a direction, and its time after the voxel's frame, in frames.
+    /// Returns the centre of the face after a voxel in `direction`, as a position in the region, and the time of the
+    /// face after the frame of the voxel, in frames: 0.5 for faces along time.
     pub fn face(&self, direction: usize, voxel: u32) -> (DVec3, f32) {
         let mut at = DVec3::from(self.voxel(voxel).map(|i| i as f64));
         if direction == TIME {
@@ -179,7 +186,8 @@ impl Region {
         (at * self.spacing, 0.0)
     }
 
-    /// Interpolates the quantised intensity of a frame trilinearly at a position, with the border replicated.
+    /// Interpolates the quantised intensity of a frame trilinearly at a position, with the border of the region
+    /// replicated.
     pub fn sample(&self, frame: usize, position: DVec3) -> f64 {
         trilinear(self.dims, position / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
@@ -228,7 +236,7 @@ fn bin_of(value: f32) -> usize {
 }
 
 /// Returns the lower and upper quantile of the intensities, normalised to 0..1, beyond which voxels are outliers, from
-/// the counts in [`BINS`].
+/// `counts`, the number of voxels in each of the [`BINS`].
 fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
     let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
     let beyond = |from_top: bool| {
@@ -243,7 +251,8 @@ fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
     [false, true].map(beyond)
 }
 
-/// Returns the first and the last voxel within bounds, validated; by default those of the whole volume.
+/// Returns the first and the last voxel within `bounds`, by default those of the whole volume, after checking that the
+/// bounds are inside the volume and large enough.
 fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     let (parameter, [low, high]) = match bounds {
@@ -266,7 +275,7 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
 }
 
 /// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in
-/// the world; at least one voxel along each axis.
+/// the world, clamped to the volume; at least one voxel along each axis.
 fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {

@@ -1,21 +1,21 @@
 //! Boundary points as arrays of weights on the faces between voxels, for fast weighted sums over the points around a
 //! position.
 //!
-//! All positions in a frame have the same distances in time to the points of other frames, and θ is separable over the
-//! axes. So the frames are summed once, and each query sums along rows of voxels only.
+//! All positions in a frame have the same distances in time to the points of other frames, and the weight θ is
+//! separable over the axes. So the frames are summed once, and each query sums along rows of voxels only.
 
 use super::region::Region;
 use super::vote::{Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use wide::f32x8;
 
-/// Weights by distance: θ(r) = exp(−r²/h²), with r in space-time. It is cut off at 2h: |x| ≤ 2h, y² + z² < 4h², c|t| <
-/// 2h.
+/// Weights of boundary points in plane fits, by distance: θ(r) = exp(−r²/h²), with r in space-time. The weight is cut
+/// off at 2h: |x| ≤ 2h, y² + z² < 4h², c|t| < 2h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Falloff {
-    /// Radius of the cut-off, in world units: 2h.
+    /// Distance at which weights are cut off, in world units: 2h.
     pub radius: f64,
-    /// c: the distance that one frame counts as, in world units.
+    /// Time scale c: the distance in space, in world units, that a difference of one frame counts as in plane fits.
     pub time_scale: f64,
 }
 
@@ -24,56 +24,61 @@ impl Falloff {
         libm::exp(-4.0 * distance * distance / (self.radius * self.radius))
     }
 
-    /// Returns the ratio of θ at `distance + step` to θ at `distance`.
+    /// Returns the ratio of the weight θ at `distance + step` to θ at `distance`, by which weights are computed from
+    /// voxel to voxel.
     fn ratio(&self, distance: f64, step: f64) -> f64 {
         libm::exp(-4.0 * step * (2.0 * distance + step) / (self.radius * self.radius))
     }
 
-    /// Returns the offsets of the frames with points that may be within the radius, at most `most` to either side.
+    /// Returns the offsets, in frames, from a frame to those with boundary points that may be within the cut-off radius
+    /// of positions in it, at most `most` to either side.
     pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
         let frames = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
         -frames..=frames
     }
 }
 
-/// Faces along x that one vector holds; usually no more are within the radius.
+/// Number of faces along x that one SIMD vector holds; usually no more are within the cut-off radius of a position.
 const LANES: usize = 8;
 
-/// Maximum number of vectors for the faces along x within the radius.
+/// Maximum number of SIMD vectors for the faces along x within the cut-off radius of a position.
 const MAX_VECTORS: usize = 4;
 
-/// Maximum number of faces within the radius along one axis; limits the radius.
+/// Maximum number of faces along one axis within the cut-off radius of a position; the parameter `radius` is limited by
+/// it.
 pub(super) const MAX_FACES: usize = MAX_VECTORS * LANES;
 
-/// The boundary points around one frame, as weights on faces; answers queries for [`Sums`].
+/// The boundary points around one frame, as weights on the faces between voxels; answers queries for [`Sums`], to which
+/// planes are fitted.
 #[derive(Clone, Debug)]
 pub(super) struct SampleField {
     dims: [usize; 3],
     spacing: DVec3,
     falloff: Falloff,
-    /// Length of a row with its padding.
+    /// Length of a row of weights along x with its padding.
     stride: usize,
-    /// Number of zeros at either end of a row, for queries near the border.
+    /// Number of zeros at either end of a row of weights along x, for queries near the border.
     padding: usize,
-    /// By axis, the constant factor by which the ratio of θ between neighbouring voxels changes from voxel to voxel.
+    /// By axis, the constant factor by which the ratio of the weight θ between neighbouring voxels changes from voxel
+    /// to voxel; it saves exponentials.
     changes: DVec3,
-    /// Whether the points are of several moments, so that sums with time are kept.
+    /// Whether the points are of several times, so that sums with time are kept.
     has_times: bool,
-    /// Points by direction of the faces; faces along time are at voxel centres.
+    /// Boundary points by the direction of their faces; faces along time are at voxel centres.
     sites: [FaceWeights; 4],
 }
 
-/// Weights of the points of one direction by face, summed over the frames: times θ(t), and for several moments also
-/// times t θ(t) and t² θ(t), where t is the distance in time in world units.
+/// Weights of the boundary points on the faces of one direction, by face, summed over the frames: times θ(t), and for
+/// points of several times also times t θ(t) and t² θ(t), where t is the distance in time in world units.
 #[derive(Clone, Debug, Default)]
 struct FaceWeights {
     weights: [Vec<f32>; 3],
-    /// By row, the first voxel with a weight and the one after the last.
+    /// For each row along x, the first voxel with a weight and the one after the last, so that queries skip empty rows.
     extents: Vec<[u32; 2]>,
 }
 
 impl SampleField {
-    /// Creates a field without points, for several moments.
+    /// Creates a field without boundary points, to which those of several frames can be added.
     pub fn new(region: &Region, falloff: Falloff) -> Self {
         let most = (2.0 * falloff.radius / region.spacing.x) as usize + 1;
         let padding = most + 1 + if most <= LANES { LANES } else { MAX_FACES };
@@ -91,7 +96,7 @@ impl SampleField {
         }
     }
 
-    /// Creates a field with the points of a single frame, without those along time.
+    /// Creates a field with the points of a single frame, without points on faces along time.
     pub fn single_frame(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
         let mut field = Self { has_times: false, ..Self::new(region, falloff) };
         for direction in [X, Y, Z] {
@@ -100,8 +105,8 @@ impl SampleField {
         field
     }
 
-    /// Adds the points of the frame that is `offset` frames after that of the field; those beyond the radius in time
-    /// are left out.
+    /// Adds the boundary points of the frame that is `offset` frames after that of the field; those beyond the radius
+    /// in time are left out.
     pub fn add(&mut self, faces: &Faces, offset: i64) {
         for direction in [X, Y, Z, TIME] {
             // Faces along time are half a frame after their frame.
@@ -133,7 +138,7 @@ impl SampleField {
         }
     }
 
-    /// Returns weighted sums over all points around a position in the frame.
+    /// Returns weighted sums over all boundary points around a position in the frame, from which a plane is fitted.
     pub fn sums(&self, at: DVec3) -> Sums {
         let mut sums = Sums::default();
         let axis = |k: usize, offset: f64| {
@@ -159,8 +164,8 @@ impl SampleField {
         sums
     }
 
-    /// Sums over the faces of one direction within the radius, and adds the results to `sums`. `N` vectors of lanes
-    /// along x hold them all.
+    /// Sums over the boundary points on the faces of one direction within the cut-off radius of a position, and adds
+    /// the results to `sums`. `N` vectors of lanes along x hold them all.
     fn gather<const N: usize, const TIMED: bool>(
         &self,
         sites: &FaceWeights,
@@ -200,12 +205,12 @@ impl SampleField {
     }
 }
 
-/// Along one axis, the faces across it, or the voxel centres if the faces lie across another axis, that are within the
-/// cut-off radius of the query position; with the factor of θ for this axis. Index i is voxel i's centre, or the face
-/// after it.
+/// Factors of the weight θ along one axis, for the positions on the axis that are within the cut-off radius of a query
+/// position: the faces across the axis, or the voxel centres for faces that lie across another one. Index i stands for
+/// the centre of voxel i, or the face after it.
 struct AxisWeights {
     first: i64,
-    /// Signed distance from the position to the first of them, in world units.
+    /// Signed distance from the position to the first face or voxel centre within the cut-off radius, in world units.
     start: f64,
     spacing: f64,
     weights: [f32; MAX_FACES],
@@ -228,13 +233,14 @@ impl AxisWeights {
         Self { first, start, spacing, weights, count }
     }
 
-    /// Returns the index after the last face or centre within the radius.
+    /// Returns the index after the last face or centre within the cut-off radius of the query position.
     fn end(&self) -> i64 {
         // Positions may be arbitrarily far away.
         self.first.saturating_add(self.count as i64)
     }
 
-    /// Returns the indices of the faces or centres within the radius on a grid of `n` voxels.
+    /// Returns the indices of the faces or centres within the cut-off radius of the query position, on a grid of `n`
+    /// voxels along the axis.
     fn range(&self, n: usize) -> std::ops::Range<i64> {
         self.first.max(0)..self.end().min(n as i64)
     }
@@ -248,7 +254,7 @@ impl AxisWeights {
     }
 }
 
-/// One partial sum for each face along x.
+/// SIMD vectors with one partial sum for each face along x.
 type Lanes<const N: usize> = [f32x8; N];
 
 fn lanes<const N: usize>(values: &[f32]) -> Lanes<N> {
@@ -263,8 +269,8 @@ fn add<const N: usize>(to: &mut Lanes<N>, lanes: &Lanes<N>, factor: f32) {
     to.iter_mut().zip(lanes).for_each(|(to, lane)| *to += *lane * factor);
 }
 
-/// Sums over the rows of one plane, by face along x: of the weights times 1, y and y², of the weights times t, times 1
-/// and y, and of the weights times t².
+/// Sums over the rows of faces in one plane of constant z, by face along x: of the weights times 1, y and y², of the
+/// weights times t, times 1 and y, and of the weights times t².
 struct RowSums<const N: usize> {
     plain: [Lanes<N>; 3],
     timed: [Lanes<N>; 2],
@@ -295,12 +301,13 @@ impl<const N: usize> RowSums<N> {
     }
 }
 
-/// Sums over the planes along z: those of [`RowSums`], and those with a factor z or z² that [`Sums`] needs.
+/// Sums over the planes of constant z, by face along x: those of [`RowSums`], and those with a factor z or z² that
+/// [`Sums`] needs.
 struct PlaneSums<const N: usize> {
     rows: RowSums<N>,
-    /// Weights times z, yz and zt.
+    /// Sums of the weights times z, yz and zt.
     z_sums: [Lanes<N>; 3],
-    /// Weights times z².
+    /// Sums of the weights times z².
     zz_sums: Lanes<N>,
 }
 
@@ -328,7 +335,8 @@ impl<const N: usize> PlaneSums<N> {
         add(&mut self.z_sums[2], &rows.timed[0], theta * dz);
     }
 
-    /// Sums over x, with the factors of θ and the powers of x, and adds the results to `sums`.
+    /// Adds up the sums over x, the last of the three axes, with the factors of θ and the powers of x, and adds the
+    /// results to `sums`.
     fn add_to(&self, sums: &mut Sums, x: &AxisWeights) {
         let theta = lanes::<N>(&x.weights);
         let mut away = [f32x8::ZERO; N];
@@ -355,8 +363,8 @@ impl<const N: usize> PlaneSums<N> {
     }
 }
 
-/// Weighted sums over the points around a position: of 1, of their coordinates x, y, z, ct relative to it, and of the
-/// products of two coordinates. Planes are fitted to them.
+/// Weighted sums over the boundary points around a position: of 1, of their coordinates x, y, z, ct relative to the
+/// position, and of the products of two coordinates. Planes are fitted to them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     pub weight: f64,

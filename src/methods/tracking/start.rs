@@ -1,4 +1,5 @@
-//! The initial mesh: the caller's, or the surface of the first frame (section 4.1).
+//! The initial mesh of tracking: the caller's, or the surface extracted from the first frame (section 4.1 of the paper
+//! that `tracking` follows).
 
 use super::first::extract_bright_surface;
 use super::region::Region;
@@ -9,18 +10,18 @@ use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{EdgeBounds, remesh};
 
-/// Target edge length of the first frame's mesh, in units of the shortest side of a voxel.
+/// Target edge length of the mesh extracted from the first frame, in units of the shortest side of a voxel.
 const EDGE: f64 = 1.2;
 
-/// Factor by which the longest edge accepted of the first frame's mesh may exceed the target, and the shortest fall
-/// below it.
+/// Ratio of the longest accepted edge of the mesh extracted from the first frame to the target edge length, and of that
+/// to the shortest.
 const EDGE_BOUND_RATIO: f32 = 1.5;
 
-/// Smallest mean edge of a caller's mesh, in units of the shortest side of a voxel. Its resolution is kept: with
-/// shorter edges, a surface as large as the image would have more triangles than fit into memory.
+/// Smallest mean edge of a caller's mesh, in units of the shortest side of a voxel. The resolution of that mesh is
+/// kept: with shorter edges, a surface as large as the image would have more triangles than fit into memory.
 const MIN_EDGE: f64 = 0.1;
 
-/// Validates the caller's mesh, and converts it to a [`Mesh`] with the same vertices.
+/// Validates the caller's mesh for the first frame, and converts it to a [`Mesh`] with the same vertices.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
@@ -42,7 +43,7 @@ pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Me
 }
 
 impl SurfaceTracker {
-    /// Extracts the initial mesh from the first frame, in world coordinates, unless one was given.
+    /// Extracts the initial mesh from the first frame, in world coordinates, unless the caller gave one.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if no frame has a boundary, or there is no closed surface in the first one.
@@ -70,8 +71,8 @@ impl SurfaceTracker {
         Ok(())
     }
 
-    /// Returns the component to be tracked, as the option `component` selects. Components with negative volume are
-    /// cavities of others, and are skipped.
+    /// Returns the component to be tracked, selected by the option `component`, from the closed surfaces in the first
+    /// frame; `None` if there is none. Components with negative volume are cavities of others, and are skipped.
     fn tracked_component(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
         let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
         let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
@@ -83,7 +84,8 @@ impl SurfaceTracker {
     }
 }
 
-/// Returns the distance of a point from the nearest vertex of a solid; 0 inside.
+/// Returns the distance, in world units, of a point from the nearest vertex of a closed surface; 0 if the point is
+/// inside. It selects the tracked component.
 fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
     let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();
     if angle.abs() > std::f64::consts::TAU {

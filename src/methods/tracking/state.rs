@@ -1,5 +1,5 @@
-//! Saves a run and restores it bit for bit. A state holds the boundary votes and the surfaces; the image comes from the
-//! same volume, and sums around the newest frame are computed again.
+//! Saves a tracking run and restores it bit for bit. The saved state holds the boundary votes and the surfaces; the
+//! image comes from the same volume, and the weights of boundary points around the newest frame are computed again.
 
 use super::frame_tracker::{FrameStatistics, FrameTracker};
 use super::vote::{Faces, TIME};
@@ -12,16 +12,16 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLTRK\x01";
 
-/// The saved state: everything of a run but its input and what is computed again.
+/// The saved state of a [`SurfaceTracker`]: everything of a run but its input and what is computed again.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
     params: TrackingParams,
     faces: Vec<Faces>,
     mesh: Mesh,
-    /// Mean edge of the first frame's mesh, once there is one.
+    /// Mean edge length, in world units, of the first frame's mesh, `None` before there is one.
     edge: Option<f64>,
-    /// Positions and triangles by frame.
+    /// Positions and triangles of the surface in each frame tracked so far.
     meshes: Vec<(Vec<Vec3>, Vec<[u32; 3]>)>,
     statistics: Vec<FrameStatistics>,
     cycle_closure_error: Option<f64>,
@@ -29,7 +29,8 @@ struct State {
 }
 
 impl SurfaceTracker {
-    /// Serialises the run, without its input: the image, the box, the component and the start.
+    /// Returns the run as bytes for [`Self::restore`], without its input: the image, the box, the component and the
+    /// start.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
         encode(
@@ -110,7 +111,8 @@ impl SurfaceTracker {
             .all(|(direction, list)| list.iter().all(|face| is_sound(direction, face.voxel, face.weight)))
     }
 
-    /// Returns a hash of the image, the box, the component and the start, which identifies the input of a run.
+    /// Returns a hash of the image, the box, the component and the start, by which [`Self::restore`] recognises whether
+    /// a saved run has the same input.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));

@@ -1,36 +1,37 @@
-//! Boundary votes (section 2): each window of the image is split into two clusters by intensity, and votes for the
-//! faces between them.
+//! Boundary votes (section 2 of the paper that `tracking` follows): each window of the image is split into two clusters
+//! by intensity, and votes for the faces between voxels of different clusters.
 
 use super::region::Region;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
 
-/// The level of a window without a boundary; quantised intensities are lower.
+/// Stands for the level between bright and dark in a window without a boundary; quantised intensities are lower.
 const NONE: u8 = u8::MAX;
 
-/// Faces that are counted at once in one vector.
+/// Number of faces between voxels whose votes are counted at once in one SIMD vector.
 const LANES: usize = u8x16::LANES as usize;
 
-/// Share of the voxels of a window that each cluster must exceed.
+/// Share of the voxels of a window that each of its two clusters, bright and dark, must exceed for a boundary.
 const MIN_SHARE: f64 = 0.1;
 
-/// Maximum number of Lloyd iterations; two to five are usual.
+/// Maximum number of Lloyd iterations that split a window into two clusters; two to five are usual.
 const ITERATIONS: usize = 50;
 
-/// The extent of a window, and the criterion for its clusters.
+/// The extent of the windows that vote for boundaries, and the criterion for their two clusters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Window {
-    /// Voxels to either side of the central one: k.
+    /// Number k of voxels to either side of the central voxel along each axis.
     pub half_width: usize,
-    /// Frames to either side of the central one; 0 processes each frame on its own.
+    /// Number of frames to either side of the central frame; 0 processes each frame on its own.
     pub frames: usize,
-    /// τ: the difference of the cluster means must exceed this, in quantisation steps.
+    /// Edge threshold τ, in steps of the quantised intensities: the difference of a window's cluster means must exceed
+    /// this.
     pub threshold: f64,
-    /// Whether the last frame is followed by the first.
+    /// Whether the last frame is followed by the first, so that windows extend from one to the other.
     pub cyclic: bool,
 }
 
-/// The direction of faces between voxels next to each other along x: an index into [`Faces`].
+/// The direction of the faces between voxels next to each other along x: an index into [`Faces`].
 pub(super) const X: usize = 0;
 /// The direction of faces between voxels next to each other along y: an index into [`Faces`].
 pub(super) const Y: usize = 1;
@@ -39,26 +40,28 @@ pub(super) const Z: usize = 2;
 /// The direction of faces between a voxel and itself in the next frame: an index into [`Faces`].
 pub(super) const TIME: usize = 3;
 
-/// A face between two voxels that has votes.
+/// A face between two voxels that has boundary votes: a boundary point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Face {
-    /// Index of the voxel before the face; the other one is next along the direction.
+    /// Index of the voxel before the face; the other voxel is next to it along the direction of the face.
     pub voxel: u32,
-    /// Votes as a share of the windows that contain both voxels, above 0; 1 in the sides of the box.
+    /// Share of the windows containing both voxels that vote for the face, above 0; 1 in the sides of the processed
+    /// box.
     pub weight: f32,
 }
 
-/// Faces of one frame by direction; those along time are between it and the next frame.
+/// Faces with boundary votes of one frame, by direction; those along time are between this frame and the next.
 pub(super) type Faces = [Vec<Face>; 4];
 
-/// Finds, frame by frame, the level between bright and dark in each window of a sequence, and the boundary votes.
+/// Finds, frame by frame, the level between bright and dark in each window of a sequence, and the boundary votes of the
+/// faces between voxels.
 #[derive(Clone, Debug)]
 pub(super) struct BoundaryVoting {
     window: Window,
     /// By frame, the level between the clusters of the window around each voxel, in padded rows (see [`Rows`]);
     /// computed when first needed.
     levels: Vec<Option<Vec<u8>>>,
-    /// The largest difference of cluster means so far, in quantisation steps.
+    /// The largest difference of the two cluster means in a window so far, in steps of the quantised intensities.
     largest: f64,
 }
 
@@ -67,7 +70,8 @@ impl BoundaryVoting {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
-    /// Returns the faces of a frame that have votes, within the box, and those in its sides that cut bright regions.
+    /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
+    /// sides where they cut bright regions.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
         let frames = self.window.frames_around(frame, region.frames.len());
         frames.iter().for_each(|&t| self.ensure_levels(region, t));
@@ -87,15 +91,15 @@ impl BoundaryVoting {
         faces
     }
 
-    /// Returns the largest difference of cluster means in any frame, whatever the threshold, in quantisation steps; for
-    /// the error message when no boundary is found.
+    /// Returns the largest difference of the two cluster means in a window of any frame, whatever the threshold, in
+    /// steps of the quantised intensities; for the error message when no boundary is found.
     pub fn largest_step(&self, region: &Region) -> f64 {
         let mut all = Self::new(Window { threshold: 0.0, ..self.window }, region.frames.len());
         (0..region.frames.len()).for_each(|frame| drop(all.levels_of(region, frame)));
         all.largest
     }
 
-    /// Computes the levels of a frame, unless they are known.
+    /// Computes the levels between bright and dark in all windows centred in a frame, unless they are known.
     pub fn ensure_levels(&mut self, region: &Region, frame: usize) {
         if self.levels[frame].is_none() {
             self.levels[frame] = Some(self.levels_of(region, frame));
@@ -109,7 +113,8 @@ impl BoundaryVoting {
         (level != NONE).then_some(level)
     }
 
-    /// Computes the level of each window with its centre in a frame, in padded rows (see [`Rows`]).
+    /// Computes the level between bright and dark in each window with its centre in a frame, in padded rows (see
+    /// [`Rows`]).
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
         let frames: Vec<&[u8]> = self
@@ -137,8 +142,8 @@ impl BoundaryVoting {
         out
     }
 
-    /// Returns the level that separates the clusters of a window: voxels up to it are in the lower one. [`NONE`] if a
-    /// cluster is too small, or their means differ by too little.
+    /// Returns the level that separates the clusters of a window: voxels with intensities up to it are in the lower
+    /// cluster. [`NONE`] if a cluster is too small, or the means of the two differ by no more than the threshold.
     fn level(&mut self, counts: &Histogram) -> u8 {
         let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
         let enough = MIN_SHARE * f64::from(low.count + high.count);
@@ -153,8 +158,9 @@ impl BoundaryVoting {
         ((low.mean() + high.mean()) / 2.0) as u8
     }
 
-    /// Returns the faces that have votes between the voxels of `frame` and the next ones along a direction, which are
-    /// in the frame `other` for faces along time. The windows with centres in the frames `frames` vote.
+    /// Returns the faces that have boundary votes between the voxels of `frame` and the next ones along a direction,
+    /// which are in the frame `other` for faces along time. The windows with centres in the frames `frames` are the
+    /// ones that vote.
     fn votes(
         &self,
         region: &Region,
@@ -190,7 +196,8 @@ impl BoundaryVoting {
     }
 }
 
-/// Pairs of neighbouring voxels: the lower intensity of each pair, and the absolute difference.
+/// Pairs of neighbouring voxels whose faces are counted at once: the lower quantised intensity of each pair, and the
+/// absolute difference.
 struct Pairs {
     low: [u8; LANES],
     span: [u8; LANES],
@@ -206,9 +213,9 @@ impl Pairs {
     }
 }
 
-/// The windows that vote for faces along one direction in one frame.
+/// The windows that vote for the faces between voxels along one direction in one frame.
 struct VotingWindows<'a> {
-    /// The levels of each frame with window centres.
+    /// For each frame with centres of windows, the levels between bright and dark in these windows.
     levels: Vec<&'a [u8]>,
     rows: Rows,
     dims: [usize; 3],
@@ -216,7 +223,8 @@ struct VotingWindows<'a> {
 }
 
 impl VotingWindows<'_> {
-    /// Returns the centres, along an axis, of the windows that contain a voxel and the next one.
+    /// Returns the coordinates, along `axis`, of the centres of the windows that contain both voxels at a face, of
+    /// which the first has the coordinate `at`.
     fn centres(&self, at: usize, axis: usize) -> std::ops::Range<usize> {
         let first = at + usize::from(self.direction == axis);
         first.saturating_sub(self.rows.half_width)..(at + self.rows.half_width + 1).min(self.dims[axis])
@@ -227,7 +235,8 @@ impl VotingWindows<'_> {
         [X, Y, Z].map(|axis| self.centres(at[axis], axis).len()).iter().product::<usize>() * self.levels.len()
     }
 
-    /// Returns the votes for the faces after [`LANES`] consecutive voxels along x, from the given one on.
+    /// Returns the number of votes for each of the faces after [`LANES`] consecutive voxels along x, from the given one
+    /// on.
     fn votes(&self, [x, y, z]: [usize; 3], pairs: &Pairs) -> [u16; LANES] {
         let mut votes = [0u16; LANES];
         if pairs.span == [0; LANES] {
@@ -249,7 +258,8 @@ impl VotingWindows<'_> {
 }
 
 impl Window {
-    /// Returns the frames within a window's extent in time around a frame of a sequence of `count` frames.
+    /// Returns the indices of the frames within a window's extent in time around `frame`, in a sequence of `count`
+    /// frames that may be cyclic.
     fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
         let half_width = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
@@ -260,7 +270,8 @@ impl Window {
     }
 }
 
-/// Counts, for each pair of voxels, the windows of a row whose level separates it, and adds them to `votes`.
+/// Counts, for each pair of neighbouring voxels, the windows of a row whose level between bright and dark separates the
+/// two voxels, and adds them to `votes`.
 #[inline]
 fn count(levels: &[u8], windows: usize, pairs: &Pairs, votes: &mut [u16; LANES]) {
     let (low, span) = (u8x16::new(pairs.low), u8x16::new(pairs.span));
@@ -272,7 +283,8 @@ fn count(levels: &[u8], windows: usize, pairs: &Pairs, votes: &mut [u16; LANES])
     votes.iter_mut().zip(few.to_array()).for_each(|(all, few)| *all += u16::from(few));
 }
 
-/// The layout of levels in rows along x, with padding for windows beyond both ends.
+/// The layout in memory of the windows' levels between bright and dark: rows along x, with padding for windows beyond
+/// both ends.
 struct Rows {
     ny: usize,
     nz: usize,
@@ -289,13 +301,13 @@ impl Rows {
         self.row * self.ny * self.nz
     }
 
-    /// Returns the index of the first voxel of a row.
+    /// Returns the index of the level at the first voxel of the row (y, z).
     fn at(&self, y: usize, z: usize) -> usize {
         (z * self.ny + y) * self.row + self.half_width
     }
 }
 
-/// A histogram of quantised intensities.
+/// A histogram of the quantised intensities of voxels, by which a window is split into clusters.
 #[derive(Clone)]
 struct Histogram([u16; 256]);
 
@@ -305,7 +317,7 @@ impl Default for Histogram {
     }
 }
 
-/// The number of voxels in a cluster, and the sum of their intensities.
+/// The number of voxels in one of the two clusters of a window, and the sum of their quantised intensities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cluster {
     count: u32,
@@ -327,7 +339,7 @@ impl Histogram {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a -= b);
     }
 
-    /// Returns the number and sum of the voxels with intensities in a range.
+    /// Returns the number of voxels with quantised intensities in a range, and the sum of these intensities.
     fn within(&self, levels: std::ops::Range<usize>) -> Cluster {
         let mut cluster = Cluster::default();
         for level in levels {
@@ -338,8 +350,8 @@ impl Histogram {
         cluster
     }
 
-    /// Splits the histogram into two clusters, the lower first, by Lloyd iterations from its lowest and highest
-    /// intensity; `None` if these two differ by no more than `threshold`.
+    /// Splits the histogram of a window into two clusters, the lower first, by Lloyd iterations from its lowest and
+    /// highest intensity; `None` if these two differ by no more than `threshold`.
     fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
         let least = self.0.iter().position(|&count| count > 0)?;
         let greatest = self.0.iter().rposition(|&count| count > 0)?;
@@ -369,9 +381,9 @@ impl Histogram {
     }
 }
 
-/// Histograms of intensities around a row (y, z), one for each x: of the voxels at this x, in all given frames, that
-/// are at most a window's half-width from the row along y and along z. The histogram of a window is the sum of those at
-/// consecutive x.
+/// Histograms of quantised intensities around a row (y, z), one for each x: of the voxels at this x, in all given
+/// frames, that are at most a window's half-width from the row along y and along z. The histogram of a window is the
+/// sum of those at consecutive x.
 struct Slabs<'a> {
     dims: [usize; 3],
     half_width: usize,
@@ -385,7 +397,7 @@ impl<'a> Slabs<'a> {
         Self { dims, half_width, frames, at: None, counts: vec![Histogram::default(); dims[0]] }
     }
 
-    /// Moves the slabs to the row (y, z); incrementally if it follows the current one.
+    /// Moves the histograms to the row (y, z); incrementally if it follows the current row.
     fn move_to_row(&mut self, y: usize, z: usize) {
         let ny = self.dims[1];
         if y > 0 && self.at == Some((y - 1, z)) {
@@ -404,7 +416,8 @@ impl<'a> Slabs<'a> {
         self.at = Some((y, z));
     }
 
-    /// Applies `change` to the counts of all voxels in row y of the slices within the half-width of z.
+    /// Applies `change` to the counts of the intensities of all voxels in row y of the slices within the half-width of
+    /// z.
     fn update_row(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
         let [nx, ny, nz] = self.dims;
         for z in z.saturating_sub(self.half_width)..(z + self.half_width + 1).min(nz) {
@@ -417,7 +430,8 @@ impl<'a> Slabs<'a> {
         }
     }
 
-    /// Adds the slab at `x` to the histogram of a sliding window, and subtracts the one that leaves the window.
+    /// Moves the window along x by one voxel: adds the histogram at `x` to that of the window, and subtracts the one
+    /// that leaves it.
     fn slide(&self, window: &mut Histogram, x: usize) {
         if let Some(counts) = self.counts.get(x) {
             window.add(counts);
@@ -435,7 +449,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// An image of noise around two intensities.
+    /// Returns a test image of two intensities with noise.
     fn region(dims: [usize; 3], frames: usize) -> Region {
         let mut random = Random::new(8);
         let [nx, ny, nz] = dims;
@@ -458,7 +472,8 @@ mod tests {
         }
     }
 
-    /// Returns the voxels of one window that are in the image, as index and frame.
+    /// Returns the voxels of one window that are in the image, as pairs of voxel index and frame, for checking the
+    /// votes.
     fn window_at(region: &Region, window: &Window, at: [usize; 3], frame: usize) -> Vec<(usize, usize)> {
         let [nx, ny, nz] = region.dims;
         let near = |a: usize, b: usize| a.abs_diff(b) <= window.half_width;
@@ -475,7 +490,8 @@ mod tests {
             .collect()
     }
 
-    /// Computes the level between the clusters of a window that passes, directly as in section 2.
+    /// Computes the level between the clusters in a window with the given intensities, directly as in section 2 of the
+    /// paper; `None` if it has no boundary.
     fn level_of(values: &[u8], threshold: f64) -> Option<f64> {
         let (mut low, mut high) = (f64::from(*values.iter().min()?), f64::from(*values.iter().max()?));
         if high - low <= threshold {
@@ -496,7 +512,8 @@ mod tests {
         }
     }
 
-    /// The voxels of a window, and its level.
+    /// The voxels of a window, as pairs of index and frame, and its level between bright and dark, `None` without a
+    /// boundary.
     type Checked = (Vec<(usize, usize)>, Option<f64>);
 
     #[test]

@@ -7,13 +7,13 @@ use crate::math::Bounds;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
-/// The whole mesh is swept if at least one in this many vertices has to be searched around; otherwise the grid is
-/// queried around those vertices only. Tuned by timing.
+/// The whole mesh is swept for near vertices if at least one vertex in this many has a pending search for its
+/// neighbours; otherwise the grid is queried around these vertices only. Tuned by timing.
 const MANY: usize = 8;
 
 impl Embedding {
-    /// Measures the longest edge at each of the `dirty` vertices; for those with a pending search, updates the position
-    /// in the grid and finds the pairs anew.
+    /// Measures the longest edge at each of the `dirty` vertices; for those with a pending search for non-adjacent
+    /// vertices near them, updates the position in the grid and finds the pairs anew.
     pub(super) fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let is_entered = self.entered == Some(mesh.geometry_version());
         let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
@@ -47,7 +47,8 @@ impl Embedding {
         self.pending[v.index()].has(Check::Search)
     }
 
-    /// Finds the pairs with a vertex to be searched around, by a sweep over the whole mesh.
+    /// Finds pairs of non-adjacent vertices near each other by a sweep over the whole mesh, and stores those of which
+    /// at least one has a pending search.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let proximity = self.proximity();
         let balls = mesh.vertices().map(|v| self.grid.ball(v)).collect();
@@ -58,8 +59,8 @@ impl Embedding {
         });
     }
 
-    /// Finds the pairs of the `dirty` vertices to be searched around, by grid queries, one for all those in the same
-    /// cell.
+    /// Finds pairs of non-adjacent vertices near each other, of which at least one is `dirty` and has a pending search,
+    /// by grid queries, one for all those in the same cell.
     pub(super) fn search(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let proximity = self.proximity();
         let searched = dirty.iter().filter(|&&v| self.is_searched_around(v));
@@ -90,8 +91,8 @@ impl Embedding {
         }
     }
 
-    /// Stores a pair at both of its vertices, unless these are identical or adjacent, and marks both if they may come
-    /// within contact distance.
+    /// Stores two vertices near each other in the lists of both, unless they are identical or adjacent, and marks both
+    /// if they may come within contact distance.
     fn add_pair(&mut self, mesh: &Mesh, a: &VertexBall, b: &VertexBall, proximity: Proximity) {
         if a.vertex == b.vertex || mesh.ring(a.vertex).contains(b.vertex) {
             return;
@@ -109,13 +110,14 @@ impl Embedding {
         }
     }
 
-    /// Returns the index of `w` in the list of vertices found near `v`.
+    /// Returns the index of `w` in the list of vertices that the broad phase found near `v`; `None` if `w` is not in
+    /// this list.
     pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
         self.nearby[v.index()].iter().position(|near| near.vertex == w)
     }
 
-    /// Returns the distance between two vertices below which their triangles can intersect, or the two come within
-    /// contact distance, before either is searched around again.
+    /// Returns the distance up to which two vertices have to be paired: below it their triangles may intersect, or they
+    /// may come within contact distance, before the next search around either.
     fn proximity(&self) -> Proximity {
         // Distance and edges change by twice the skin at most.
         let change = 2.0 * (SEARCH_SKIN * self.ordinary_edge + self.exact_below());
@@ -126,7 +128,7 @@ impl Embedding {
         }
     }
 
-    /// Returns the vertices inside a box, sorted.
+    /// Returns the vertices inside a box, sorted by id.
     pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
         self.sync(mesh);
         let mut found = Vec::new();

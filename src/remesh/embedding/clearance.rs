@@ -9,15 +9,15 @@ use crate::mesh::{Mesh, VertexId};
 use smallvec::SmallVec;
 use wide::f32x4;
 
-/// The squared length, with edges relative to the longest, above which the cross product of two edges has a reliable
-/// direction.
+/// The squared length, in units of the longest edge, above which the cross product of two edges has a reliable
+/// direction, so that it can serve as a separating axis.
 const SHORTEST: f32 = 1e-30;
 
 type Triangle = [Vec3; 3];
 
-/// Returns the clearance between the triangles at `u` and those at `v` without a common corner; not positive if some
-/// pair is not known to be disjoint. Of clearances above `enough`, any may be returned. `longest` is the longest edge
-/// at `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner: how far all vertices
+/// may move before two of them can intersect; not positive if some pair is not known to be disjoint. Of clearances
+/// above `enough`, any may be returned. `longest` is the longest edge at `u` and `v`.
 pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
     // Lengths are relative to the longest edge, so that squares of products of edges neither over- nor underflow.
     let (origin, per_length) = (mesh.position(u), 1.0 / longest);
@@ -57,8 +57,9 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
     clearance * longest
 }
 
-/// Returns the clearance between the triangles at `v`, except for their common corners and edges; not positive if some
-/// pair may intersect. `longest` is the longest edge at `v`.
+/// Returns the clearance of the triangles at `v`: how far all vertices may move before two of them can intersect,
+/// except at common corners and edges; not positive if some pair may intersect already. `longest` is the longest edge
+/// at `v`.
 pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     let ring = mesh.ring(v).as_slice();
     let origin = mesh.position(v);
@@ -82,7 +83,8 @@ pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
 }
 
 /// Returns the clearance of two triangles that share the edge from the origin to `edge` and have the third corners
-/// `tips`: the displacement of all vertices below which the two cannot fold onto each other.
+/// `tips`: the displacement of all vertices below which the two cannot fold onto each other. `longest` is the longest
+/// edge of both.
 fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
@@ -120,7 +122,7 @@ fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 
     gap
 }
 
-/// Four vectors in SIMD lanes.
+/// Four vectors in SIMD lanes, the axes on which two triangles are projected at once.
 #[derive(Clone, Copy)]
 struct Vectors([f32x4; 3]);
 
@@ -138,7 +140,7 @@ impl Vectors {
         Self([b * z - c * y, c * x - a * z, a * y - b * x])
     }
 
-    /// Returns unit vectors; 0 for those without a direction.
+    /// Returns the unit vectors along the four vectors; 0 for those too short to have a reliable direction.
     fn unit(self) -> Self {
         let [x, y, z] = self.0;
         let square = x * x + y * y + z * z;
@@ -173,14 +175,14 @@ fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
 }
 
 /// Returns whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal
-/// to one of its edges. Most triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is
-/// the extent of both together, which bounds the rounding error.
+/// to one of its edges. A filter before the exact predicates, which are slowest for triangles on one flat sheet.
+/// `reach` is the extent of both together, which bounds the rounding error.
 pub(super) fn are_apart_in_plane(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
     is_beyond_edge(s, t, gap) || is_beyond_edge(t, s, gap)
 }
 
-/// Returns whether `t` is beyond an edge of `s` by more than `gap`.
+/// Returns whether the triangle `t`, projected onto the plane of `s`, is beyond an edge of `s` by more than `gap`.
 fn is_beyond_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
     let normal = (s[1] - s[0]).cross(s[2] - s[0]);
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
@@ -206,7 +208,7 @@ fn gap_between_boxes(a: &Bounds, b: &Bounds) -> f32 {
 }
 
 /// Returns the smallest distance of the tips of two triangles, whose common corner is the origin, from a separating
-/// plane through it; not positive if none was found.
+/// plane through the origin; not positive if none was found. `a`, `b` and `c`, `d` are the tips, the other corners.
 ///
 /// If the tips of one triangle are mirrored at the origin, all four are on one side of the plane. Its normal is the
 /// mean of those of the faces of the cone around them.
@@ -251,7 +253,7 @@ mod tests {
         mesh
     }
 
-    /// Returns the mesh with each vertex moved by nearly `displacement`.
+    /// Returns a copy of the mesh with each vertex moved by nearly `displacement` in a random direction.
     fn shaken(mesh: &Mesh, displacement: f32, random: &mut Random) -> Mesh {
         let mut mesh = mesh.clone();
         let vertices: Vec<VertexId> = mesh.vertices().collect();
@@ -261,7 +263,7 @@ mod tests {
         mesh
     }
 
-    /// Asserts that nothing intersects, by the exact test `intersections`, as long as no vertex moves further than
+    /// Asserts that no triangles intersect, by the exact test `intersections`, as long as no vertex moves further than
     /// `clearance`.
     fn assert_holds(
         mesh: &Mesh,

@@ -70,38 +70,40 @@ pub struct Embedding {
     ordinary_edge: f32,
     /// The longest edge at each vertex, as last measured, by slot.
     longest: Vec<f32>,
-    /// The non-adjacent vertices that the broad phase found near each vertex.
+    /// The non-adjacent vertices that the broad phase found near each vertex, by slot.
     nearby: Vec<SmallVec<[Nearby; 4]>>,
-    /// Whether a non-adjacent vertex may be within the contact distance, by vertex.
+    /// Whether any non-adjacent vertex may be within the contact distance of each vertex, by slot.
     may_touch: Vec<bool>,
-    /// The remaining motion bounds of each vertex: the displacement of its one-ring up to the next test.
+    /// The remaining motion bounds of each vertex, by slot: the displacements of its one-ring up to its next tests.
     motion_bounds: Vec<MotionBounds>,
     certificates: Certificates,
-    /// The largest displacement in the one-ring of each vertex during a move.
+    /// The largest displacement in the one-ring of each vertex during a move, by slot.
     ring_displacement: Vec<f32>,
     /// The vertices whose `ring_displacement` is not 0.
     touched: Vec<VertexId>,
-    /// Vertices that edits created or changed since the last move; the pairs of their neighbours do not include them
-    /// yet.
+    /// Vertices that edits created or changed since the last move; lists of near vertices do not contain them yet.
     edited: Vec<VertexId>,
-    /// The pending checks of each vertex.
+    /// The pending collision checks of each vertex, by slot.
     pending: Vec<Checks>,
-    /// The vertices with pending checks.
+    /// The vertices with pending collision checks.
     dirty: Vec<VertexId>,
-    /// The geometry version of the mesh with which this is synchronised.
+    /// The geometry version of the mesh for which grid, motion bounds and certificates are up to date.
     version: Option<u32>,
-    /// The geometry version at which the whole mesh was entered into the grid.
+    /// The geometry version at which all vertices of the mesh were set in the grid; as long as the mesh has it, none
+    /// has to be set again.
     entered: Option<u32>,
-    /// Visited marks: a vertex is marked if its entry equals `newest`.
+    /// Visited marks of vertices, by slot: a vertex is marked if its entry equals `newest`.
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
     /// Vertex positions before the current move.
     from: Vec<Vec3>,
-    /// Whether a corner of an intersecting triangle had no displacement in a move since the last full synchronisation.
+    /// Whether, in a move since everything was last rebuilt, an intersecting triangle had a corner without
+    /// displacement: then shortening displacements may not have resolved the intersection.
     stuck: bool,
     effort: u64,
-    /// The output space, in which triangles must not intersect either.
+    /// The output space (world space in single precision), in which triangles must not intersect either, if it is
+    /// watched.
     output: Option<OutputSpace>,
 }
 
@@ -118,9 +120,10 @@ impl Embedding {
         output::exact_below(self.output.as_ref())
     }
 
-    /// Synchronises with `mesh` after any changes, and sets the ordinary edge: a length that most edges do not exceed.
-    /// It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are found.
-    /// Unlike [`Self::sync`], it does not fill the cells of the grid.
+    /// Brings grid, motion bounds and certificates up to date with `mesh` after any changes, and sets the ordinary
+    /// edge: a length that most edges do not exceed. It affects speed and the largest distance of
+    /// [`Self::for_each_contact`], not which intersections are found. Unlike [`Self::sync`], it does not fill the cells
+    /// of the grid.
     pub fn sync_with_edge(&mut self, mesh: &Mesh, edge: f32) {
         let edge = higher(MIN_LENGTH, edge);
         if self.ordinary_edge != edge {
@@ -130,13 +133,15 @@ impl Embedding {
         self.sync_without_cells(mesh);
     }
 
-    /// Synchronises with `mesh` after any changes, and fills the cells of the grid.
+    /// Brings grid, motion bounds and certificates up to date with `mesh` after any changes, and fills the cells of the
+    /// grid, which edits and contact queries need.
     pub fn sync(&mut self, mesh: &Mesh) {
         self.sync_without_cells(mesh);
         self.grid.link_cells();
     }
 
-    /// Synchronises without filling the cells of the grid: a check of the whole mesh does not need them.
+    /// Synchronises as [`Self::sync`] does, but without filling the cells of the grid: a check of the whole mesh does
+    /// not need them.
     fn sync_without_cells(&mut self, mesh: &Mesh) {
         if self.version == Some(mesh.geometry_version()) && !self.certificates.are_worn() {
             return;
@@ -169,8 +174,8 @@ impl Embedding {
         self.attempt_with(mesh, edit, Self::changes_intersect)
     }
 
-    /// Performs edits as [`Self::attempt`] does, but tests only pairs of triangles that share a corner.
-    /// [`Self::intersecting_vertices`] finds the other intersections.
+    /// Performs edits as [`Self::attempt`] does, but tests only pairs of triangles that share a corner, which is
+    /// faster. Afterwards, [`Self::intersecting_vertices`] finds the other intersections.
     ///
     /// # Errors
     /// As [`Self::attempt`].
@@ -200,7 +205,8 @@ impl Embedding {
         done
     }
 
-    /// Updates this structure with the changes since [`Mesh::begin`]; an error if they make triangles intersect.
+    /// Updates grid, motion bounds and certificates with the edits since [`Mesh::begin`]; an error if `intersects`
+    /// finds that they make triangles intersect.
     fn accept_changes(
         &mut self,
         mesh: &Mesh,
@@ -220,7 +226,7 @@ impl Embedding {
         self.check_all(mesh).is_empty()
     }
 
-    /// Returns the corners of all triangles that intersect another, sorted.
+    /// Returns the corners of all triangles that intersect another, sorted by id; exact.
     pub fn intersecting_vertices(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check_all(mesh)
     }
@@ -232,7 +238,7 @@ impl Embedding {
     }
 
     /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that
-    /// intersect one of those components, sorted.
+    /// intersect one of those components, sorted by id.
     ///
     /// # Errors
     /// As [`Mesh::append`].
@@ -258,7 +264,7 @@ impl Embedding {
         Ok((added, intersecting))
     }
 
-    /// Deletes the component of `v`, and returns its number of vertices.
+    /// Deletes the component of `v` from the mesh and the grid, and returns its number of vertices.
     pub fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) -> usize {
         self.sync(mesh);
         let members = mesh.component_of(v, usize::MAX);
@@ -268,7 +274,7 @@ impl Embedding {
         count
     }
 
-    /// Resizes the arrays by vertex to a number of slots; new vertices are untested.
+    /// Resizes the arrays indexed by vertex slot to `slots`; all collision checks of new vertices are due.
     fn resize_for(&mut self, slots: usize) {
         self.longest.resize(slots, 0.0);
         self.nearby.resize(slots, SmallVec::new());
@@ -282,12 +288,13 @@ impl Embedding {
         self.longest[v.index()] = longest_edge(mesh, v);
     }
 
-    /// Enters `v` into the grid, with its longest edge as last measured.
+    /// Sets the position of `v` and its longest edge, as last measured, in the grid.
     fn enter(&mut self, mesh: &Mesh, v: VertexId) {
         self.grid.set(v, mesh.position(v), self.longest[v.index()]);
     }
 
-    /// Updates the grid and the motion bounds with the changes since [`Mesh::begin`].
+    /// Updates the grid and the motion bounds with the edits since [`Mesh::begin`]; `changed` are the triangles that
+    /// these created or moved, by their corners.
     fn sync_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
         self.resize_for(mesh.slots());
         for v in mesh.touched_vertices() {
@@ -314,7 +321,7 @@ impl Embedding {
         }
     }
 
-    /// Discards the motion bounds and certificates of `v`, which an edit created or changed.
+    /// Discards the motion bounds and certificates of `v`, which an edit created, moved or gave other triangles.
     fn forget(&mut self, v: VertexId) {
         self.may_touch[v.index()] = true;
         self.certificates.revoke(v);
@@ -323,7 +330,7 @@ impl Embedding {
         }
     }
 
-    /// Clears all marks.
+    /// Clears the visited marks of all vertices.
     fn new_marks(&mut self, mesh: &Mesh) {
         self.marks.resize(mesh.slots(), 0);
         self.newest = self.newest.wrapping_add(1);
@@ -333,7 +340,7 @@ impl Embedding {
         }
     }
 
-    /// Marks `v`; returns whether it was unmarked.
+    /// Marks `v` as visited; returns whether it was unmarked.
     fn mark(&mut self, v: VertexId) -> bool {
         std::mem::replace(&mut self.marks[v.index()], self.newest) != self.newest
     }

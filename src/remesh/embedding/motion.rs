@@ -6,17 +6,18 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
-/// The factor on the displacement of vertices of intersecting triangles; if triangles still intersect, these vertices
-/// do not move.
+/// The factor on the displacement of vertices of intersecting triangles; if triangles still intersect after that, these
+/// vertices do not move.
 const HELD_BACK: f32 = 0.25;
 
 impl Embedding {
-    /// Returns whether the mesh still intersects itself after a move, which happens only if it did before.
+    /// Returns whether the mesh intersects itself after a move; it can only if it did before.
     pub fn still_intersects(&mut self, mesh: &Mesh) -> bool {
         self.stuck && !self.is_embedded(mesh)
     }
 
-    /// Moves all vertices by `displacements`, as [`Self::move_some`] does.
+    /// Moves all vertices by `displacements`, given by slot, as [`Self::move_some`] does; returns the vertices held
+    /// back, with the share of its displacement by which each moved.
     pub fn move_all(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.move_some(mesh, &all, displacements)
@@ -81,7 +82,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// An edit may move triangles near a vertex whose skin is not used up.
+    /// An edit may bring triangles near a vertex that has moved too little itself for a new search for near vertices.
     #[test]
     fn triangles_that_an_edit_puts_near_are_detected() {
         let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
@@ -188,7 +189,7 @@ mod tests {
         Mesh::from_triangles(&TriangleMesh { positions, triangles, ..TriangleMesh::default() }).unwrap()
     }
 
-    /// Squares of small lengths are rounded to few digits or to 0, those of large ones are infinite.
+    /// Lengths are tried at which squares are rounded to few digits or to 0, or are infinite.
     #[test]
     fn no_triangles_intersect_in_any_unit() {
         for power in (-44..=36).step_by(2) {

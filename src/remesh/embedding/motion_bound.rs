@@ -8,14 +8,14 @@ use super::{Embedding, MIN_LENGTH};
 use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
-/// A kind of collision check with a motion bound of its own.
+/// A kind of collision check at a vertex, with a motion bound of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Check {
     /// Pairs of triangles that are both at the vertex, or one at the vertex and one at an adjacent vertex.
     OneRing,
     /// Pairs of triangles, one at the vertex and one at a non-adjacent vertex near it.
     Nearby,
-    /// The search for non-adjacent vertices near the vertex; followed by [`Check::Nearby`].
+    /// The search for non-adjacent vertices near the vertex by the broad phase; followed by [`Check::Nearby`].
     Search,
 }
 
@@ -43,25 +43,26 @@ impl Checks {
     }
 }
 
-/// The remaining displacement of a one-ring before each kind of check; used up if it is not positive.
+/// The displacement that remains to the one-ring of a vertex before each kind of check is due; due if it is not
+/// positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MotionBounds([f32; 3]);
 
 impl MotionBounds {
-    /// The bounds of a vertex that was never tested.
+    /// The motion bounds of a vertex that was never tested, or has to be tested again: all checks are due.
     pub(super) const NONE: Self = Self([0.0; 3]);
 
     pub(super) fn set(&mut self, check: Check, clearance: f32) {
         self.0[check as usize] = clearance;
     }
 
-    /// Lowers the bound of one kind of check to `clearance` if it is higher.
+    /// Lowers the motion bound of one kind of check to `clearance` if it is higher.
     pub(super) fn lower(&mut self, check: Check, clearance: f32) {
         let own = &mut self.0[check as usize];
         *own = if *own < clearance { *own } else { clearance };
     }
 
-    /// Subtracts a displacement of the one-ring from all bounds; an infinite one uses them up.
+    /// Subtracts a displacement of the one-ring from all motion bounds; an infinite displacement makes all checks due.
     fn subtract(&mut self, displacement: f32) {
         self.0.iter_mut().for_each(|bound| {
             *bound = if displacement < f32::INFINITY { *bound - displacement } else { 0.0 }
@@ -75,8 +76,9 @@ impl MotionBounds {
 }
 
 impl Embedding {
-    /// Subtracts displacements from the motion bounds of all one-rings that contain a moved vertex, and marks those
-    /// vertices dirty whose bounds are used up. `moved` contains the moved vertices and their previous positions.
+    /// Subtracts the displacements of a move from the motion bounds of all one-rings that contain a moved vertex, and
+    /// marks those vertices dirty whose bounds are used up. `moved` contains the moved vertices and their previous
+    /// positions.
     pub(super) fn apply_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
         self.ring_displacement.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
@@ -105,8 +107,8 @@ impl Embedding {
         self.touched = touched;
     }
 
-    /// Marks dirty the vertices that edits created or changed since the last move, for the checks whose bounds are used
-    /// up.
+    /// Marks the vertices that edits created or changed since the last move as dirty, for the checks whose motion
+    /// bounds are used up.
     pub(super) fn mark_edited_dirty(&mut self, mesh: &Mesh) {
         let mut edited = std::mem::take(&mut self.edited);
         for v in edited.drain(..).filter(|&v| mesh.is_live(v)) {

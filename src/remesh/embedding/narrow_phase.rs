@@ -10,15 +10,15 @@ use super::{Embedding, Nearby};
 use crate::math::higher;
 use crate::mesh::{Mesh, VertexId};
 
-/// The clearance, relative to the ordinary edge, above which no further filter is tried.
+/// The clearance of a pair, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
 
 /// The checks that test pairs of triangles.
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
 
 impl Embedding {
-    /// Runs all checks at every vertex, as [`Self::check_dirty`] does but regardless of certificates; returns the
-    /// corners of all triangles that intersect another, sorted.
+    /// Runs all collision checks at every vertex, as [`Self::check_dirty`] does but regardless of certificates; returns
+    /// the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.sync_without_cells(mesh);
         self.pending.resize(mesh.slots(), Checks::default());
@@ -27,7 +27,7 @@ impl Embedding {
     }
 
     /// Runs the pending collision checks of all vertices that have any, and stores the clearances found as motion
-    /// bounds and certificates. Returns the corners of all triangles that intersect another, sorted.
+    /// bounds and certificates. Returns the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check(mesh, false)
     }
@@ -127,8 +127,8 @@ impl Embedding {
         }
     }
 
-    /// Records the clearance of two one-rings, and runs exact tests if there is none; returns the sum of odometer
-    /// readings up to which the pair is certified.
+    /// Lowers the motion bounds of a pair of vertices to the clearance of their one-rings, or runs exact tests if there
+    /// is none; returns the sum of odometer readings up to which the pair is certified not to intersect.
     fn record_clearance(
         &mut self,
         mesh: &Mesh,
@@ -145,8 +145,8 @@ impl Embedding {
         self.certificates.until(pair, clearance)
     }
 
-    /// Returns a lower bound on the distance between the one-rings of two non-adjacent vertices, found by separating
-    /// planes; not positive if the planes found do not separate them.
+    /// Returns the clearance between the one-rings of two non-adjacent vertices, how far all vertices may move before
+    /// they can intersect, by separating planes; not positive if the planes tried do not separate them.
     fn nearby_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(v, w);
         if let Some(edge) = common_edge(mesh, v, w) {
@@ -167,8 +167,8 @@ impl Embedding {
         }
     }
 
-    /// Returns `clearance`, found by planes between two one-rings, or, if it is not ample, the one between their
-    /// triangles if that is larger.
+    /// Returns `clearance`, which planes between two one-rings have given, if it is above [`AMPLE`]; otherwise the
+    /// clearance between their individual triangles, if that is larger.
     fn or_triangle_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], clearance: f32) -> f32 {
         if self.is_ample(clearance) {
             return clearance;
@@ -176,7 +176,7 @@ impl Embedding {
         higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.ordinary_edge))
     }
 
-    /// Returns `clearance`, or 0 if it is so small that exact tests have to decide.
+    /// Returns `clearance`, or 0 if it is so small that exact tests have to decide whether triangles intersect.
     fn or_zero(&self, clearance: f32) -> f32 {
         if clearance > self.exact_below() { clearance } else { 0.0 }
     }
@@ -189,7 +189,7 @@ impl Embedding {
         clearance > AMPLE * self.ordinary_edge
     }
 
-    /// Returns whether the pair `w`, `v` is tested from `w` in this check, so that `v` can skip it.
+    /// Returns whether the pair `w`, `v` is tested when the check is run at `w`, so that `v` can skip it.
     pub(super) fn is_checked_from(&self, w: VertexId, v: VertexId, check: Check) -> bool {
         w < v && self.pending[w.index()].has(check)
     }
@@ -200,7 +200,7 @@ impl Embedding {
     }
 }
 
-/// Returns the edge across which `v` and `w` are opposite each other, if there is one.
+/// Returns the ends of an edge across which `v` and `w` are opposite each other, `None` if there is none.
 fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
     mesh.ring(v).pairs().find(|&(a, b)| mesh.ring(a).before(b) == Some(w)).map(|(a, b)| [a, b])
 }
@@ -257,7 +257,7 @@ mod tests {
         mesh
     }
 
-    /// Returns the corners of the triangles that intersect, by testing all pairs.
+    /// Returns the corners of the triangles that intersect another, found by testing all pairs.
     fn expected(mesh: &Mesh) -> Vec<VertexId> {
         let triangles = mesh.to_triangles();
         let vertices: Vec<VertexId> = mesh.vertices().collect();

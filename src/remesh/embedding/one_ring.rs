@@ -14,16 +14,17 @@ use smallvec::SmallVec;
 /// The valence up to which one-rings are stored inline, without heap allocation.
 pub(super) const ORDINARY_RING: usize = 16;
 
-/// Bound on the rounding error of lengths and areas, relative to the longest edge and its square: a hundred times the
-/// actual one.
+/// Bound on the rounding error of lengths, relative to the longest edge, and of areas, relative to its square: a
+/// hundred times the actual error.
 pub(super) const ROUNDING: f32 = 1e-4;
 
 /// The largest clearance that [`facing_clearance`] returns, relative to the longest edge: its bound holds for smaller
 /// displacements only.
 const SMALL: f32 = 0.125;
 
-/// The remaining share of the distance from a plane after the plane was turned by the displacements of two vertices in
-/// it that are at least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down.
+/// The share of its distance from a plane that a point keeps when displacements of two vertices in the plane turn it;
+/// their distance from each other is at least six times these displacements. The cosine of the angle, √(1 − (1/3)²),
+/// rounded down.
 const LEFT_BY_TURN: f32 = 0.94;
 /// The largest displacement of two vertices, relative to their distance, for which [`LEFT_BY_TURN`] holds.
 const TURN: f32 = 1.0 / 6.0;
@@ -38,8 +39,8 @@ pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     higher(MIN_LENGTH, square.sqrt())
 }
 
-/// Returns the unit vector in the direction of `offset`, or 0 for the null vector. In double precision if the squared
-/// length over- or underflows.
+/// Returns the unit vector in the direction of `offset`, or 0 for the null vector; computed in double precision if the
+/// squared length over- or underflows.
 pub(super) fn unit(offset: Vec3) -> Vec3 {
     let square = offset.length_squared();
     if (1e-30..1e30).contains(&square) {
@@ -49,8 +50,9 @@ pub(super) fn unit(offset: Vec3) -> Vec3 {
     }
 }
 
-/// Returns the clearance of a one-ring whose triangles all face in a direction and wind about it once: projected along
-/// this direction they do not overlap. `longest` is the longest edge at `v`.
+/// Returns the clearance of a one-ring, how far all vertices may move before its triangles can intersect, if these all
+/// face in a direction and wind about it once: projected along this direction they do not overlap. `longest` is the
+/// longest edge at `v`.
 ///
 /// If vertices move by f, twice the projected area of a triangle with perimeter P changes by less than f·P + 3·f².
 fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
@@ -81,14 +83,15 @@ fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> 
     if once && longest < f32::INFINITY { clearance } else { 0.0 }
 }
 
-/// Returns the clearance of a one-ring that is a height field along its normal, so that its triangles do not intersect.
-/// `longest` is the longest edge at `v`.
+/// Returns the clearance of a one-ring, how far all vertices may move before its triangles can intersect, if it is a
+/// height field along its normal. `longest` is the longest edge at `v`.
 pub(super) fn flat_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     facing_clearance(mesh, v, unit(mesh.area_normal(v)), longest)
 }
 
-/// Returns the clearance between the one-rings of two adjacent vertices that both face in one direction, if neither
-/// reaches into the corners behind the two vertices opposite their edge. `longest` is the longest edge at `u` and `v`.
+/// Returns the clearance between the one-rings of two adjacent vertices, how far all vertices may move before these can
+/// intersect, if both face in one direction and neither reaches into the corners behind the two vertices `left` and
+/// `right` opposite their edge. `longest` is the longest edge at `u` and `v`.
 ///
 /// ```text
 ///        . behind .       In projection along the direction, a common point of triangles S at u and T at v is not
@@ -124,8 +127,9 @@ pub(super) fn spread_clearance(
     lower(area, (lower(at_left, at_right) - rounding) / (6.5 * longest))
 }
 
-/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, by a separating plane
-/// through two common neighbours `p` and `q`. `longest` is the longest edge at `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, how far all vertices
+/// may move before these can intersect, by a separating plane through two common neighbours `p` and `q`. `longest` is
+/// the longest edge at `u` and `v`.
 ///
 /// The plane moves with `p` and `q`, and turns about the direction in it that is perpendicular to the line through
 /// them. If all vertices move by f, a corner at distance g from the plane, beside the point p + t·(q − p) of that line,
@@ -166,22 +170,26 @@ pub(super) fn clearance_beside_line(gap: f32, reach: f32, square: f32, longest: 
     lower(clearance, TURN * square.sqrt())
 }
 
-/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, by the plane through
-/// the common neighbour `p` that is normal to `v` − `u`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, how far all vertices
+/// may move before these can intersect, by the plane through their common neighbour `p` that is normal to `v` − `u`.
+/// `longest` is the longest edge at `u` and `v`.
 pub(super) fn corner_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
     let normal = unit(mesh.position(v) - mesh.position(u));
     // The plane moves with p and keeps its normal.
     0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
 }
 
-/// Returns the clearance between the triangles at `u` and those at `v`, by the bisecting plane of `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v`, which have no common corner: how far all
+/// vertices may move before these can intersect, by the bisecting plane of `u` and `v`. `longest` is the longest edge
+/// at both.
 pub(super) fn mid_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let (p, q) = (mesh.position(u), mesh.position(v));
     gap(mesh, [u, v], [u, v], (p + q) * 0.5, unit(q - p)) - ROUNDING * longest
 }
 
-/// Returns the clearance between the triangles at `u` and those at `v`, by a plane between two sheets that face each
-/// other or away from each other.
+/// Returns the clearance between the triangles at `u` and those at `v`, which have no common corner: how far all
+/// vertices may move before these can intersect, by a plane between two sheets that face each other or away from each
+/// other. `longest` is the longest edge at both.
 pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let normal = unit(mesh.area_normal(u) - mesh.area_normal(v));
     let (p, q) = (mesh.position(u), mesh.position(v));
@@ -193,8 +201,9 @@ pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) 
     0.5 * (other - own) - ROUNDING * longest
 }
 
-/// Returns the smallest distance from a plane of `u` and its neighbours, which should be behind it, and of `v` and its
-/// neighbours, which should be in front; those `in_plane` are ignored. Not positive if one is on the wrong side.
+/// Returns the smallest distance of vertices from the plane through `origin` with the unit normal `normal`: of `u` and
+/// its neighbours, which should be behind it, and of `v` and its neighbours, which should be in front; the vertices
+/// `in_plane` are ignored. Not positive if one is on the wrong side.
 fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3, normal: Vec3) -> f32 {
     let height = |w: VertexId| (mesh.position(w) - origin).dot(normal);
     let mut least = lower(-height(u), height(v));
@@ -228,8 +237,8 @@ pub(super) fn intersections_around(
     }
 }
 
-/// Returns whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners;
-/// exact. `longest` is the longest edge at `v`.
+/// Returns whether one of the `changed` triangles (by their corners) at `v` intersects another triangle at `v` beyond
+/// their common corners; exact. `longest` is the longest edge at `v`.
 pub(super) fn changes_intersect_around(
     mesh: &Mesh,
     v: VertexId,

@@ -8,15 +8,16 @@ use super::MIN_LENGTH;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3, higher};
 use crate::mesh::{Facet, facets_intersect};
 
-/// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and a safety
-/// factor of 2.
+/// Bound on the rounding of a position to single precision, relative to its largest coordinate: half a unit in the last
+/// place, times √3 for three axes and a safety factor of 2.
 const ROUNDING: f64 = 2.1e-7;
 
-/// The coarsest rounding, in units of the mesh, that is taken into account. Beyond that, the output space cannot
-/// represent the surface, and testing it would stop all motion.
+/// The coarsest rounding of positions in the output space, in units of the mesh, that is taken into account. Beyond
+/// that, the output space cannot represent the surface, and testing it would stop all motion.
 const COARSEST: f64 = 0.01;
 
-/// The map to the output space, and the largest displacement of a vertex by rounding there, in units of the mesh.
+/// The map from the mesh to the output space, and the largest displacement of a vertex by rounding there, in units of
+/// the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OutputSpace {
     map: DAffine3,
@@ -24,7 +25,8 @@ pub(super) struct OutputSpace {
 }
 
 impl OutputSpace {
-    /// Creates the output space of `map` for meshes within `bounds`; `None` if single precision is too coarse for it.
+    /// Creates the output space to which `map` leads, for meshes within `bounds`; `None` if single precision is too
+    /// coarse for it.
     pub(super) fn new(map: DAffine3, bounds: &Bounds) -> Option<Self> {
         let corner = |k: usize| {
             let pick =
@@ -64,7 +66,7 @@ pub(super) fn intersect(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> b
     facets_intersect(s, t) || output.is_some_and(|space| facets_intersect(&space.facet(s), &space.facet(t)))
 }
 
-/// Returns the bounding box of a triangle, enlarged by the rounding of the output space.
+/// Returns the bounding box of a triangle, enlarged by the rounding of the output space if there is one.
 pub(super) fn bounds(facet: &Facet, output: Option<&OutputSpace>) -> Bounds {
     let Bounds { min, max } = Bounds::from_points(&facet.points);
     let margin = Vec3::splat(output.map_or(0.0, OutputSpace::rounding));

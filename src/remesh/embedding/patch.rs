@@ -7,13 +7,14 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
-/// The work of an edit that changes n triangles is counted 1 + ⌊n / this⌋ times; most edits change fewer than this.
+/// Number of changed triangles per which the work of an edit is counted once more: with n of them, the nearby vertices
+/// visited count 1 + ⌊n / this⌋ times. Most edits change fewer than this.
 const ORDINARY_PATCH: usize = 24;
 
 /// The work counted for an edit that is tested in one-rings only, in units of nearby vertices visited.
 const UNSEARCHED: u64 = 30;
 
-/// A triangle changed by an edit, or one tested against these, and its bounding box.
+/// A triangle changed by an edit, or another one tested against the changed ones, and its bounding box.
 type Changed = (Facet, Bounds);
 
 fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
@@ -22,7 +23,7 @@ fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
 
 impl Embedding {
     /// Returns whether the triangles changed since [`Mesh::begin`], given by their corners, intersect each other or any
-    /// others. The grid still holds the mesh before the edit.
+    /// other triangles of the mesh. The grid still contains the positions before the edit.
     pub(super) fn changes_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         let edited: Vec<Changed> =
             triangles.iter().map(|&corners| changed(mesh.facet(corners), self.output.as_ref())).collect();
@@ -33,14 +34,15 @@ impl Embedding {
             || self.intersect_others(mesh, &edited)
     }
 
-    /// Returns whether a triangle changed since [`Mesh::begin`] intersects another one with a common corner;
-    /// `triangles` are the changed ones, by their corners.
+    /// Returns whether a triangle changed since [`Mesh::begin`] intersects another one with which it has a common
+    /// corner; `triangles` are the changed ones, by their corners.
     pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         self.effort += UNSEARCHED;
         self.any_one_ring_intersects(mesh, triangles)
     }
 
-    /// Returns whether a changed triangle intersects another one with a common corner.
+    /// Returns whether one of the triangles `changed` by an edit, given by their corners, intersects another one with
+    /// which it has a common corner.
     fn any_one_ring_intersects(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
         hubs.sort_unstable();
@@ -52,7 +54,8 @@ impl Embedding {
         })
     }
 
-    /// Returns whether a changed triangle intersects an unchanged one without a common corner.
+    /// Returns whether one of the triangles changed by an edit, `edited`, intersects an unchanged one with which it has
+    /// no common corner.
     fn intersect_others(&mut self, mesh: &Mesh, edited: &[Changed]) -> bool {
         let whole = edited.iter().fold(Bounds::EMPTY, |whole, (_, bounds)| whole.union(bounds));
         let mut near = std::mem::take(&mut self.found);
@@ -76,7 +79,8 @@ impl Embedding {
     }
 }
 
-/// Returns whether all corners of a triangle are beyond one side of the box.
+/// Returns whether all corners of a triangle are beyond the same face of the box, so that the triangle does not
+/// intersect it.
 #[inline]
 fn is_outside_box(facet: &Facet, bounds: &Bounds) -> bool {
     let [a, b, c] = facet.points;
@@ -89,7 +93,8 @@ fn intersect_each_other(edited: &[Changed], output: Option<&OutputSpace>) -> boo
     edited.iter().enumerate().any(|(k, s)| edited[..k].iter().any(|t| intersect_apart(s, t, output)))
 }
 
-/// Returns whether a triangle that is not among the changed ones intersects one of them.
+/// Returns whether the triangle `other` is not one of those changed by an edit, `edited`, and intersects one of them
+/// without having a common corner with it.
 fn intersects_one(other: &Changed, edited: &[Changed], output: Option<&OutputSpace>) -> bool {
     let same = |(facet, _): &Changed| other.0.corners.iter().all(|v| facet.corners.contains(v));
     !edited.iter().any(same) && edited.iter().any(|changed| intersect_apart(other, changed, output))
@@ -103,7 +108,8 @@ fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bo
         && intersect(&s.0, &t.0, output)
 }
 
-/// Returns whether two triangles are known to be disjoint, including in the output space.
+/// Returns whether two triangles are known to be disjoint, also in the output space if there is one; a filter before
+/// exact tests.
 fn are_apart((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&OutputSpace>) -> bool {
     let whole = around_s.union(around_t);
     let reach = (whole.max - whole.min).max_element();

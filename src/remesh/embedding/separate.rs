@@ -4,20 +4,21 @@ use super::Embedding;
 use crate::math::Vec3;
 use crate::mesh::{DisjointSets, Mesh, VertexId};
 
-/// Displacements along the outward normals that are tried in turn, relative to the ordinary edge.
+/// Displacements along the outward normals that are tried in turn to separate intersecting sheets, relative to the
+/// ordinary edge; negative ones are inwards.
 const OFFSETS: [f32; 8] = [-0.02, 0.02, -0.06, 0.06, -0.12, 0.12, -0.2, 0.2];
 
-/// Fractions of the displacement to the mean of the neighbours that are tried in turn.
+/// Fractions of the displacement to the mean of the neighbours that are tried in turn to retract a spike.
 const SHARES: [f32; 2] = [0.5, 1.0];
 
-/// The largest distance between neighbouring vertices of one cluster, relative to the ordinary edge.
+/// The distance below which two corners of intersecting triangles belong to one cluster, relative to the ordinary edge.
 const CLUSTER_DISTANCE: f32 = 1.0;
 
 /// The largest number of corners of intersecting triangles for which [`Embedding::separate`] tries anything: with more,
 /// moving a few vertices is no remedy.
 const MAX_VERTICES: usize = 4000;
 
-/// Vertices, each with its displacement before scaling.
+/// Vertices to be moved, each with its displacement before scaling.
 type Moves = Vec<(VertexId, Vec3)>;
 
 impl Embedding {
@@ -70,7 +71,7 @@ impl Embedding {
     }
 }
 
-/// Returns the vector from a vertex to the mean of its neighbours.
+/// Returns the vector from `v` to the mean of its neighbours.
 fn to_neighbours(mesh: &Mesh, v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     let sum: Vec3 = ring.iter().map(|&w| mesh.position(w) - mesh.position(v)).sum();

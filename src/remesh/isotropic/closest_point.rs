@@ -1,10 +1,11 @@
-//! The closest point on the input surface, found by a walk along it.
+//! The closest point on the input surface of remeshing, found by a walk along it.
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 
-/// The largest number of steps of one walk. Vertices move by less than an edge at a time; this many suffice on an input
-/// a hundred times finer than the bounds. Longer walks would only cost time on malformed meshes.
+/// The largest number of steps of one walk, each to an adjacent vertex. Vertices move by less than an edge at a time;
+/// this many suffice on an input a hundred times finer than the bounds. Longer walks would only cost time on malformed
+/// meshes.
 const STEPS: usize = 200;
 
 /// A point inside a triangle is accepted at once if its squared distance from the query point is below this share of
@@ -12,16 +13,16 @@ const STEPS: usize = 200;
 /// on rough surfaces.
 const NEAR: f32 = 0.04;
 
-/// The squared sine of an angle below which only the edges of a triangle are tested: rounding makes barycentric
+/// The squared sine of the angle of a triangle below which only its edges are tested: rounding makes barycentric
 /// coordinates meaningless there.
 const SLIVER: f32 = 1e-6;
 
 /// A closest point on the input surface, as returned by [`closest_point`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestPoint {
-    /// The position of the point.
+    /// The position of the closest point, on the input surface.
     pub point: Vec3,
-    /// The nearest corner of its triangle, where the next walk can start.
+    /// The corner of its triangle that is nearest to the point, at which the next walk can start.
     pub anchor: VertexId,
 }
 
@@ -66,7 +67,7 @@ fn closest_in_ring(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, Cl
     best.map(|(point, anchor)| (least, ClosestPoint { point: origin + point, anchor }))
 }
 
-/// Barycentric coordinates of the point a·A + b·B of a triangle with corners at the origin, A and B.
+/// Barycentric coordinates of the point a·A + b·B of a triangle whose corners are the origin, A and B.
 #[derive(Clone, Copy, Debug)]
 struct Barycentric {
     a: f32,
@@ -74,7 +75,7 @@ struct Barycentric {
 }
 
 impl Barycentric {
-    /// Returns the corner with the largest barycentric coordinate: 0 for the origin, 1 for A, 2 for B.
+    /// Returns the number of the corner with the largest barycentric coordinate: 0 for the origin, 1 for A, 2 for B.
     fn nearest_corner(self) -> usize {
         let Self { a, b } = self;
         let rest = 1.0 - a - b;
@@ -122,8 +123,8 @@ fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Barycentric, bool) {
     (best.1, false)
 }
 
-/// Returns the parameter, in 0..=1, of the point of a segment closest to another point: `along` is the dot product of
-/// the offset of that point with the segment, `whole` the squared length of the segment.
+/// Returns the parameter, in 0..=1, of the point of a segment closest to a point p: `along` is the dot product of the
+/// segment with the offset of p from its start, `whole` the squared length of the segment.
 fn share(along: f32, whole: f32) -> f32 {
     if whole > 0.0 { (along / whole).clamp(0.0, 1.0) } else { 0.0 }
 }

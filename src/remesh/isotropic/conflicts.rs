@@ -4,8 +4,9 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeSet;
 
-/// The radius around intersections in which the surface is left unchanged, in units of the target edge. With a smaller
-/// one, edits next to the region cause intersections in the next run; a larger one needs more checked edits.
+/// The radius, in units of the target edge, around intersections in which the next run of remeshing leaves the surface
+/// unchanged. With a smaller one, edits next to the region cause intersections in that run; a larger one needs more
+/// checked edits.
 const REACH: f32 = 3.0;
 
 /// The set of vertices of the input surface near self-intersections found so far, which the next run leaves unchanged.
@@ -15,7 +16,7 @@ pub(super) struct ConflictMask<'a> {
 }
 
 impl<'a> ConflictMask<'a> {
-    /// Creates an empty set.
+    /// Creates an empty set of vertices of `surface`, the input of remeshing.
     pub fn new(surface: &'a Mesh) -> Self {
         Self { surface, marked: vec![false; surface.slots()] }
     }

@@ -1,18 +1,20 @@
-//! The distance of a vertex from the triangles that replace its one-ring after a move or collapse.
+//! The distance of a vertex from the triangles that replace its one-ring after a move or collapse, by which remeshing
+//! limits its deviation from the input surface.
 
 use crate::math::{Vec3, triangle};
 use smallvec::SmallVec;
 
-/// The squared cosine of the largest angle to the mean normal at which the triangles count as flat. They then cover the
-/// old ones, and the largest distance of `from` from their planes is at least its distance from the triangles.
+/// The squared cosine of the largest angle to the mean normal at which the triangles of a fan count as flat. They then
+/// cover the old ones, and the largest distance of `from` from their planes is at least its distance from the
+/// triangles.
 const FLAT: f32 = 0.5;
 
-/// The triangles around `to` that replace those around `from` in a move or collapse, for the distance of `from` from
-/// them.
+/// The triangles around `to` that replace those around `from` when a vertex is moved or collapsed, for measuring the
+/// distance of `from` from them.
 pub(super) struct Fan {
     from: Vec3,
     to: Vec3,
-    /// The other two corners of each triangle, and its normal.
+    /// The two corners of each triangle other than `to`, and its normal, whose length is twice the area.
     sides: SmallVec<[(Vec3, Vec3, Vec3); 12]>,
     sum: Vec3,
 }
@@ -22,7 +24,7 @@ impl Fan {
         Self { from, to, sides: SmallVec::new(), sum: Vec3::ZERO }
     }
 
-    /// Adds the triangle of `to`, `a` and `b`; returns its normal, whose length is twice the area.
+    /// Adds the triangle `to`, `a`, `b`; returns its normal, whose length is twice the area.
     pub fn push(&mut self, a: Vec3, b: Vec3) -> Vec3 {
         let normal = (a - self.to).cross(b - self.to);
         self.sides.push((a, b, normal));
@@ -30,7 +32,7 @@ impl Fan {
         normal
     }
 
-    /// Returns the distance of `from` from the triangles, or, if they are nearly flat, an upper bound.
+    /// Returns the distance of `from` from the triangles, or an upper bound of it if they are nearly flat.
     pub fn gap(&self) -> f32 {
         let (sum, squared) = (self.sum, self.sum.length_squared());
         let mut most = 0.0;

@@ -10,19 +10,19 @@ use crate::remesh::{Changes, EdgeBounds, EditPolicy};
 /// The squared sine of 33°: triangles with a smaller angle are improved.
 const POOR: f32 = 0.2966;
 
-/// The largest number of passes over all poor triangles; most improvements are made in three.
+/// The largest number of passes over all vertices with an angle below 33°; most improvements are made in three.
 const ROUNDS: usize = 6;
 
-/// Step lengths tried in turn, as fractions of the target edge.
+/// Lengths of the steps by which a vertex is moved, tried in turn, as fractions of the target edge.
 const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
-/// The largest number of steps that a vertex makes in one attempt.
+/// The largest number of steps by which a vertex is moved in one attempt to improve its angles.
 const MOVES: usize = 4;
 
 /// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
 const MAX_VALENCE: usize = 10;
 
-/// Improves angles below 33° by edits that keep edges within bounds or bring them nearer to them; returns the changes
-/// made.
+/// Improves triangle angles below 33° by flips, collapses and moves that keep edge lengths within bounds or bring them
+/// nearer to them; returns the numbers of edits.
 pub(super) fn improve_angles<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -54,7 +54,7 @@ pub(super) fn improve_angles<E: EditPolicy>(
 }
 
 /// Tries to improve the angles at `v` below 33°: by flips, then by a collapse of `v`, then by moves of it; `ring`
-/// contains its neighbours before the edits. Returns the changes made, without moves.
+/// contains its neighbours before the edits. Returns the numbers of edits; moves are not counted.
 fn improve_around<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -80,7 +80,7 @@ fn improve_around<E: EditPolicy>(
     changes
 }
 
-/// Flips an edge if the smallest angle of its two triangles is below 33° and increases, and the flip is allowed;
+/// Flips the edge `uv` if the smallest angle of its two triangles is below 33° and increases, and the flip is allowed;
 /// returns whether it was flipped.
 fn flip<E: EditPolicy>(
     mesh: &mut Mesh,
@@ -107,7 +107,7 @@ fn flip<E: EditPolicy>(
 }
 
 /// Collapses `removed` into `kept` if that is allowed and gives all remaining triangles of `removed` a better
-/// [`angle_quality`] than `now`, the lowest around it; returns whether it was collapsed.
+/// [`angle_quality`] than `now`, the lowest around `removed`; returns whether it was collapsed.
 fn collapse<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,

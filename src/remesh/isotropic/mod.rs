@@ -28,17 +28,18 @@ use min_angle::improve_angles;
 use relax::relax;
 use session::Session;
 
-/// The largest number of rounds of restructuring. One fewer leaves twice as many poor angles for the final
-/// optimisation; more cost more than they save.
+/// The largest number of rounds of restructuring in a run. One fewer leaves twice as many angles below 33° for the
+/// final optimisation; more cost more time than they save there.
 const ROUNDS: usize = 5;
-/// The largest number of relaxation sweeps after each round; for one fewer or more, the same holds as for [`ROUNDS`].
+/// The largest number of relaxation sweeps after each round of restructuring. One fewer leaves twice as many angles
+/// below 33° for the final optimisation; more cost more time than they save there.
 const SWEEPS: usize = 2;
 
-/// The ratio of the longest to the shortest edge allowed in rounds, by Botsch & Kobbelt: triangles with such edges have
-/// no angle below 33°. With a smaller ratio, halves of long edges are too short. To reach it, the requested bounds are
-/// narrowed.
+/// The ratio of the longest to the shortest edge allowed in rounds of restructuring, by Botsch & Kobbelt: triangles
+/// with such edges have no angle below 33°. With a smaller ratio, halves of long edges are too short. To reach it, the
+/// requested bounds are narrowed.
 const INNER_RATIO: f32 = 5.0 / 3.0;
-/// The largest factor by which each of the requested bounds is narrowed in rounds.
+/// The largest factor by which each of the requested bounds of edge lengths is narrowed in rounds of restructuring.
 const MAX_NARROWING: f32 = 1.2;
 
 /// The largest number of runs with unchecked edits. Usually the second one has no intersections; if all have, a last
@@ -78,10 +79,12 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     Ok(changes)
 }
 
-/// The largest exponent of two by which lengths can be multiplied and divided without leaving the range of `f32`.
+/// The largest exponent of two by which lengths are scaled before remeshing and back afterwards, so that both factors
+/// are in the range of `f32`.
 const EXPONENTS: i32 = 120;
 
-/// Remeshes with unchecked edits, then with checked ones where needed.
+/// Remeshes a mesh that was scaled to edges of about 1: with unchecked edits, then with checked ones where these caused
+/// self-intersections. Returns the changes made.
 fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
     let surface = mesh.clone();
     let target_edge = (bounds.min * bounds.max).sqrt();
@@ -137,14 +140,16 @@ fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Sess
     changes
 }
 
-/// Brings the last edges within the requested bounds, and improves angles below 33°; returns the changes made.
+/// Brings edges that are still out of the requested bounds within them, and improves angles below 33°; returns the
+/// changes made.
 fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = pass(mesh, bounds, session);
     changes += improve_angles(mesh, bounds, session);
     changes
 }
 
-/// Does one round of restructuring as [`restructure`](super::restructure()) does, with at most eight million vertices.
+/// Makes one round of collapses, splits and flips as [`restructure`](super::restructure()) does, with at most eight
+/// million vertices; returns the changes made.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
     changes += split_long(mesh, bounds, MAX_VERTICES, session);
@@ -152,8 +157,8 @@ fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Sessio
     changes
 }
 
-/// Returns the bounds used in rounds, a little narrower than the requested ones, so that moves leave few edges out of
-/// bounds.
+/// Returns the bounds of edge lengths used in rounds of restructuring, a little narrower than the requested ones, so
+/// that moves leave few edges out of bounds.
 fn inner_bounds(EdgeBounds { min, max }: EdgeBounds) -> EdgeBounds {
     let margin = (max / min / INNER_RATIO).sqrt();
     let margin = if margin < MAX_NARROWING { margin } else { MAX_NARROWING };

@@ -7,21 +7,21 @@ use crate::mesh::{Mesh, VertexId};
 use crate::remesh::restructure::faces_alike;
 use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The weight of missing the wanted displacement, relative to leaving the planes of the triangles. Higher values wear off
-/// sharp edges; with lower ones, vertices on curved regions hardly move.
+/// The weight of missing the wanted displacement, relative to leaving the planes of the triangles, when a displacement
+/// is made tangential. Higher values wear off sharp edges; with lower ones, vertices on curved regions hardly move.
 const SLACK: f32 = 0.04;
 
 /// The one-ring of a vertex as needed for moves along the surface: its centroid and a tangential projection.
 pub(super) struct OneRing {
     /// The vector from the vertex to the area-weighted centroid of its triangles.
     pub to_centroid: Vec3,
-    /// Reduces displacements to their tangential part when applied twice: onto the plane of a flat one-ring, onto the
-    /// line of a sharp edge, and to nearly 0 at a corner.
+    /// The matrix that, applied twice, reduces a displacement to its tangential part: onto the plane of a flat
+    /// one-ring, onto the line of a sharp edge, and to nearly 0 at a corner.
     along: Mat3,
 }
 
 impl OneRing {
-    /// Computes the one-ring of `v`; `None` if it has no area.
+    /// Computes centroid and tangential projection of the one-ring of `v`; `None` if it has no area.
     pub fn of(mesh: &Mesh, v: VertexId) -> Option<Self> {
         let p = mesh.position(v);
         let (mut area, mut sum) = (0.0, Vec3::ZERO);
@@ -48,13 +48,14 @@ impl OneRing {
         Some(Self { to_centroid: sum / (3.0 * area), along: stiff.inverse() })
     }
 
-    /// Returns approximately the tangential component of a displacement.
+    /// Returns approximately the component of a displacement of the vertex that is tangential to the surface.
     pub fn along(&self, displacement: Vec3) -> Vec3 {
         self.along * (self.along * displacement)
     }
 }
 
-/// Returns the squared sine of the smallest angle of a triangle; 0 if it has no area.
+/// Returns the squared sine of the smallest angle of a triangle, the quality that minimum-angle optimisation increases;
+/// 0 if it has no area.
 pub(super) fn angle_quality(corners: [Vec3; 3]) -> f32 {
     let [part, whole] = angle_quality_fraction(corners);
     if whole > 0.0 { part / whole } else { 0.0 }
@@ -90,9 +91,9 @@ pub(super) struct Move {
     pub deviation: f32,
 }
 
-/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn by 78° or more,
-/// or face inwards as it did not before, an edge leave its bounds or get further out of them, or the surface deviate
-/// too far.
+/// Returns the angles and the deviation that a move of `v` to `position` would give, without moving it; `None` if a
+/// triangle would turn by 78° or more, or face inwards as it did not before, an edge leave its bounds or get further
+/// out of them, or the surface deviate too far from the input.
 pub(super) fn moved<E: EditPolicy>(
     mesh: &Mesh,
     v: VertexId,
@@ -122,7 +123,8 @@ pub(super) fn moved<E: EditPolicy>(
     Some(Move { least_quality, deviation: session.deviation_after(v, fan.gap())? })
 }
 
-/// Returns whether an edge whose new length is out of bounds was within or nearer to them before; lengths are squared.
+/// Returns whether an edge whose length `new` is out of bounds was within them or nearer to them at its length `old`;
+/// lengths are squared, `shortest` is the lower bound.
 fn leaves(new: f32, old: f32, shortest: f32) -> bool {
     if new < shortest { new < old } else { new > old }
 }

@@ -6,14 +6,16 @@ use super::session::Session;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The squared sine of 35°: a move may reduce the smallest angle around a vertex if that stays above it.
+/// The squared sine of 35°: relaxation may reduce the smallest angle around a vertex if it stays above this.
 const GOOD: f32 = 0.329;
 
-/// The shortest step that a vertex makes, as a fraction of the target edge; with a higher value angles stay smaller.
+/// The shortest displacement that relaxation gives a vertex, as a fraction of the target edge; with a higher value
+/// angles stay smaller.
 const SHORTEST_STEP: f32 = 0.02;
 
-/// Moves each free vertex once along the surface to the centroid of its triangles, one after the other, unless the step
-/// is too short, is rejected by [`moved`] or makes a poor angle poorer; returns the number of vertices moved.
+/// Relaxes each vertex in a region that may be edited: moves it along the surface to the centroid of its triangles, one
+/// vertex after the other, unless the step is too short, is rejected by [`moved`] or makes a poor angle poorer. Returns
+/// the number of vertices moved.
 pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
     let mut moves = 0;
     let shortest = SHORTEST_STEP * session.target_edge();

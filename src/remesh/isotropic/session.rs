@@ -11,22 +11,25 @@ use crate::remesh::EditPolicy;
 /// the target edge. Higher values shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces
 /// stay out of bounds.
 const MAX_DEVIATION: f32 = 0.25;
-/// The largest distance between the old and the new edge of a flip, as a fraction of the target edge.
+/// The largest distance between the old and the new edge of a flip, as a fraction of the target edge, so that flips
+/// keep the shape.
 const FLIP_DEPTH: f32 = 0.15;
 
 /// State of a remeshing run, and the [`EditPolicy`] that keeps the mesh close to the input surface.
 pub(super) struct Session<'a, E> {
-    /// The input surface.
+    /// The input surface of remeshing.
     pub surface: &'a Mesh,
     /// Unit vertex normals of the input surface, by its slots.
     normals: Vec<Vec3>,
-    /// A nearby vertex of the input surface for each vertex, by slot.
+    /// For each vertex of the remeshed mesh, by its slots: a nearby vertex of the input surface, where walks to closest
+    /// points start.
     anchors: Vec<VertexId>,
-    /// Whether edits other than splits are allowed near a vertex of the input surface, by its slots.
+    /// For each vertex of the input surface, by its slots: whether edits other than splits are allowed near it.
     free: Vec<bool>,
-    /// An upper bound of the deviation from the input surface at each vertex, by slot.
+    /// For each vertex of the remeshed mesh, by its slots: an upper bound of its deviation from the input surface.
     deviation: Vec<f32>,
-    /// The deviation at the remaining vertex after the last collapse passed to `may_collapse`.
+    /// The deviation from the input surface at the remaining vertex after the last collapse passed to `may_collapse`;
+    /// stored once the collapse is made.
     pending_deviation: f32,
     target_edge: f32,
     edits: E,
@@ -57,17 +60,17 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         Session { surface, normals, free, anchors, deviation, pending_deviation, target_edge, edits }
     }
 
-    /// Returns the anchor of `v`: a nearby vertex of the input surface.
+    /// Returns the anchor of `v`: a nearby vertex of the input surface, where walks to closest points start.
     pub fn anchor(&self, v: VertexId) -> VertexId {
         self.anchors[v.index()]
     }
 
-    /// Returns whether `v` may be moved and its edges collapsed and flipped.
+    /// Returns whether `v` is in a region where vertices may be moved, collapsed and flipped.
     pub fn is_free(&self, v: VertexId) -> bool {
         self.free[self.anchors[v.index()].index()]
     }
 
-    /// Returns the target edge length.
+    /// Returns the edge length at which remeshing aims, in units of the mesh.
     pub fn target_edge(&self) -> f32 {
         self.target_edge
     }
@@ -77,15 +80,15 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         closest_point(self.surface, self.anchors[v.index()], p)
     }
 
-    /// Returns whether a triangle with these corners and this normal faces out of the input surface: the normal is
-    /// within 90° of that of the input surface near at least one corner.
+    /// Returns whether a triangle of the remeshed mesh with these corners and this normal faces out of the input
+    /// surface: the normal is within 90° of that of the input surface near at least one corner.
     pub fn faces_outwards(&self, corners: [VertexId; 3], normal: Vec3) -> bool {
         let [u, v, w] = corners.map(|corner| self.normals[self.anchors[corner.index()].index()]);
         normal.dot(u) > 0.0 || normal.dot(v) > 0.0 || normal.dot(w) > 0.0
     }
 
-    /// Moves `v` to a point of the input surface and stores its new deviation, if the policy allows it; returns whether
-    /// it was moved.
+    /// Moves `v` to a point of the input surface and stores `deviation`, its accumulated deviation after the move, if
+    /// the edit policy allows the move; returns whether `v` was moved.
     pub fn move_to(&mut self, mesh: &mut Mesh, v: VertexId, closest: ClosestPoint, deviation: f32) -> bool {
         let moved = self.edits.attempt(mesh, |mesh| {
             mesh.set_position(v, closest.point);
@@ -98,8 +101,8 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         moved.is_ok()
     }
 
-    /// Returns the distance of `removed`, or an upper bound, from the surface after its collapse into `kept`; `None` if
-    /// a triangle would not face outwards.
+    /// Returns the distance of the vertex `removed` from the surface that remains after its collapse into `kept`, or an
+    /// upper bound of it; `None` if a triangle would not face out of the input surface.
     fn gap_without(&self, mesh: &Mesh, kept: VertexId, removed: VertexId) -> Option<f32> {
         let mut fan = Fan::new(mesh.position(removed), mesh.position(kept));
         for (a, b) in mesh.ring(removed).pairs().filter(|&(a, b)| a != kept && b != kept) {
@@ -110,14 +113,15 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         Some(fan.gap())
     }
 
-    /// Returns the accumulated deviation at `v` increased by `gap`; `None` if it exceeds [`MAX_DEVIATION`].
+    /// Returns the accumulated deviation of `v` from the input surface, increased by `gap`; `None` if it exceeds
+    /// [`MAX_DEVIATION`].
     pub fn deviation_after(&self, v: VertexId, gap: f32) -> Option<f32> {
         let deviation = self.deviation[v.index()] + gap;
         (deviation <= MAX_DEVIATION * self.target_edge).then_some(deviation)
     }
 
-    /// Renumbers the mesh so that vertices near each other on its surface are near in memory, together with the arrays
-    /// by slot.
+    /// Renumbers the mesh so that vertices near each other on its surface are near in memory, and the arrays of the
+    /// session that are indexed by its slots with it.
     pub fn reorder(&mut self, mesh: &mut Mesh) {
         let new_ids = mesh.reorder();
         let (mut anchors, mut deviation) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);
@@ -175,7 +179,7 @@ impl<E: EditPolicy> EditPolicy for Session<'_, E> {
     }
 }
 
-/// Returns unit vertex normals by slot; zero at vertices without area.
+/// Returns the unit vertex normals of a mesh, by slot; zero at vertices without area.
 fn unit_normals(surface: &Mesh) -> Vec<Vec3> {
     (0..surface.slots())
         .map(|slot| surface.area_normal(VertexId::from_index(slot)).normalize_or_zero())

@@ -1,8 +1,10 @@
-//! A batch of points whose function values are needed next, evaluated in parts within a budget.
+//! A batch of points at which the surface extractor needs values of its function next, evaluated in parts so that each
+//! slice of work keeps to its budget.
 
 use crate::math::DVec3;
 
-/// Points to be evaluated, and the function values of those evaluated so far, from the first on.
+/// Points at which the surface extractor's function is to be evaluated, and the values at the first of them, evaluated
+/// so far.
 #[derive(Default)]
 pub(super) struct Batch {
     points: Vec<DVec3>,
@@ -15,7 +17,7 @@ impl Batch {
         self.values.clear();
     }
 
-    /// Appends points, in an order in which neighbouring points are adjacent.
+    /// Appends points, in an order in which points near each other in space follow each other.
     pub fn extend(&mut self, points: impl IntoIterator<Item = DVec3>) {
         self.points.extend(points);
     }

@@ -1,32 +1,32 @@
-//! Sparse storage of values at the nodes of a large lattice, in blocks of 8 × 8 × 8 that are allocated on demand.
+//! Sparse storage of function values at the nodes of the surface extractor's lattice, in blocks of 8 × 8 × 8 that are
+//! allocated on demand.
 //!
 //! The lattice is padded by one layer of outside nodes, so node (i, j, k) of the lattice is node (i + 1, j + 1, k + 1)
-//! here. A cell is identified by its corner of lowest coordinates. A slot is the index of a node, or of the cell that
-//! starts there, in the allocated blocks.
+//! in this module. A cell is identified by its corner of lowest coordinates. A slot is the index of a node, or of the
+//! cell that starts there, in the allocated blocks.
 
 use super::super::cube_cases::corner;
 use super::super::error::{VolumeError, reserve};
 
-/// The indices of a node of the padded lattice.
+/// The indices along x, y and z of a node of the padded lattice.
 pub(super) type Node = [usize; 3];
 
-/// Nodes along the side of a block. If it is smaller, the table of blocks grows; if larger, more of each block lies off
-/// the surface.
+/// Number of nodes along the side of a block of the sparse lattice storage. If it is smaller, the table of blocks
+/// grows; if larger, more of each block lies off the surface.
 const SIDE: usize = 8;
-/// Number of nodes in a block.
 const BLOCK: usize = SIDE * SIDE * SIDE;
-/// Largest number of blocks: three vertices per node still have distinct `u32` indices.
+/// Largest number of allocated blocks: up to it, three vertices per node (one per edge) have distinct `u32` indices.
 const MAX_BLOCKS: usize = u32::MAX as usize / (3 * BLOCK);
 
-/// Marks a node whose block is not allocated (as a slot), and a table entry without a block.
+/// Slot of a node whose block is not allocated, and entry in the table of blocks where there is none.
 pub(super) const ABSENT: u32 = u32::MAX;
 
-/// Value of a node that has not been evaluated.
+/// Stored value of a node at which the function has not been evaluated.
 const UNKNOWN: f64 = f64::NAN;
-/// Value of a node in the padding, and of one where the function is NaN.
+/// Stored value of a node in the padding, and of one at which the function is NaN: both are outside the surface.
 const OUTSIDE: f64 = f64::NEG_INFINITY;
 
-/// Returns whether a node with this value is inside the surface: 0 and above is.
+/// Returns whether a node with this function value is inside the surface, which values of 0 and above are.
 pub(super) fn is_inside(value: f64) -> bool {
     value >= 0.0
 }
@@ -36,13 +36,13 @@ pub(super) fn nan_to_outside(value: f64) -> f64 {
     if value.is_nan() { OUTSIDE } else { value }
 }
 
-/// Returns the next node along an axis.
+/// Returns the node after `node` along an axis.
 pub(super) fn next(mut node: Node, axis: usize) -> Node {
     node[axis] += 1;
     node
 }
 
-/// Returns the offset of a cell's corner, numbered as in [`corner`].
+/// Returns the offset of a cell's corner from the cell's first node; the inverse of [`corner`].
 fn corner_offset(number: usize) -> [usize; 3] {
     [number >> 2 & 1, number & 1, number >> 1 & 1]
 }
@@ -53,15 +53,15 @@ fn local(node: Node) -> usize {
     (z * SIDE + y) * SIDE + x
 }
 
-/// Sparse block storage of node values and of marks for visited cells.
+/// Sparse block storage of function values at lattice nodes, and of marks for the cells that the flood has visited.
 pub(super) struct Blocks {
     /// Number of nodes of the padded lattice along each axis.
     nodes: [usize; 3],
     /// Number of blocks that cover the padded lattice, along each axis.
     dims: [usize; 3],
-    /// Index of the block at each block position, x fastest, then y, z, or [`ABSENT`].
+    /// Index of the allocated block at each block position, x fastest, then y, z; [`ABSENT`] where none is allocated.
     table: Vec<u32>,
-    /// The first node of each block.
+    /// Node of lowest coordinates of each allocated block.
     origins: Vec<[u16; 3]>,
     values: Vec<f64>,
     /// One bit per cell: whether the flood has visited or queued it.
@@ -79,7 +79,7 @@ impl Blocks {
         Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), visited: Vec::new() })
     }
 
-    /// Returns the size of the stored data in bytes, without spare capacity.
+    /// Returns the size of the stored values, marks and tables in bytes, without spare capacity.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.table[..])
             + size_of_val(&self.origins[..])
@@ -87,7 +87,7 @@ impl Blocks {
             + size_of_val(&self.visited[..])
     }
 
-    /// Returns the number of slots: 512 for each allocated block.
+    /// Returns the number of slots, one per node of the allocated blocks: 512 for each block.
     pub fn slots(&self) -> usize {
         self.values.len()
     }
@@ -97,7 +97,7 @@ impl Blocks {
         self.nodes.map(|n| n - 1)
     }
 
-    /// Returns whether a node belongs to the padding.
+    /// Returns whether a node belongs to the padding, the layer of outside nodes around the lattice.
     pub fn is_padding(&self, node: Node) -> bool {
         (0..3).any(|k| node[k] == 0 || node[k] + 1 >= self.nodes[k])
     }
@@ -107,7 +107,7 @@ impl Blocks {
         (z * self.dims[1] + y) * self.dims[0] + x
     }
 
-    /// Returns the slot of a node, [`ABSENT`] if its block is not allocated.
+    /// Returns the slot of a node, its index in the allocated blocks; [`ABSENT`] if its block is not allocated.
     pub fn slot(&self, node: Node) -> u32 {
         match self.table[self.block_position(node)] {
             ABSENT => ABSENT,
@@ -115,20 +115,21 @@ impl Blocks {
         }
     }
 
-    /// Returns the node of a slot.
+    /// Returns the node of a slot; the inverse of [`Self::slot`].
     pub fn node(&self, slot: u32) -> Node {
         let (block, local) = (slot as usize / BLOCK, slot as usize % BLOCK);
         let [x, y, z] = self.origins[block].map(usize::from);
         [x + local % SIDE, y + local / SIDE % SIDE, z + local / (SIDE * SIDE)]
     }
 
-    /// Returns a sort key that orders slots by block position, then node, independent of the order of allocation.
+    /// Returns a sort key that orders slots (indices of nodes in the storage) by block position, then node, so that
+    /// results do not depend on the order of allocation.
     pub fn rank(&self, slot: u32) -> u64 {
         let position = self.block_position(self.node(slot)) as u64;
         position * BLOCK as u64 + u64::from(slot) % BLOCK as u64
     }
 
-    /// Returns the slot of a node, allocating its block if necessary.
+    /// Returns the slot of a node (its index in the storage), allocating its block if necessary.
     pub fn open(&mut self, node: Node) -> Result<u32, VolumeError> {
         if self.slot(node) == ABSENT {
             self.make_block(node)?;
@@ -136,7 +137,7 @@ impl Blocks {
         Ok(self.slot(node))
     }
 
-    /// Allocates the blocks of all corners of a cell.
+    /// Allocates the blocks that contain the corners of a cell, given by the slot of its first node.
     pub fn open_corners(&mut self, cell: u32) -> Result<(), VolumeError> {
         let node = self.node(cell);
         if node.iter().any(|k| k % SIDE == SIDE - 1) {
@@ -166,7 +167,8 @@ impl Blocks {
         Ok(())
     }
 
-    /// Returns the slots of a cell's corners, numbered as in [`corner`]; [`ABSENT`] if a block is not allocated.
+    /// Returns the slots of a cell's eight corners, numbered as in [`corner`]; [`ABSENT`] for a corner whose block is
+    /// not allocated.
     pub fn corners(&self, cell: u32) -> [u32; 8] {
         let first = cell as usize % BLOCK;
         let at_border = [first % SIDE, first / SIDE % SIDE, first / (SIDE * SIDE)].contains(&(SIDE - 1));
@@ -177,28 +179,29 @@ impl Blocks {
         std::array::from_fn(|number| cell + local(corner_offset(number)) as u32)
     }
 
-    /// Returns the value at a node; NaN if it is unknown.
+    /// Returns the function value at the node with this slot; NaN if it has not been evaluated.
     pub fn value(&self, slot: u32) -> f64 {
         self.values.get(slot as usize).copied().unwrap_or(UNKNOWN)
     }
 
-    /// Returns whether the value at a node has not been evaluated.
+    /// Returns whether the function has not been evaluated at the node with this slot.
     pub fn is_unknown(&self, slot: u32) -> bool {
         self.value(slot).is_nan()
     }
 
-    /// Sets the value at a node; NaN is stored as [`OUTSIDE`].
+    /// Stores the function value at the node with this slot; NaN is stored as [`OUTSIDE`].
     pub fn set(&mut self, slot: u32, value: f64) {
         self.values[slot as usize] = nan_to_outside(value);
     }
 
-    /// Returns the marching cubes case of a cell, one bit per inside corner. Unknown corners count as outside.
+    /// Returns the marching cubes case of a cell, one bit per inside corner. Corners that have not been evaluated count
+    /// as outside.
     pub fn case(&self, cell: u32) -> u8 {
         let corners = self.corners(cell).into_iter().enumerate();
         corners.fold(0, |case, (number, slot)| case | u8::from(is_inside(self.value(slot))) << number)
     }
 
-    /// Marks a cell as visited; returns false if it was marked already.
+    /// Marks a cell as visited by the flood; returns false if it was marked already.
     pub fn mark_visited(&mut self, cell: u32) -> bool {
         let (word, bit) = (&mut self.visited[cell as usize / 64], 1 << (cell % 64));
         let is_new = *word & bit == 0;
@@ -206,16 +209,17 @@ impl Blocks {
         is_new
     }
 
-    /// Returns whether a cell is marked as visited.
+    /// Returns whether a cell is marked as visited by the flood.
     pub fn is_visited(&self, cell: u32) -> bool {
         self.visited.get(cell as usize / 64).is_some_and(|word| word >> (cell % 64) & 1 == 1)
     }
 
-    /// Returns whether the surface found so far crosses a straight lattice line an odd number of times; valid when the
-    /// flood's queue is empty. The line runs from `from` along `axis` up to coordinate `to`.
+    /// Returns whether the surface found so far crosses a straight lattice line an odd number of times, from which the
+    /// scan infers missing components; valid when the flood's queue is empty. The line runs from node `from` along
+    /// `axis` up to coordinate `to`.
     ///
-    /// The four cells around a cut edge are connected through its faces, so it suffices to test the one that starts
-    /// there.
+    /// The four cells around a cut edge are connected through the faces at that edge, so the flood visits all of them
+    /// or none, and it suffices to test the one that starts where the edge starts.
     pub fn crosses_oddly(&self, from: Node, axis: usize, to: usize) -> bool {
         let mut odd = false;
         let mut node = from;
@@ -235,7 +239,7 @@ impl Blocks {
     }
 }
 
-/// Returns a corner of the cell that starts at a node.
+/// Returns the node at corner `number` of the cell that starts at `node`.
 fn at_corner(node: Node, number: usize) -> Node {
     let offset = corner_offset(number);
     debug_assert_eq!(corner(offset), number);

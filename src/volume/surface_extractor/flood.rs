@@ -1,4 +1,5 @@
-//! The flood: a breadth-first traversal from the cells of the seeds through all cells that the surface crosses.
+//! The flood of the surface extractor: a breadth-first traversal from the cells of the seeds through all cells that the
+//! surface crosses.
 //!
 //! It proceeds in waves. The corners of all queued cells are evaluated; each cell that the surface crosses is stored,
 //! and its neighbours across the crossed faces are queued. When the queue is empty, the 26 neighbours of seed cells are
@@ -9,11 +10,12 @@ use super::Lattice;
 use super::batch::Batch;
 use super::blocks::{ABSENT, Blocks, Node};
 
-/// The six faces of a cell: axis, whether it is the far face, and its corners as a mask of case bits.
+/// The six faces of a cell: axis, whether it is the far face along it, and the face's corners as a mask of the bits of
+/// a marching cubes case.
 const FACES: [(usize, bool, u8); 6] =
     [(0, false, 0x0F), (0, true, 0xF0), (1, false, 0x55), (1, true, 0xAA), (2, false, 0x33), (2, true, 0xCC)];
 
-/// A cell that the surface crosses, with its marching cubes case.
+/// A cell of the lattice that the surface crosses, with its marching cubes case.
 #[derive(Clone, Copy)]
 pub(super) struct CrossedCell {
     pub slot: u32,
@@ -21,30 +23,33 @@ pub(super) struct CrossedCell {
     pub case: u8,
 }
 
-/// State of the flood: the crossed cells found so far and the cells to visit next.
+/// State of the flood, which follows the surface from cell to cell: the crossed cells found so far and the cells to
+/// visit next. Cells are processed in waves, so that the function is evaluated for many at a time.
 #[derive(Default)]
 pub(super) struct Flood {
-    /// Cells of seeds added since the last wave.
+    /// Cells of seeds that have not been queued yet.
     seeds: Vec<Node>,
-    /// Visited cells of seeds whose neighbours are queued, too, if the queue ends before a surface is found near them.
+    /// Queued cells of seeds. If the queue runs empty before a surface is found in or next to one, its neighbours are
+    /// queued, too.
     unresolved_seeds: Vec<u32>,
-    /// Cells to visit in the next wave.
+    /// Slots of the cells to visit in the next wave.
     queue: Vec<u32>,
-    /// Unprocessed cells of the current wave.
+    /// Slots of the cells of the current wave that have not been processed yet.
     wave: Vec<u32>,
-    /// Slots of the nodes evaluated for the current wave.
+    /// Slots of the nodes that are evaluated for the current wave: the corners of its cells without a value.
     requested: Vec<u32>,
     /// All crossed cells found so far, in the order of discovery.
     pub crossed: Vec<CrossedCell>,
 }
 
 impl Flood {
-    /// Adds a seed cell; its neighbours are visited, too, if no surface is found in or next to it.
+    /// Adds the cell of a seed, in which the flood starts; its neighbours are visited, too, if no surface is found in
+    /// or next to it.
     pub fn seed(&mut self, cell: Node) {
         self.seeds.push(cell);
     }
 
-    /// Queues a cell unless it was visited or queued before; returns whether it was queued.
+    /// Queues a cell unless the flood visited or queued it before; returns whether it was queued.
     pub fn visit(&mut self, cell: Node, blocks: &mut Blocks) -> Result<bool, VolumeError> {
         let slot = blocks.open(cell)?;
         let is_new = blocks.mark_visited(slot);
@@ -54,8 +59,8 @@ impl Flood {
         Ok(is_new)
     }
 
-    /// Fills `batch` with the corners of the cells of the next wave that are not evaluated yet, which may be none;
-    /// returns false if no cell is left.
+    /// Starts the next wave and fills `batch` with the corners of its cells that are not evaluated yet, which may be
+    /// none; returns false if no cell is left to visit.
     pub fn request(
         &mut self,
         blocks: &mut Blocks,
@@ -81,8 +86,8 @@ impl Flood {
         Ok(!self.wave.is_empty())
     }
 
-    /// Stores the values of the wave, records its crossed cells and queues the next wave. Can be called again after an
-    /// error.
+    /// Stores the function values requested for the current wave, records its crossed cells and queues their neighbours
+    /// for the next wave. Can be called again after an error.
     pub fn store_values(&mut self, values: &[f64], blocks: &mut Blocks) -> Result<(), VolumeError> {
         for (&slot, &value) in self.requested.iter().zip(values) {
             blocks.set(slot, value);
@@ -99,8 +104,8 @@ impl Flood {
         Ok(())
     }
 
-    /// Queues the neighbours of a cell across the faces that the surface crosses. They always exist: the outermost
-    /// nodes of the padded lattice are outside.
+    /// Queues the neighbours of a cell across the faces that the surface crosses. These neighbours always exist: the
+    /// outermost nodes of the padded lattice are outside.
     fn cross_faces(&mut self, slot: u32, case: u8, blocks: &mut Blocks) -> Result<(), VolumeError> {
         let cell = blocks.node(slot);
         for (axis, is_far, mask) in FACES {
@@ -114,7 +119,6 @@ impl Flood {
         Ok(())
     }
 
-    /// Queues the cells of new seeds.
     fn queue_seeds(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
         while let Some(&cell) = self.seeds.last() {
             self.visit(cell, blocks)?;
@@ -144,7 +148,7 @@ fn is_crossed(cell: Node, blocks: &Blocks) -> bool {
     slot != ABSENT && blocks.is_visited(slot) && !matches!(blocks.case(slot), 0 | 255)
 }
 
-/// Returns a cell and its neighbours within the padded lattice, up to 27 cells.
+/// Returns a cell and its neighbours across faces, edges and corners within the padded lattice, up to 27 cells.
 fn around(cell: u32, blocks: &Blocks) -> Vec<Node> {
     let (cell, cells) = (blocks.node(cell), blocks.cells());
     let step = |k: usize, by: usize| (cell[k] + by).checked_sub(1).filter(|&at| at < cells[k]);

@@ -1,10 +1,10 @@
 //! Surface-following marching cubes: extracts the zero set of an implicit function, evaluated only near the surface.
 //!
-//! For functions that are expensive and best evaluated for many points at a time. A [`SurfaceExtractor`] starts in the
-//! cells of its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse
-//! scan of the rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its
-//! lattice edge move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations,
-//! and the mesh found so far is available after each.
+//! Meant for functions that are expensive and best evaluated for many points at a time. A [`SurfaceExtractor`] starts
+//! in the cells of its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a
+//! coarse scan of the rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along
+//! its lattice edge move each vertex onto the surface (`root`). Work is done in slices of a given number of
+//! evaluations, and the mesh found so far is available after each slice.
 //!
 //! Guarantees: cubes are triangulated as by [`marching_cubes`](super::marching_cubes), values of 0 and above are
 //! inside, NaN and everything beyond the lattice are outside. So the mesh is closed, oriented, 2-manifold and free of
@@ -32,13 +32,15 @@ use flood::Flood;
 use scan::Scan;
 use surface::Surface;
 
-/// Largest number of nodes along an axis: the table of blocks of a cube of this size takes 68 MB, and of one twice as
-/// wide more than half a gigabyte.
+/// Largest number of lattice nodes along an axis: the table of blocks of a cubic lattice of this size takes 68 MB, and
+/// of one twice as wide more than half a gigabyte.
 const MAX_NODES: usize = 2048;
-/// Largest distance of the lattice from the world's origin, in edges: there, rounding to `f32` moves a vertex by 1/2048
-/// of an edge at most, and vertices keep 1/256 away from nodes. Much further away, vertices coincide.
+/// Largest distance of the lattice from the world's origin, in edge lengths of its cells: there, rounding to `f32`
+/// moves a vertex by 1/2048 of an edge at most, and vertices keep 1/256 of an edge away from nodes. Much further away,
+/// vertices coincide.
 const MAX_EDGES_AWAY: f64 = 8192.0;
-/// Smallest accepted edge length, in world units: far below it, `f32` cannot distinguish vertices.
+/// Smallest accepted edge length of the cells of a lattice, in world units: far below it, `f32` cannot distinguish
+/// vertices.
 const MIN_EDGE: f64 = 1e-30;
 
 /// A regular lattice of cubes in world space on which [`SurfaceExtractor`] extracts a surface. Node (i, j, k) is at
@@ -107,7 +109,7 @@ impl Lattice {
     }
 }
 
-/// The stage that requested the current batch of values.
+/// The stage of the extraction that requested the current batch of function values.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Task {
     Nothing,
@@ -140,11 +142,12 @@ pub struct SurfaceExtractor {
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Largest number of refinement steps of a vertex.
+    /// Largest number of refinement steps, each of which evaluates the function once per vertex to move it onto the
+    /// surface.
     refine_steps: usize,
-    /// Number of refinement steps performed.
+    /// Number of refinement steps performed so far.
     refine_steps_done: usize,
-    /// The surface during and after refinement; `None` before.
+    /// The surface during and after refinement; `None` before, when it is built from the crossed cells on demand.
     surface: Option<Surface>,
     batch: Batch,
     task: Task,
@@ -175,8 +178,8 @@ impl SurfaceExtractor {
         })
     }
 
-    /// Adds a seed on or near the surface: extraction starts in the cell that contains `p`. If the surface crosses
-    /// neither that cell nor one of its 26 neighbours that was reached from elsewhere, it starts in those 26.
+    /// Adds a seed, a point on or near the surface: extraction starts in the cell that contains `p`. If the surface is
+    /// then found neither in that cell nor in one of its 26 neighbours, it starts in these neighbours, too.
     ///
     /// Returns false, and adds nothing, if `p` is more than one edge outside the lattice or not finite.
     pub fn seed(&mut self, p: DVec3) -> bool {
@@ -185,9 +188,9 @@ impl SurfaceExtractor {
         cell.is_some()
     }
 
-    /// Requests a scan, after all seeds are followed, for components of the surface that contain no seed. It tests the
-    /// lattice lines between every `stride`-th node along each axis: components that cross a line an odd number of
-    /// times are found and extracted, too.
+    /// Requests a scan of the whole lattice, after the surface around all seeds is extracted, for components that
+    /// contain no seed. It tests the lattice lines between every `stride`-th node along each axis: components that
+    /// cross a line an odd number of times are found and extracted, too.
     ///
     /// # Errors
     /// A stride of 0; [`VolumeError::TooLarge`].
@@ -206,14 +209,15 @@ impl SurfaceExtractor {
     /// all components are extracted. Without it, a vertex is placed by linear interpolation between the values at the
     /// ends of its edge.
     ///
-    /// On a sphere of 45 edges radius the error falls from 3e-3 edges to 2e-7 by one step, which is the resolution of
-    /// `f32`, and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays 1/256 of an edge
-    /// away from nodes.
+    /// On a sphere of 45 edges radius the position error falls from 3e-3 edges to 2e-7 by one step, which is the
+    /// resolution of `f32`, and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays
+    /// 1/256 of an edge away from nodes.
     pub fn refine(&mut self, steps: usize) {
         self.refine_steps = steps;
     }
 
-    /// Continues with at most `budget` evaluations, but at least one; returns true when the extraction is complete.
+    /// Continues the extraction with at most `budget` function evaluations (0 counts as 1); returns true when the
+    /// extraction is complete.
     ///
     /// `f` receives world positions and writes a value for each: 0 and above is inside, NaN outside. It must return the
     /// same value at the same point, whatever the other points of the call.
@@ -241,7 +245,7 @@ impl SurfaceExtractor {
         }
     }
 
-    /// Passes the values of the batch to the stage that requested them; returns false if some are missing.
+    /// Passes the function values of the batch to the stage that requested them; returns false if some are missing.
     fn store_values(&mut self) -> Result<bool, VolumeError> {
         let Some(values) = self.batch.values() else { return Ok(false) };
         match self.task {
@@ -259,7 +263,8 @@ impl SurfaceExtractor {
         Ok(true)
     }
 
-    /// Selects the next stage and fills the batch for it: first the flood, then the scan, then refinement.
+    /// Selects the next stage and fills the batch with the points that it needs: first the flood, then the scan, then
+    /// refinement.
     fn next_task(&mut self) -> Result<Task, VolumeError> {
         let Self { lattice, blocks, flood, batch, .. } = self;
         if flood.request(blocks, lattice, batch)? {
@@ -280,7 +285,7 @@ impl SurfaceExtractor {
         Ok(if surface.request(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
     }
 
-    /// Discards the current batch if `task` requested it.
+    /// Discards the current batch of points if it was requested by `task`.
     fn discard_batch_of(&mut self, task: Task) {
         if self.task == task {
             self.batch.clear();
@@ -289,9 +294,9 @@ impl SurfaceExtractor {
     }
 
     /// Returns the surface extracted so far, in world space, triangles counter-clockwise seen from outside; vertices
-    /// and triangles are in spatial order. Closed half an edge beyond the lattice, as by
-    /// [`marching_cubes`](super::marching_cubes). Open where the flood has to continue; a vertex there may belong to no
-    /// triangle.
+    /// and triangles are in spatial order. The mesh is closed half an edge beyond the lattice, as by
+    /// [`marching_cubes`](super::marching_cubes), and open where the extraction has to continue; a vertex there may
+    /// belong to no triangle.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -299,7 +304,7 @@ impl SurfaceExtractor {
         self.with_surface(|surface| surface.mesh(&self.blocks, &self.lattice))
     }
 
-    /// Returns the vertices of [`Self::mesh`] before they are rounded to `f32`.
+    /// Returns the vertex positions of [`Self::mesh`] in world space, before they are rounded to `f32`.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -319,8 +324,9 @@ impl SurfaceExtractor {
         }
     }
 
-    /// Returns an estimate of the completed share of the work, from 0 to 1, for a progress bar; the number of remaining
-    /// waves is unknown until the last. 0 when nothing is pending.
+    /// Returns an estimate of the completed share of the work, from 0 to 1, for a progress bar; it is rough, since the
+    /// extent of the surface is unknown until all of it is found. 0 before the first call of [`Self::advance`] and
+    /// after the last.
     pub fn progress(&self) -> f64 {
         let share = self.batch.progress();
         let waves = f64::from(self.waves) + share;
@@ -338,18 +344,18 @@ impl SurfaceExtractor {
         self.scan.as_ref().map_or(0, |scan| scan.components_found)
     }
 
-    /// Returns the number of cells that the surface crosses, as found so far.
+    /// Returns the number of lattice cells found so far that the surface crosses.
     pub fn crossed_cells(&self) -> usize {
         self.flood.crossed.len()
     }
 
-    /// Returns the number of function evaluations so far.
+    /// Returns the number of function evaluations so far, the main cost of the extraction.
     pub fn evaluations(&self) -> usize {
         self.evaluations
     }
 
-    /// Returns the size of the lattice values in bytes: in proportion to the surface area, plus 4 for each block of 8³
-    /// nodes of the lattice.
+    /// Returns the memory of the function values at lattice nodes, in bytes: in proportion to the surface area, plus 4
+    /// bytes for each block of 8³ nodes of the lattice.
     pub fn bytes(&self) -> usize {
         self.blocks.bytes()
     }

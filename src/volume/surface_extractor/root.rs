@@ -1,15 +1,17 @@
-//! Root finding on a lattice edge: the zero of a function between an inside and an outside node.
+//! Root finding on a lattice edge, to place mesh vertices: the zero of a function between an inside and an outside
+//! node.
 
 use super::super::contour::MARGIN;
 use super::blocks::{is_inside, nan_to_outside};
 
-/// Convergence threshold, as a fraction of the edge: a smaller step is not worth an evaluation. Steps shrink so fast
-/// that the next one is far below the resolution of `f32` positions.
+/// Convergence threshold of root finding, as a fraction of the lattice edge: a smaller step is not worth an evaluation.
+/// Steps shrink so fast that the next one is far below the resolution of `f32` positions.
 const CONVERGED: f64 = 1e-6;
 
-/// Largest relative curvature for which parabolic interpolation is used instead of linear. At 1 the parabola is level
-/// at one end, as when the surface is tangent to the edge. A jump gives a much larger value, and parabolic steps would
-/// converge slowly from one side of it.
+/// Largest curvature of the parabola, relative to the difference of the values at the ends of the bracket, for which
+/// root finding interpolates by it instead of linearly. At 1 the parabola is level at one end, as when the surface is
+/// tangent to the edge. A jump of the function gives a much larger value, and parabolic steps would converge slowly
+/// from one side of it.
 const MAX_CURVATURE: f64 = 4.0;
 
 /// A sample on a lattice edge: the position as a fraction of the edge, and the function value.
@@ -21,38 +23,40 @@ struct Sample {
 
 /// Bracketing root finder on a lattice edge: an inside and an outside sample that converge to the zero.
 ///
-/// The estimate is the zero of the parabola through both samples and the previous one: on an edge to which the surface
-/// is nearly tangent, curvature is as large as slope, and linear interpolation would take many steps.
+/// The estimate is the zero of the parabola through both samples and the one replaced last: on an edge to which the
+/// surface is nearly tangent, curvature is as large as slope, and linear interpolation would take many steps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Root {
     inside: Sample,
     outside: Sample,
-    /// The sample that was last replaced; its value is NaN at first.
+    /// The sample that was last replaced, for the parabola; its value is NaN at first.
     before: Sample,
 }
 
 impl Root {
-    /// Creates a bracket from the values at the ends of the edge, one of them inside and the other outside.
+    /// Creates a bracket from the function values at the ends of the lattice edge, one of them inside and the other
+    /// outside.
     pub fn between(start: f64, end: f64) -> Self {
         let (start, end) = (Sample { at: 0.0, value: start }, Sample { at: 1.0, value: end });
         let (inside, outside) = if is_inside(start.value) { (start, end) } else { (end, start) };
         Self { inside, outside, before: Sample { at: 0.5, value: f64::NAN } }
     }
 
-    /// Creates a converged root at the middle of the edge, used where the edge leads into the padding.
+    /// Creates a converged root at the middle of the lattice edge, used where the edge leads into the padding.
     pub fn fixed() -> Self {
         let (inside, outside) = (Sample { at: 0.5, value: 1.0 }, Sample { at: 0.5, value: -1.0 });
         Self { inside, outside, before: inside }
     }
 
-    /// Returns the estimated position of the zero, as a fraction of the edge, where the function is evaluated next.
+    /// Returns the estimated position of the zero, as a fraction of the lattice edge; the function is evaluated there
+    /// next.
     pub fn estimate(&self) -> f64 {
         let Self { inside, outside, .. } = self;
         inside.at + self.share() * (outside.at - inside.at)
     }
 
-    /// Returns the zero of the parabola as a fraction of the way from the inside to the outside sample; one half if a
-    /// value is infinite.
+    /// Returns the zero of the interpolating parabola, or line, as a fraction of the way from the inside to the outside
+    /// sample; one half if a value is infinite.
     ///
     /// At fraction s, the parabola divided by the difference of the two values is height − s + curvature s (s − 1).
     fn share(&self) -> f64 {
@@ -86,8 +90,8 @@ impl Root {
         [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= CONVERGED)
     }
 
-    /// Returns the position of the mesh vertex on the edge, as a fraction: the estimate, kept [`MARGIN`] away from both
-    /// ends.
+    /// Returns the position of the mesh vertex on the lattice edge, as a fraction of the edge: the estimate, kept
+    /// [`MARGIN`] away from both ends.
     pub fn fraction(&self) -> f64 {
         let margin = f64::from(MARGIN);
         self.estimate().clamp(margin, 1.0 - margin)
@@ -100,7 +104,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns the root and the number of evaluations until it converges, at most `most`.
+    /// Returns the root of `f` in [0, 1] and the number of evaluations until it converges, at most `most`.
     fn solved(f: impl Fn(f64) -> f64, most: usize) -> (Root, usize) {
         let mut root = Root::between(f(0.0), f(1.0));
         let mut steps = 0;

@@ -1,9 +1,11 @@
-//! The scan: a coarse search of the whole lattice for components of the surface without a seed.
+//! The scan of the surface extractor: a coarse search of the whole lattice for components of the surface without a
+//! seed.
 //!
 //! Every `stride`-th node along each axis is evaluated. Two neighbouring coarse nodes are joined by a straight line of
 //! lattice edges, which the surface crosses an odd number of times if exactly one end is inside, and an even number of
 //! times otherwise. If the surface found so far crosses it with the other parity, a component is missing. Bisection
-//! keeps a half with the same property, down to a cut lattice edge that was not found; the flood continues from there.
+//! keeps a half of the line to which this applies, down to a cut lattice edge that was not found; the flood continues
+//! from there.
 
 use super::super::error::{VolumeError, reserve};
 use super::Lattice;
@@ -11,22 +13,25 @@ use super::batch::Batch;
 use super::blocks::{Blocks, Node, is_inside};
 use super::flood::Flood;
 
-/// Largest number of coarse nodes evaluated in one batch: limits memory, and is large enough for functions that are
-/// evaluated in batches.
+/// Largest number of coarse nodes that the scan evaluates in one batch: limits memory, and is large enough for
+/// functions that are faster when evaluated for many points at a time.
 const BATCH: usize = 4096;
 
-/// A straight line of lattice edges between two nodes, and whether its ends are inside.
+/// A straight line of lattice edges between two nodes, and whether its ends are inside, by which the scan finds missing
+/// components of the surface.
 #[derive(Clone, Copy)]
 struct Line {
     from: Node,
     axis: usize,
-    /// Coordinate of the other end along `axis`.
+    /// Coordinate along `axis` of the end of the line; it starts at `from`.
     to: usize,
     inside: [bool; 2],
 }
 
 impl Line {
-    /// Returns whether a component of the surface that crosses the line has not been found, by parity.
+    /// Returns whether a component of the surface that crosses the line has not been found: whether the surface found
+    /// so far crosses the line an odd number of times although both ends are inside or both outside, or an even number
+    /// of times although only one is inside.
     fn has_missing_component(&self, blocks: &Blocks) -> bool {
         (self.inside[0] != self.inside[1]) != blocks.crosses_oddly(self.from, self.axis, self.to)
     }
@@ -41,7 +46,7 @@ impl Line {
         self.to == self.from[self.axis] + 1
     }
 
-    /// Returns a half of the line with a missing component: one half has one if the line does.
+    /// Returns a half of the line that a component not found yet crosses; one half is crossed if the line is.
     fn halved(&self, middle_inside: bool, blocks: &Blocks) -> Line {
         let middle = self.middle();
         let first = Line { to: middle[self.axis], inside: [self.inside[0], middle_inside], ..*self };
@@ -50,28 +55,32 @@ impl Line {
     }
 }
 
-/// State of the scan: the coarse nodes, whether they are inside, and the line being processed.
+/// State of the scan: the coarse nodes (every `stride`-th one of the lattice), whether they are inside, and the line
+/// between two of them that is being processed.
 pub(super) struct Scan {
-    /// Coordinates of the coarse nodes along each axis, in the padded lattice, including both ends.
+    /// Coordinates of the coarse nodes (those that the scan evaluates) along each axis, in the padded lattice,
+    /// including both ends.
     axes: [Vec<usize>; 3],
-    /// Whether each coarse node is inside, x fastest, then y, z.
+    /// For each coarse node of the scan, whether it is inside the surface; x fastest, then y, z.
     inside: Vec<bool>,
-    /// Number of coarse nodes that were evaluated or requested so far, in the order of `inside`.
+    /// Number of coarse nodes of the scan that were evaluated or requested so far, in the order of `inside`.
     known: usize,
-    /// Indices of the coarse nodes in the current batch.
+    /// Indices in `inside` of the coarse nodes in the current batch.
     requested: Vec<usize>,
-    /// Index of the next line: axis + 3 × the coarse node where it starts.
+    /// Number of the next line to test: axis + 3 × index of the coarse node where it starts.
     next_line: usize,
-    /// The line that is being bisected.
+    /// The line that is being bisected, down to the edge at which a missing component crosses it; `None` between
+    /// searches.
     line: Option<Line>,
-    /// Whether a component was found in the current pass over all lines.
+    /// Whether a component was found in the current pass over all lines, so that another pass is needed.
     found_in_pass: bool,
     /// Number of components of the surface found by the scan so far.
     pub components_found: usize,
 }
 
 impl Scan {
-    /// Creates a scan of every `stride`-th node of the lattice, including the first and last along each axis.
+    /// Creates a scan of every `stride`-th node of the lattice, including the first and last along each axis and the
+    /// padding.
     pub fn new(stride: usize, blocks: &Blocks) -> Result<Self, VolumeError> {
         let axes = blocks.cells().map(|end| {
             let mut axis: Vec<usize> = (1..end).step_by(stride).collect();
@@ -96,8 +105,8 @@ impl Scan {
         })
     }
 
-    /// Fills `batch` with the points the scan needs next, or queues a cell in the flood; returns false when the scan is
-    /// complete.
+    /// Fills `batch` with the points at which the scan needs the function next, or queues a cell of a missing component
+    /// in the flood; returns false when the scan is complete.
     pub fn request(
         &mut self,
         blocks: &mut Blocks,
@@ -124,7 +133,8 @@ impl Scan {
         Ok(true)
     }
 
-    /// Stores the values of the batch: of coarse nodes, or of the middle of the line being bisected.
+    /// Stores the function values of the batch: those of coarse nodes, or the one at the middle of the line being
+    /// bisected.
     pub fn store_values(&mut self, values: &[f64], blocks: &Blocks) {
         for (coarse, &value) in self.requested.drain(..).zip(values) {
             self.inside[coarse] = is_inside(value);
@@ -135,7 +145,7 @@ impl Scan {
         }
     }
 
-    /// Selects the next coarse nodes to evaluate, and reuses values that the flood evaluated.
+    /// Selects the next coarse nodes to evaluate; values that the flood has evaluated are reused.
     fn request_nodes(&mut self, blocks: &Blocks) {
         self.requested.clear();
         while self.known < self.inside.len() && self.requested.len() < BATCH {
@@ -150,8 +160,9 @@ impl Scan {
         }
     }
 
-    /// Returns the next line with a missing component. A component just found can reveal another one on a line already
-    /// tested, so the passes over all lines are repeated until nothing is found.
+    /// Returns the next line that crosses a component not found yet; `None` when the scan is complete. A component just
+    /// found can reveal another one on a line already tested, so the passes over all lines are repeated until nothing
+    /// is found.
     fn find_line(&mut self, blocks: &Blocks) -> Option<Line> {
         loop {
             while self.next_line < 3 * self.inside.len() {
@@ -168,7 +179,8 @@ impl Scan {
         }
     }
 
-    /// Returns line number `number`, from a coarse node to the next one along an axis; `None` if the node is the last.
+    /// Returns line number `number`: axis + 3 × the coarse node from which it leads to the next one along that axis.
+    /// `None` if there is no next one.
     fn line(&self, number: usize) -> Option<Line> {
         let (axis, coarse) = (number % 3, number / 3);
         let to = *self.axes[axis].get(self.index(coarse)[axis] + 1)?;

@@ -1,4 +1,5 @@
-//! The mesh of the crossed cells, in an order independent of the order of discovery.
+//! The extracted surface: mesh vertices and triangles in the cells that the flood found to be crossed, in an order
+//! independent of the order of discovery.
 
 use super::super::cube_cases::{Case, EDGES, cases, corner};
 use super::super::error::{VolumeError, reserve};
@@ -12,7 +13,8 @@ use crate::mesh::TriangleMesh;
 
 const NONE: u32 = u32::MAX;
 
-/// Returns which edges that start at the cell's first node, the one of lowest coordinates, are cut: one bit per axis.
+/// Returns which of the three edges that start at a cell's first node, the one of lowest coordinates, are cut in this
+/// marching cubes case: one bit per axis.
 fn crossed_near_edges(case: u8) -> u8 {
     let far_ends = [corner([1, 0, 0]), corner([0, 1, 0]), corner([0, 0, 1])];
     (0..3).fold(0, |cuts, axis| cuts | ((case ^ case >> far_ends[axis]) & 1) << axis)
@@ -25,16 +27,17 @@ struct Vertex {
     root: Root,
 }
 
-/// The crossed cells and their vertices, both sorted by block, then node.
+/// The crossed cells and the mesh vertices in them, both sorted by block of the storage, then node.
 pub(super) struct Surface {
     cells: Vec<CrossedCell>,
-    /// For each cell, the index of the vertex on the first cut edge that starts at its first node; those on its other
-    /// such edges follow.
+    /// For each cell in `cells`, the index of the first of its own vertices, which are those on cut edges that start at
+    /// its first node, in the order of the axes.
     first: Vec<u32>,
-    /// For each slot, the index of its cell in `cells`, or [`NONE`].
+    /// For each slot of the storage, the index in `cells` of the cell that starts at its node, or [`NONE`] if that is
+    /// not crossed.
     index: Vec<u32>,
     vertices: Vec<Vertex>,
-    /// Indices of the vertices in the current refinement batch.
+    /// Indices of the vertices whose function values are in the current refinement batch.
     requested: Vec<usize>,
 }
 
@@ -58,7 +61,8 @@ impl Surface {
         Ok(Self { cells, first, index, vertices, requested: Vec::new() })
     }
 
-    /// Fills `batch` with the estimates of all vertices that have not converged; returns false if all have.
+    /// Fills `batch` with the estimated positions of all vertices whose root finding has not converged; returns false
+    /// if all have.
     pub fn request(&mut self, blocks: &Blocks, lattice: &Lattice, batch: &mut Batch) -> bool {
         let Self { vertices, requested, .. } = self;
         requested.clear();
@@ -70,14 +74,14 @@ impl Surface {
         !requested.is_empty()
     }
 
-    /// Passes the values of the refinement batch to the roots of its vertices.
+    /// Passes the function values of the refinement batch to the root finders of its vertices.
     pub fn store_values(&mut self, values: &[f64]) {
         for (v, &value) in self.requested.drain(..).zip(values) {
             self.vertices[v].root.add_sample(value);
         }
     }
 
-    /// Returns the world positions of the vertices.
+    /// Returns the world positions of the mesh vertices, in the order of their indices.
     pub fn positions(&self, blocks: &Blocks, lattice: &Lattice) -> impl ExactSizeIterator<Item = DVec3> {
         self.vertices.iter().map(|v| lattice.on_edge(blocks.node(v.slot), v.axis, v.root.fraction()))
     }
@@ -118,7 +122,8 @@ impl Surface {
     }
 }
 
-/// Returns the root finder of a cut edge; at its middle and converged if one end is in the padding.
+/// Returns the root finder of the cut edge from a node along an axis; for an edge into the padding, it is converged at
+/// the middle.
 fn root(slot: u32, axis: usize, blocks: &Blocks) -> Root {
     let from = blocks.node(slot);
     let to = next(from, axis);

@@ -1,4 +1,4 @@
-//! Extracted surfaces, compared with known properties and with marching cubes over all nodes.
+//! Tests of the surface extractor: surfaces compared with known properties and with marching cubes over all nodes.
 
 use super::super::{Grid, marching_cubes};
 use super::*;
@@ -20,7 +20,7 @@ fn run(extractor: &mut SurfaceExtractor, budget: usize, f: impl Fn(DVec3) -> f64
     while !extractor.advance(budget, &mut f).unwrap() {}
 }
 
-/// Extracts a surface from `seeds` and, if `stride` is above 0, by a scan.
+/// Returns an extractor that has extracted the zero set of `f` from `seeds` and, if `stride` is above 0, by a scan.
 fn extracted(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3) -> f64) -> SurfaceExtractor {
     let mut extractor = SurfaceExtractor::new(lattice).unwrap();
     seeds.iter().for_each(|&p| assert!(extractor.seed(p)));
@@ -47,7 +47,8 @@ fn dense(n: usize, f: impl Fn(DVec3) -> f64) -> TriangleMesh {
     marching_cubes(&Grid::new([n; 3], values).unwrap(), 0.0).unwrap()
 }
 
-/// Returns the set of triangles as bits of their corners, each rotated to start at its lowest corner.
+/// Returns the triangles of a mesh as a set, for comparison of meshes: float bits of the corner positions, each
+/// triangle rotated to start at its lowest corner.
 fn triangle_set(mesh: &TriangleMesh) -> BTreeSet<[[u32; 3]; 3]> {
     let triangles = mesh.corners().map(|corners| {
         let mut bits = corners.map(|p| p.to_array().map(f32::to_bits));
@@ -70,8 +71,8 @@ fn hash(seed: u64, p: DVec3) -> u64 {
     state
 }
 
-/// Returns noise whose zeros by linear interpolation between two nodes are identical in `f32` and `f64`; on average,
-/// `share` of 16 nodes are inside.
+/// Returns a noise function whose zeros by linear interpolation between two nodes are identical in `f32` and `f64`, for
+/// comparison with marching cubes; on average, `share` of 16 nodes are inside.
 fn noise(seed: u64, share: u64) -> impl Fn(DVec3) -> f64 + Copy {
     move |p| {
         let hash = hash(seed, p);

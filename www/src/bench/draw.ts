@@ -4,7 +4,10 @@ import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
 import { type Bar, type Figure, formatTarget, meetsTarget, type Target, verdict, withUnit } from './targets';
 
-/** Draws one benchmark: what was measured and how, its charts, and the same numbers as tables. */
+/**
+ * Draws the section of one benchmark on the benchmark page: what was measured and how, its charts, and the same numbers
+ * as tables.
+ */
 export function drawSection({ id, title, measured, command, notes, charts }: Section): HTMLElement {
   const list = notes.length > 0 ? [h('ul', { class: 'notes' }, ...notes.map((note) => h('li', {}, note)))] : [];
   return h(
@@ -91,8 +94,8 @@ function drawBar(figure: Figure, bar: Bar, drawn: ChartLayout): HTMLElement {
 }
 
 /**
- * Draws the bar of a value, and a mark at the target if one applies; hidden from screen readers, since the number
- * beside the bar says the same.
+ * Draws the bar of a measured value, and a mark at the target if one applies to it; hidden from screen readers, since
+ * the number beside the bar says the same.
  */
 function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayout): HTMLElement {
   const missed = meetsTarget(figure, bar) === false;
@@ -107,7 +110,10 @@ function track(figure: Figure, bar: Bar, value: number, { at, base }: ChartLayou
   return element;
 }
 
-/** Returns the limit of a target, if the target applies to a bar; a target for one host is not shown on the others. */
+/**
+ * Returns the limit of a target if the target applies to the host of a bar, else undefined; a target for one host is
+ * not shown on the others.
+ */
 function limitFor(target: Target | undefined, { label }: Bar): number | undefined {
   return target && (!target.host || label.startsWith(target.host)) ? target.limit : undefined;
 }
@@ -128,8 +134,8 @@ function axis({ ticks, at }: ChartLayout): HTMLElement {
 const short = (value: number) => new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 3 }).format(value);
 
 /**
- * Creates the table of a chart: a row per bar for a chart of kind `ratio`, else a row per figure with a column per
- * host.
+ * Creates the table with the numbers of a chart: a row per bar for a chart of kind `ratio`, else a row per measurement
+ * with a column per host.
  */
 function tableOf(section: string, chart: Chart): HTMLElement {
   const { title, kind } = chart;
@@ -147,7 +153,9 @@ function tableOf(section: string, chart: Chart): HTMLElement {
   );
 }
 
-/** Wraps a table that may be wider than a phone, so that it scrolls by itself, also by keyboard. */
+/**
+ * Wraps a table of the benchmark page, which may be wider than a phone, so that it scrolls by itself, also by keyboard.
+ */
 export function scrolling(label: string, table: HTMLElement): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }

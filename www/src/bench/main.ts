@@ -20,7 +20,9 @@ function targetsIn({ charts }: Section): Targeted[] {
   return charts.flatMap((chart) => chart.figures.filter(({ target }) => target).map((figure) => ({ chart, figure })));
 }
 
-/** Creates the summary table: each measurement with a target, the target, the verdict, and the worst value. */
+/**
+ * Creates the table of all measurements with a target: each measurement, the verdict, the target, and the worst value.
+ */
 function summary(sections: Section[]): HTMLElement {
   const targets = sections.flatMap(targetsIn);
   const met = targets.filter(({ figure }) => verdict(figure) === 'met').length;
@@ -78,7 +80,7 @@ function worstValue({ bars, target }: Figure, unit: string): string {
 
 const hostsOf = ({ points, head }: Report) => (points ?? head ?? []).map(({ host }) => host);
 
-/** Fills the header of the page: its name, the links to the labs, and what it shows. */
+/** Fills the header of the benchmark page: its name, the links to the labs, and what it shows. */
 function fillHeader(): void {
   const fill = (id: string, ...children: (Node | string)[]) => document.getElementById(id)?.append(...children);
   const links = LAB_IDS.map((id) => h('a', { href: `./index.html#${id}` }, text(`shell.${id}`)));

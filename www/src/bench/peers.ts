@@ -30,7 +30,7 @@ export function peerSection({ rows, load = 0, cores }: NonNullable<Report['peers
   };
 }
 
-/** Returns a figure of the chart for each task, with a bar for each other package that does it. */
+/** Returns a group of bars for each task of the comparison, with a bar for each other package that does it. */
 function figuresOf(rows: PeerRow[]): Figure[] {
   const tasks = new Map(rows.map(({ task, name }) => [task, name]));
   return [...tasks].map(([task, name]) => ({ name, bars: rows.filter((row) => row.task === task).map(barOf) }));
@@ -47,7 +47,7 @@ function barOf(row: PeerRow): Bar {
 const describeSide = ([whose, figure, ...rest]: string[]) =>
   `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
-/** Removes the post-release suffix of a version, such as `.post1`. */
+/** Removes the post-release suffix, such as `.post1`, of a package's version, for display. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');
 
 function figureOf({ unit }: PeerRow, { figure }: Side): string {
@@ -56,8 +56,8 @@ function figureOf({ unit }: PeerRow, { figure }: Side): string {
 }
 
 /**
- * Describes the result of one side, such as its number of triangles and its volume, so that the reader can judge how
- * comparable the two sides are.
+ * Describes the result of one side of a comparison, this library or another package, such as its number of triangles
+ * and its volume, so that the reader can judge how comparable the two sides are.
  */
 function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string[] {
   if (refused) return [text('bench.notClosedSurface')];

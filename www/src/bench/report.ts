@@ -1,4 +1,7 @@
-/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds unless noted. */
+/**
+ * The part of bench.json, written by scripts/bench.mjs, that the benchmark page draws. Times are in milliseconds unless
+ * noted.
+ */
 export interface Report {
   processor?: string;
   bestOf: number;
@@ -10,7 +13,8 @@ export interface Report {
   head?: (Host & HeadFigures)[];
   phantom?: (Host & HeadFigures)[];
   /**
-   * `load` is the load average of the machine (over one minute) before the measurement; `cores` its number of cores.
+   * Comparison with other software: `load` is the load average of the machine (over one minute) before the measurement;
+   * `cores` its number of cores.
    */
   peers?: { bestOf: number; load?: number; cores?: number; rows: PeerRow[] };
   page?: Host & PageFigures;
@@ -38,7 +42,7 @@ export interface PointFigures {
 
 export interface RemeshRow {
   name: string;
-  /** Target edge length, relative to the mean edge before remeshing. */
+  /** Target edge length of a remeshing run, relative to the mean edge before remeshing. */
   factor: number;
   milliseconds: number;
   triangles: number;
@@ -59,7 +63,7 @@ export interface TrackFigures {
 
 export interface StepRow {
   vertices: number;
-  /** Duration of a step per vertex, nanoseconds. */
+  /** Duration of a step of the deformable model per vertex, nanoseconds. */
   step: number;
   topology: number;
 }
@@ -98,7 +102,10 @@ export interface PageFigures {
   memory: { heap: number; arrays: number; wasm?: number; gpu: number };
 }
 
-/** Measurement of this library or of the other software, in the row's unit, with facts about the result. */
+/**
+ * Measurement of one side of a comparison, this library or another package, in the unit of its {@link PeerRow}, with
+ * facts about the result.
+ */
 export interface Side {
   figure: number;
   vertices?: number;
@@ -117,8 +124,8 @@ export interface PeerRow {
   version?: string;
   ours: Side & Host;
   theirs?: Side & { what: string };
-  /** Ratio of this library's figure to the other's: below 1, this library takes less time. */
+  /** Ratio of this library's measurement to that of the other package: below 1, this library takes less time. */
   ratio?: number;
-  /** Reason why there is no measurement of the other software. */
+  /** Reason why there is no measurement of the other package. */
   skipped?: string;
 }

@@ -1,7 +1,7 @@
 /** Scale of a chart's axis, mapping values to 0 at its left end and 1 at its right. */
 export interface Scale {
   at: (value: number) => number;
-  /** Position, 0 to 1, at which bars start: that of the value 1 for ratios, else the left end. */
+  /** Position on the axis, 0 to 1, at which bars start: that of the value 1 for ratios, else the left end. */
   base: number;
   ticks: number[];
 }
@@ -28,8 +28,8 @@ function linear(most: number): Scale {
 }
 
 /**
- * Returns the least distance between ticks, 1, 2 or 5 times a power of ten, that is at least a quarter of the length of
- * the axis.
+ * Returns the distance between the ticks of an axis: the least value, 1, 2 or 5 times a power of ten, that is at least
+ * a quarter of the length of the axis.
  */
 function niceStep(length: number): number {
   const power = 10 ** Math.floor(Math.log10(length / 4));

@@ -17,7 +17,7 @@ export interface Chart {
 export interface Section {
   id: string;
   title: string;
-  /** Description of the measurement in one sentence. */
+  /** Description of what was measured, in one sentence. */
   measured: string;
   command: string;
   /** Notes displayed above the charts. */
@@ -25,7 +25,9 @@ export interface Section {
   charts: Chart[];
 }
 
-/** Returns the sections that can be drawn from a report; missing parts are omitted. */
+/**
+ * Returns the sections of the benchmark page that can be drawn from a report; those without measurements are omitted.
+ */
 export function sectionsOf(report: Report): Section[] {
   const { head, phantom, steps, points, skin, track, remesh, page, peers } = report;
   const made = [
@@ -45,14 +47,17 @@ export function sectionsOf(report: Report): Section[] {
 const SECOND = 1000;
 const MEGABYTE = 1e6;
 
-/** Returns a figure of a chart, with a bar for each host; `value` takes the measurement from a host's results. */
+/**
+ * Returns a figure, a group of bars of a chart, with a bar for each host; `value` takes the measurement from a host's
+ * results.
+ */
 function figure<T extends Host>(name: string, hosts: T[], value: (host: T) => number, target?: Target): Figure {
   return { name, bars: hosts.map((host): Bar => ({ label: shortHost(host.host), value: value(host) })), target };
 }
 
 /**
- * Returns a figure of a chart for each row of the first host's results, with a bar for each host's row of the same
- * index.
+ * Returns a figure, a group of bars of a chart, for each row of the first host's results, with a bar for each host's
+ * row of the same index.
  */
 function figuresOfRows<Row>(
   hosts: (Host & { rows: Row[] })[],
@@ -143,8 +148,8 @@ function spread(rows: StepRow[]): number {
 }
 
 /**
- * Returns the figures of the time of a topology update, one for each mesh size; only that near 65,000 vertices has a
- * target.
+ * Returns the groups of bars for the duration of a topology update, one for each mesh size; only that near 65,000
+ * vertices has a target.
  */
 function topologyFigures(hosts: Steps[]): Figure[] {
   return figuresOfRows(
@@ -156,8 +161,8 @@ function topologyFigures(hosts: Steps[]): Figure[] {
 }
 
 /**
- * Returns a chart of the step time of each other host relative to native code; no chart if native code was not
- * measured.
+ * Returns a chart of the step time of the deformable model on each other host relative to native code; an empty array
+ * if native code was not measured.
  */
 function overNative(hosts: Steps[]): Chart[] {
   const native = hosts.find(({ host }) => host === 'native');
@@ -203,7 +208,9 @@ function pointSection(hosts: NonNullable<Report['points']>): Section {
   };
 }
 
-/** Returns the target frame rate of a row; only sizes near 20,000 triangles have one. */
+/**
+ * Returns the target frame rate of a row of the Sculpt benchmark; undefined unless its mesh has about 20,000 triangles.
+ */
 function targetOf({ name, triangles }: SculptRow): Target | undefined {
   return near(triangles, 20_000) ? atLeast(name === 'lava lamp' ? 30 : 10) : undefined;
 }

@@ -4,22 +4,24 @@ import { LANGUAGE } from '../texts';
 export interface Target {
   limit: number;
   sense: 'most' | 'least';
-  /** Start of the names of the hosts to which it applies; all hosts if undefined. */
+  /** Start of the names of the hosts to which the target applies; all hosts if undefined. */
   host?: string;
 }
 
-/** A measured value, or the reason why there is none. */
+/** A bar of a chart: a measured value, or the reason why there is none. */
 export interface Bar {
-  /** The host or software that was measured. */
+  /** The host (browser, Node or native code) or software that was measured. */
   label: string;
   value?: number;
-  /** Remark beside the value. */
+  /** Remark displayed beside the value. */
   remark?: string;
-  /** Reason why there is no value. */
+  /** Reason, displayed in place of the bar, why there is no value. */
   skipped?: string;
 }
 
-/** A group of bars in a chart: one measurement, with a bar for each host or package, and its target. */
+/**
+ * A group of bars in a chart: one measurement, with a bar for each host or package, and the target of the measurement.
+ */
 export interface Figure {
   name: string;
   bars: Bar[];
@@ -39,8 +41,8 @@ export function meetsTarget({ target }: Figure, { label, value }: Bar): boolean 
 }
 
 /**
- * Returns the verdict on a figure: met only if all bars to which the target applies meet it, not measured if none of
- * them has a value.
+ * Returns the verdict on a figure, a measurement on several hosts: met only if all bars to which the target applies
+ * meet it, not measured if none of them has a value.
  */
 export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
   const judged = figure.bars.map((bar) => meetsTarget(figure, bar)).filter((met) => met !== undefined);
@@ -49,7 +51,8 @@ export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
 }
 
 /**
- * Formats a number with its unit, to three significant digits (integers from 100); seconds below 0.1 as milliseconds.
+ * Formats a measured number with its unit, to three significant digits (integers from 100); seconds below 0.1 as
+ * milliseconds.
  */
 export function withUnit(value: number, unit: string): string {
   if (unit === 's' && value < 0.1) return withUnit(1000 * value, 'ms');
@@ -62,5 +65,5 @@ export function formatTarget({ limit, sense, host }: Target, unit: string): stri
   return `${sense === 'most' ? '≤' : '≥'} ${withUnit(limit, unit)}${host ? ` ${host}` : ''}`;
 }
 
-/** Shortens a host's name and version to the name and the major version. */
+/** Shortens a host's name and version to the name and the major version, for display. */
 export const shortHost = (host: string) => host.replace(/^(\S+ \d+)\..*/, '$1');

@@ -38,7 +38,7 @@ export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | un
   return undefined;
 }
 
-/** Returns the volume; throws a `Refusal` if it is a single slice, which has no surface. */
+/** Returns the imported volume unchanged; throws a `Refusal` if it is a single slice, which has no surface. */
 function rejectSingleSlice(format: string, init: VolumeInit): VolumeInit {
   if (init.dims[2] > 1) return init;
   throw new Refusal('bad-file', text('files.singleSlice', { format }));

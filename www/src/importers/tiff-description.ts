@@ -1,12 +1,18 @@
 /** Parses the description of the stack in a TIFF file: OME's XML, or the lines of ImageJ. */
 
 export interface Stack {
-  /** Indices of the pages that make up the volume: all slices of the first frame, then those of the next. */
+  /**
+   * Indices of the pages of the file, or files, that make up the volume: all slices of the first frame, then those of
+   * the next.
+   */
   pages: number[];
   frames: number;
   /** Voxel sizes along x, y and z in the description's unit of length; undefined where it has none. */
   spacing: [number | undefined, number | undefined, number | undefined];
-  /** Whether the pages' resolution tags count pixels per unit of length of the description, as in ImageJ. */
+  /**
+   * Whether the pages' resolution tags count pixels per unit of length of the description, as in ImageJ; else they are
+   * not used.
+   */
   perUnit: boolean;
 }
 
@@ -22,7 +28,7 @@ export function describedIn(text: string, count: number): Stack {
 
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
 
-/** Parses a number above 0; undefined for anything else. */
+/** Parses a number above 0 in a description; undefined for anything else. */
 function positive(text: string | undefined): number | undefined {
   const value = Number(text);
   return text !== undefined && Number.isFinite(value) && value > 0 ? value : undefined;
@@ -49,7 +55,8 @@ function fromImageJ(text: string, count: number): Stack {
 
 /**
  * Returns the pages of the first channel, frame after frame, from a file that stores slices (Z), channels (C) and
- * frames (T) in `order`, the fastest first. If the file has fewer pages than that, all pages are slices of one frame.
+ * frames (T) in `order`, the fastest first. If `count`, the number of pages of the file, is too small for that, all
+ * pages are slices of one frame.
  */
 function ordered(sizes: Record<string, number>, order: string, count: number): Pick<Stack, 'pages' | 'frames'> {
   const { Z = 1, T = 1 } = sizes;

@@ -9,8 +9,8 @@ import { describedIn, type Stack } from './tiff-description';
 const KINDS = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, Float32Array, Float64Array];
 
 /**
- * Reads the volume from all pages, in the order of the file names; of several channels the first. Throws a `Refusal` if
- * the images cannot be read, differ in size or are in colour.
+ * Reads the volume from all pages of TIFF files, in the order of the file names; of several channels only the first.
+ * Throws a `Refusal` if the images cannot be read, differ in size or are in colour.
  */
 export async function readStack(files: NamedBytes[]): Promise<VolumeInit> {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
@@ -59,7 +59,7 @@ async function valuesOf(plane: GeoTIFFImage, k: number): Promise<VoxelArray> {
   return values as VoxelArray;
 }
 
-/** Returns the value of a page's tag; undefined if the page has none of that name. */
+/** Returns the value of a tag of a TIFF page; undefined if the page has none of that name. */
 async function tagOf(page: GeoTIFFImage, name: 'ImageDescription' | 'XResolution' | 'YResolution'): Promise<unknown> {
   const directory = page.getFileDirectory();
   return directory.hasTag(name) ? directory.loadValue(name) : undefined;

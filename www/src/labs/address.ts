@@ -2,7 +2,7 @@
 import { text } from '../texts';
 import type { StatusLine } from '../ui/status';
 
-/** Names of the labs in addresses. */
+/** Ids of the labs, as they appear in addresses. */
 export const LAB_IDS = ['extract', 'reconstruct', 'track', 'sculpt'] as const;
 
 /** Returns the id of the lab that the hash of an address names, undefined if none. */
@@ -23,8 +23,8 @@ export function showAddress(hash: string): void {
 export const FILE_NOTE = text('labs.linkLacksFile');
 
 /**
- * Copies the page's address to the clipboard, and reports it in the status line, with the notes on what the link lacks;
- * if the clipboard is not available, refers to the address bar.
+ * Copies the page's address to the clipboard, and reports it in the status line, followed by `notes` on what the link
+ * lacks (false: none); if the clipboard is not available, refers to the address bar.
  */
 export async function copyAddress(status: StatusLine, notes: (string | false)[]): Promise<void> {
   const say = (done: string) => status.say([done, ...notes].filter(Boolean).join(' '));

@@ -4,8 +4,9 @@ const PLAIN = ['iteration', 'phase', 'residual', 'tolerance', 'vertices', 'trian
 const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished', 'seeds'] as const;
 
 /**
- * Returns the history as CSV, one line per iteration, with the data of the plots, the event list and the table of times
- * (in milliseconds). `residual` is the heading of the residual's column, which is a different quantity for each method.
+ * Returns the history of a run as CSV for saving, one line per iteration, with the data of the lab's plots, its list of
+ * topology changes and its table of times (in milliseconds). `residual` is the heading of the residual's column, which
+ * is a different quantity for each method.
  */
 export function toCsv({ reports }: History, residual = 'energy'): string {
   const parts = [...new Set(reports.flatMap(({ times }) => Object.keys(times)))];

@@ -3,7 +3,7 @@ import { text } from '../texts';
 /** Downloads started by {@link preload} and not yet used, by address. */
 const early = new Map<string, Promise<Uint8Array>>();
 
-/** Starts to download a file that will be needed as soon as the engine has loaded. */
+/** Starts to download a file that will be needed as soon as the engine has loaded; {@link fetchBytes} returns it. */
 export function preload(url: string): void {
   const bytes = download(url);
   // `fetchBytes` reports the error.
@@ -11,7 +11,10 @@ export function preload(url: string): void {
   early.set(url, bytes);
 }
 
-/** Returns the bytes of a file, preloaded or downloaded now; the caller may transfer them. */
+/**
+ * Returns the content of the file at an address, downloaded by {@link preload} or now. The caller owns the bytes and
+ * may transfer them to a worker.
+ */
 export function fetchBytes(url: string): Promise<Uint8Array> {
   const bytes = early.get(url) ?? download(url);
   early.delete(url);

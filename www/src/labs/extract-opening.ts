@@ -17,7 +17,7 @@ import { Opening, type Source } from './opening';
 
 export type ExtractSource = Source<Example, Linked, VolumeSource>;
 
-/** An opened volume, and the settings of its model, which has done no step yet. */
+/** A volume opened in the Extract lab, and the settings of its model, which has done no step yet. */
 interface OpenedVolume extends Loaded {
   choice: StartChoice;
   setup: Setup;
@@ -30,9 +30,12 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   readonly #ui: ExtractParts;
   readonly #settings: ExtractSettings;
   readonly #results: ExtractResults;
-  /** Sends a restarted engine the view's settings. */
+  /** Sends the view's settings to the worker again, after a restart of the engine. */
   readonly #onRestart: () => Promise<unknown>;
-  /** Default parameters of the method, without the iso value, whose default depends on the volume. */
+  /**
+   * Default parameters of the method, without the iso value, whose default depends on the volume; links contain only
+   * the parameters that differ.
+   */
   defaults: ParamValues = {};
 
   constructor(
@@ -61,7 +64,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     if (example && !linked?.file && 'file' in example.source) preload(exampleUrl(example.source.file));
   }
 
-  /** Opens a volume passed on by another lab. */
+  /** Opens a volume passed on by another lab, with the parameters passed on with it. */
   passedOn({ name, bytes, params }: Handoff): Promise<void> {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
     return this.open({ name, load, linked: { params, attractors: [] }, unit: '' });
@@ -106,8 +109,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Continues after a restart of the engine, with volume and settings unchanged: restores the newest saved state, or
-   * begins a new model if there is none.
+   * Continues with a newly loaded engine after the previous one broke, with volume and settings unchanged: restores the
+   * newest saved state, or begins a new model if there is none.
    */
   async #takeUp({ choice, params }: OpenedVolume, { example }: ExtractSource): Promise<void> {
     this.#ui.data.choose(example);
@@ -142,8 +145,9 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /**
-   * Returns the settings for a model of an example or a file: the example's own parameters or, without any, those in
-   * force except the iso value, which is specific to a volume; without attractors. A link's settings take precedence.
+   * Returns the settings for a model of an example or of the user's file: an example's own parameters; for a file,
+   * those in force except the iso value, which is specific to a volume; without attractors. A link's settings take
+   * precedence.
    */
   #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;

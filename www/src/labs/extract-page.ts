@@ -4,7 +4,7 @@ import { text } from '../texts';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure } from '../ui/format';
 
-/** Elements that {@link layOut} arranges on the lab's page. */
+/** Elements of the Extract lab that {@link layOut} arranges on its page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -35,7 +35,10 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
+/**
+ * Arranges the elements of the Extract lab in `root`: setup on one side, the view in the middle, results on the other
+ * side.
+ */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab';
   const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.legend, parts.banner, parts.drop);
@@ -75,12 +78,12 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** Returns a titled section of a column that is collapsed at first. */
+/** Returns a titled section of a lab's page that is collapsed until the user opens it. */
 export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
   return h('details', { class: 'panel' }, h('summary', {}, h('h2', {}, title)), ...children);
 }
 
-/** Names of the facts about a volume; they are shown before one is open, so that the layout does not shift. */
+/** Labels of the facts about the open volume; shown before a volume is open, too, so that the layout does not shift. */
 const FACTS = [
   text('labs.factFile'),
   text('extract.factVoxels'),
@@ -88,7 +91,7 @@ const FACTS = [
   text('extract.sectionIntensities'),
 ];
 
-/** Panel that shows the open volume and opens others. */
+/** Panel of the Extract lab with the facts about the open volume, and controls to open examples and files. */
 export class DataPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -96,7 +99,10 @@ export class DataPanel {
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
-  /** `figures` are listed apart from the other examples. */
+  /**
+   * `figures`, the examples from the paper, are listed apart from the other examples; `chooser` is the control that
+   * opens files.
+   */
   constructor(examples: Example[], figures: Example[], chooser: HTMLElement, onExample: (example: Example) => void) {
     const id = uniqueId('example');
     const group = (label: string, list: Example[]) =>
@@ -125,13 +131,16 @@ export class DataPanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if the open volume is no example. */
+  /** Selects the open example in the list of examples, or “Your file” if the open volume is no example. */
   choose(example: Example | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';
   }
 
-  /** Shows the facts and credits of a volume. */
+  /**
+   * Shows the facts about the open volume and the credits of its example, and selects the example in the list;
+   * `example` is undefined for the user's file.
+   */
   show(volume: VolumeView, example: Example | undefined): void {
     this.choose(example);
     const spacing = volume.spacing.map(figure).join(' × ');

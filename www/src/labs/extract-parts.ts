@@ -227,7 +227,7 @@ export class ExtractParts {
     else this.#params?.showError(name, message);
   }
 
-  /** Shows the attractors in force, in the list and in the views. */
+  /** Shows the attractors in force in the list on the page, in the 3D view and on the slices. */
   showAttractors(attractors: Attractor[]): void {
     this.attractors.show(attractors);
     this.stage.showAttractors(attractors);
@@ -240,7 +240,7 @@ export class ExtractParts {
     this.#log.update(this.#history);
   }
 
-  /** Shows a history that was cleared or set back, not only extended. */
+  /** Shows the run's history after it was cleared, or set back by undo; {@link showHistory} suffices after steps. */
   replaceHistory(): void {
     this.#log.clear();
     this.transport.showReport(this.#history.reports.at(-1));

@@ -11,17 +11,17 @@ export type ResultEvent = SnapshotEvent | ProgressEvent | SectionsEvent;
 
 const VANISHED = text('extract.vanishedHint');
 
-/** Displays the worker's results: surface, cross-sections, measures and history. */
+/** Displays the results of the Extract lab's worker: surface, cross-sections, measures and history of steps. */
 export class ExtractResults {
   readonly #client: Client;
   readonly #ui: ExtractParts;
   readonly #states: LabStates;
   readonly #history: History;
-  /** Pyramid level that the model is on. */
+  /** Pyramid level that the model is on; 0 is the finest. */
   #level = 0;
-  /** The newest snapshot, until it is displayed. */
+  /** Newest snapshot of the model, until it is displayed. */
   #snapshot: SnapshotEvent | undefined;
-  /** The displayed surface, in buffers of the worker. */
+  /** Buffers of the displayed surface, which are returned to the worker when another is displayed. */
   #shown: SurfaceBuffers | undefined;
   #framePending = 0;
   /** Counts requests for the pyramid, so that only the reply to the newest is displayed. */
@@ -40,13 +40,16 @@ export class ExtractResults {
     else this.#ui.stage.showSections(event.sections);
   }
 
-  /** Clears the history, for a newly built model. */
+  /** Clears the displayed history of steps, for a newly built model. */
   startOver(): void {
     this.#history.clear();
     this.#ui.replaceHistory();
   }
 
-  /** Returns a function that marks this run's history at an iteration, which may become known later. */
+  /**
+   * Returns a function that creates a mark, for undo to return to, in the history of the present run at an iteration
+   * that may become known later.
+   */
   marker(): (iteration: number) => HistoryMark {
     return this.#history.marker();
   }
@@ -70,13 +73,13 @@ export class ExtractResults {
     }
   }
 
-  /** Describes the state in the status line; if the surface has vanished, a banner explains possible causes. */
+  /** Describes the lab's state in the status line; if the surface has vanished, a banner explains possible causes. */
   showState(state: LabState): void {
     this.#ui.status.say(this.describe(state));
     if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show(text('extract.vanished'), VANISHED);
   }
 
-  /** Describes a state for the status line. */
+  /** Returns the text for the status line in a state of the lab. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (!last) return state === 'running' ? text('labs.running') : text('labs.readyToStart');
@@ -90,7 +93,10 @@ export class ExtractResults {
     return text('extract.pausedAt', { iteration: count(last.iteration), surface: where });
   }
 
-  /** Forgets the displayed buffers, which belong to an engine that was replaced. */
+  /**
+   * Forgets the displayed buffers, which belong to an engine that was replaced, so that they are not returned to the
+   * new one.
+   */
   forgetBuffers(): void {
     this.#shown = undefined;
   }
@@ -101,8 +107,8 @@ export class ExtractResults {
   }
 
   /**
-   * Displays a snapshot at the next animation frame, which returns the previous one's buffers to the worker; without
-   * free buffers, the worker sends no further snapshot.
+   * Displays a snapshot at the next animation frame, and then returns the buffers of the previous one to the worker,
+   * which sends no further snapshot without free buffers.
    */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);

@@ -9,24 +9,30 @@ import type { ExtractResults } from './extract-results';
 import type { LabStates } from './lab-states';
 import { type SavedMoment, UndoHistory } from './undo-history';
 
-/** Radius of the sphere placed at the crosshair, as a fraction of the volume's shortest side. */
+/**
+ * Radius of the sphere around the crosshair that the user can choose as initial surface, as a fraction of the volume's
+ * shortest side.
+ */
 const SPHERE_PART = 0.1;
-/** Radius of a new attractor, as a fraction of the volume's shortest side. */
+/** Radius of influence of a new attractor, as a fraction of the volume's shortest side. */
 const ATTRACTOR_PART = 0.15;
 
 /** Message why nothing can be changed after a failure of the engine. */
 const BROKEN = text('labs.engineStopped');
 
-/** State of the page besides the model, which undo restores. */
+/** The page's part of a saved state; the worker saves the model. Undo restores both. */
 interface PageState {
   choice: StartChoice;
   params: ParamValues;
   attractors: Attractor[];
-  /** Marks the history at the iteration at which the model was saved. */
+  /** Creates a mark in the run's history at the iteration at which the model was saved. */
   mark: (iteration: number) => HistoryMark;
 }
 
-/** Settings that a model is built and run with: changes them, sends them to the worker, and undoes changes. */
+/**
+ * Manages the settings that the Extract lab's model is built and run with: changes them, sends them to the worker, and
+ * undoes changes.
+ */
 export class ExtractSettings {
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -35,12 +41,15 @@ export class ExtractSettings {
   readonly #onChange: () => void;
   readonly #undo: UndoHistory<PageState, SavedRun>;
   #volume: VolumeView | undefined;
-  /** The parameters in force; a reset keeps them. */
+  /** The parameters in force; rebuilding the model keeps them. */
   #params: ParamValues = {};
   /** The model's attractors; the list on the page may contain one whose request is pending. */
   #attractors: Attractor[] = [];
 
-  /** `onChange` is called whenever the settings in force may have changed. */
+  /**
+   * `onChange` is called whenever the settings in force may have changed, to display them and to update the page's
+   * address.
+   */
   constructor(client: Client, ui: ExtractParts, states: LabStates, results: ExtractResults, onChange: () => void) {
     this.#client = client;
     this.#ui = ui;
@@ -62,23 +71,33 @@ export class ExtractSettings {
     return this.#attractors;
   }
 
-  /** The sphere at the crosshair that the model may start from, world units. */
+  /**
+   * Sphere around the crosshair, in world units, that the model starts from if the user chooses a sphere as initial
+   * surface.
+   */
   get sphere(): { center: Vec3; radius: number } {
     return { center: this.#ui.stage.crosshair, radius: SPHERE_PART * this.#smallestSide };
   }
 
-  /** The newest saved state, to resume from after a restart of the engine. */
+  /**
+   * The newest saved state of model and page, to resume from after a restart of the engine; undefined if there is none.
+   */
   get newest(): SavedMoment<PageState, SavedRun> | undefined {
     return this.#undo.newest;
   }
 
-  /** Returns all that a model of the present volume is built from. */
+  /**
+   * Returns the settings for a model of the present volume that starts as chosen, by default with the parameters and
+   * attractors in force.
+   */
   setup(choice: StartChoice, params = this.#params, attractors = this.#attractors): Setup {
     const { levels, edge } = choice;
     return { start: this.#startShape(choice), levels, edge, params, attractors };
   }
 
-  /** Adopts another volume and its new model, and clears the undo history. */
+  /**
+   * Takes over the settings of a newly opened volume, whose model the worker has built, and clears the undo history.
+   */
   adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, attractors: Attractor[]): void {
     this.#volume = volume;
     this.#undo.clear();
@@ -88,25 +107,28 @@ export class ExtractSettings {
     this.#adoptModel(choice, params);
   }
 
-  /** Adopts on the page a new model of the present volume, before its first step. */
+  /**
+   * Takes over the settings of a new model of the present volume, which the worker has built, before its first step.
+   */
   begin(choice: StartChoice, params: ParamValues): void {
     this.#states.idle(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
   }
 
-  /** Saves the present state, in case the user cancels opening something else. */
+  /** Saves the present state of model and page, to return to it if the user cancels opening something else. */
   save(): void {
     void this.#undo.save();
   }
 
-  /** Settles when all pending saves are complete. */
+  /** Promise that settles when all pending saves of the model are complete. */
   get saved(): Promise<unknown> {
     return this.#undo.saved;
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
-   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state before a change, so that undo can restore it; `label` names the change. Changes with the
+   * same `mergeKey`, unless empty, in short succession are undone as one. Returns a function that discards the saved
+   * state, to call if the change fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
@@ -126,7 +148,7 @@ export class ExtractSettings {
   }
 
   /**
-   * Adds new components for the parts of the object that the surface misses, and continues the run if there were any.
+   * Adds components to the surface for the parts of the object that it misses, and continues the run if there were any.
    */
   seed(): Promise<void> {
     const { coverage } = this.#ui;
@@ -138,8 +160,8 @@ export class ExtractSettings {
   }
 
   /**
-   * Rebuilds the model from the initial surface in force, with the parameters unchanged; it does not run until the user
-   * asks for it.
+   * Rebuilds the model from the initial surface in force, with the parameters unchanged; the model does not run until
+   * the user asks for it.
    */
   startOver(): Promise<void> {
     return this.#change(text('labs.reset'), text('labs.buildFailed'), async () => {
@@ -148,8 +170,8 @@ export class ExtractSettings {
   }
 
   /**
-   * Rebuilds the model from the initial surface chosen on the page, and runs it. If the start is rejected, the previous
-   * model stays, and its run continues.
+   * Rebuilds the model from the initial surface chosen on the page, and runs it. If the choice is rejected, the
+   * previous model stays, and its run continues.
    */
   async restart(): Promise<void> {
     if (!this.#states.canChange) return this.#ui.start.reject(this.#why(text('extract.notWhileOpening')));
@@ -190,8 +212,8 @@ export class ExtractSettings {
   }
 
   /**
-   * Sets the attractors of the live model; a run continues, and a converged one is resumed. With `tuning`, changes with
-   * the same label in short succession are undone as one.
+   * Sets the attractors of the live model; a run continues, and a converged one is resumed. `what` names the change for
+   * undo; with `tuning`, changes of the same name in short succession are undone as one.
    */
   setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
     return this.#states.enqueue(async () => {
@@ -239,7 +261,7 @@ export class ExtractSettings {
     this.#showPyramid(page.choice);
   }
 
-  /** Does a change that undo can revert; if it fails, an error is displayed, and undo does not list it. */
+  /** Makes a change that undo can revert; if it fails, an error is displayed, and undo does not list it. */
   #change(label: string, errorTitle: string, work: () => Promise<void>): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;

@@ -1,4 +1,4 @@
-/** Shares the state of the Extract lab as an address, and passes its surface to the Sculpt lab. */
+/** Shares the state of the Extract lab as an address, and opens its surface in the Sculpt lab. */
 
 import type { Client } from '../client';
 import { text } from '../texts';
@@ -25,7 +25,7 @@ export class ExtractSharing {
     this.#opening = opening;
   }
 
-  /** Updates the page's address with what is open and the settings. */
+  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
   updateAddress(): void {
     const { source, defaults } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -50,7 +50,7 @@ export class ExtractSharing {
     await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
   }
 
-  /** Passes the surface on as a mesh to deform. */
+  /** Opens the extracted surface in the Sculpt lab, as a mesh to deform. */
   toSculpt(passOn: OpenInLab): void {
     this.#client.request('export', { format: 'ply' }).then(
       (bytes) =>

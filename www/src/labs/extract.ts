@@ -30,7 +30,7 @@ export class ExtractLab implements Lab {
   readonly #opening: ExtractOpening;
   readonly #sharing: ExtractSharing;
   readonly #passOn: OpenInLab;
-  /** The quantity that the worker computes for each vertex, to colour the surface; undefined if none is needed. */
+  /** Quantity that the worker computes at each vertex to colour the surface by; undefined if none is needed. */
   #quantity: VertexQuantity | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
@@ -75,7 +75,7 @@ export class ExtractLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** Maps the user's actions to the parts that handle them. */
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -148,7 +148,10 @@ export class ExtractLab implements Lab {
     await (engineBroken ? this.#opening.reopen() : this.#settings.startOver());
   }
 
-  /** Runs the same extraction twice, direct and coarse to fine, both without attractors, and shows the comparison. */
+  /**
+   * Runs the extraction twice, direct and coarse to fine, both without attractors, and shows the comparison of the two
+   * runs.
+   */
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;

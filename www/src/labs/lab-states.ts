@@ -12,25 +12,25 @@ export class LabStates {
   readonly #banner: ErrorBanner;
   readonly #status: StatusLine;
   readonly #signal: AbortSignal;
-  /** State of the model beneath an error; 'loading' until there is one. */
+  /** State of the model, also while the lab displays an error; 'loading' until there is a model. */
   #model: 'loading' | 'running' | 'paused' | 'done' = 'loading';
-  /** Whether something else is being opened; the state of the present model is then not displayed. */
+  /** Whether other data is being opened; the state of the present model is then recorded, but not displayed. */
   #opening = false;
-  /** Settles when the last queued change is complete. */
+  /** Settles when the last change queued by {@link enqueue} is complete. */
   #queue: Promise<unknown> = Promise.resolve();
-  /** Whether there is a model. */
+  /** Whether the worker has a model of the lab's data. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
   engineBroken = false;
 
-  /** Once `signal` is aborted, no failure is displayed any more. */
+  /** Once `signal` is aborted, because the lab is closed, no failure is displayed any more. */
   constructor(banner: ErrorBanner, status: StatusLine, signal: AbortSignal) {
     this.#banner = banner;
     this.#status = status;
     this.#signal = signal;
   }
 
-  /** Calls `subscriber` now and at every change. */
+  /** Calls `subscriber` with the lab's state now and at every change. */
   subscribe(subscriber: (state: LabState) => void): void {
     this.#state.subscribe((state) => {
       if (state !== 'loading' && state !== 'error') this.#model = state;
@@ -47,17 +47,17 @@ export class LabStates {
     return this.value === 'error' ? this.#model : this.value;
   }
 
-  /** Whether the settings can be changed. */
+  /** Whether the settings can be changed now: there is a model, the engine works, and nothing is being loaded. */
   get canChange(): boolean {
     return this.ready && !this.engineBroken && this.value !== 'loading';
   }
 
-  /** Whether the model can be run or stepped. */
+  /** Whether the model can be run or stepped now: it is paused, and the engine works. */
   get canRun(): boolean {
     return this.ready && !this.engineBroken && this.modelState === 'paused';
   }
 
-  /** Enters the loading state, with a text for the status line. */
+  /** Enters the lab's loading state; `text` is for the status line. */
   load(text: string): void {
     this.#banner.hide();
     this.#state.value = 'loading';
@@ -65,8 +65,9 @@ export class LabStates {
   }
 
   /**
-   * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is
-   * called, the present model's state is recorded, but not displayed.
+   * Prepares for opening other data: enters the loading state, with `text` in the status line, and waits until queued
+   * changes are complete. Until {@link finishOpening} is called, the present model's state is recorded, but not
+   * displayed.
    */
   async open(text: string): Promise<void> {
     this.#opening = true;
@@ -80,14 +81,20 @@ export class LabStates {
     if (hasModel) this.#model = 'paused';
   }
 
-  /** Queues changes, so that each starts from the result of the previous one. */
+  /**
+   * Runs `work`, which changes the model, after all changes queued before, so that each starts from the result of the
+   * previous one.
+   */
   enqueue(work: () => Promise<void>): Promise<void> {
     const turn = this.#queue.then(work);
     this.#queue = turn.catch(() => undefined);
     return turn;
   }
 
-  /** Ends loading with a model that is not running; ignored while something else is being opened. */
+  /**
+   * Ends the loading state with a model that is not running; `text` is for the status line. Ignored while other data is
+   * being opened.
+   */
   idle(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
     this.#state.value = state;
@@ -95,8 +102,8 @@ export class LabStates {
   }
 
   /**
-   * Returns to the model's state after loading has failed or changed nothing; `describe` gives the text for the status
-   * line.
+   * Returns the lab to the model's state after loading has failed or changed nothing; `describe` gives the text for the
+   * status line. Ignored while other data is being opened.
    */
   restore(describe: (state: LabState) => string): void {
     if (this.#opening) return;
@@ -105,8 +112,8 @@ export class LabStates {
   }
 
   /**
-   * Records the model's new state and makes it the lab's state. Returns false if the lab's state does not change: during
-   * loading unless the new state is 'running', and always while something else is being opened.
+   * Records the model's new state and makes it the lab's state. Returns false if the lab's state does not change:
+   * during loading unless the new state is 'running', and always while other data is being opened.
    */
   setModelState(state: 'running' | 'paused' | 'done'): boolean {
     this.#model = state;
@@ -116,7 +123,7 @@ export class LabStates {
   }
 
   /**
-   * Displays a failure, unless something else is being opened. The model stays, and a run continues; after an internal
+   * Displays a failure, unless other data is being opened. The model stays, and a run continues; after an internal
    * error, the engine counts as broken, and the run as stopped.
    */
   fail(title: string, error: unknown): void {

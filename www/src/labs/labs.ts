@@ -11,19 +11,19 @@ export interface Handoff {
   params: ParamValues;
 }
 
-/** A lab that is open. */
+/** A lab that is open, as the page controls it. */
 export interface Lab {
   start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */
   close(): void;
 }
 
-/** Opens another lab with the given data. */
+/** Function by which a lab opens another lab with data that it passes on. */
 export type OpenInLab = (passedOn: Handoff) => void;
 
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
-  /** The lab's name in addresses, after the hash. */
+  /** The lab's name in addresses, after the #. */
   id: string;
   name: string;
   tagline: string;

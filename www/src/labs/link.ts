@@ -8,45 +8,49 @@ import type { ColorMode } from '../ui/view-options';
 export const ADDRESS = '#extract';
 
 /**
- * Version of the defaults that a link relies on. Links without a version were written when the lab started from an
- * enclosing surface, with the method as published.
+ * Version number of the defaults that a link relies on. Links without a version were written when the defaults were an
+ * enclosing initial surface and the method as published.
  */
 const VERSION = '2';
 
-/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
+/**
+ * Settings of the Extract lab that are contained in a link; missing ones are as in the example, or else the method's
+ * defaults.
+ */
 export interface Linked {
-  /** The example or figure that is open. */
+  /** Id of the open example or figure; without it and without `file`, the first example opens. */
   example?: string;
-  /** Name of the user's own file, which is not part of the link. */
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
   start?: string;
   bubbles?: number;
   sphere?: { center: Vec3; radius: number };
   levels?: number;
-  /** Mean edge length in world units; 0 if the model chooses it. */
+  /** Target edge length in world units; 0 if the model chooses it. */
   edge?: number;
   params: ParamValues;
   attractors: Attractor[];
   color?: ColorMode;
 }
 
-/** Present settings of the lab, from which a link is made. */
+/** Present settings of the Extract lab, from which a link is made. */
 export interface LabSettings {
   example: Example | undefined;
-  /** Name of the open file, used if no example is open. */
+  /** Name of the open file, which the link contains if no example is open. */
   file: string;
   choice: StartChoice;
-  /** The sphere at the crosshair that the model may start from. */
+  /** Sphere around the crosshair, in world units, that is the initial surface if a sphere is chosen. */
   sphere: { center: Vec3; radius: number };
   params: ParamValues;
-  /** Default parameters of the method. */
+  /** Default parameters of the method; the link contains only parameters that differ. */
   defaults: ParamValues;
   attractors: Attractor[];
   color: ColorMode;
 }
 
 /**
- * Returns the settings that differ from those of the example, or else from the method's defaults, and all attractors.
+ * Returns what a link to the lab's present state contains: the settings that differ from those of the example, or else
+ * from the method's defaults, and all attractors.
  */
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
@@ -67,12 +71,12 @@ export function linkOf(settings: LabSettings): Linked {
   };
 }
 
-/** Returns the values that differ from `usual`. */
+/** Returns the entries of `values` that differ from those in `usual`, for a link that omits the others. */
 export function differing(values: ParamValues, usual: ParamValues): ParamValues {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !Object.is(usual[name], value)));
 }
 
-/** Returns the choice of the initial surface, with the settings of a link in place of those it contains. */
+/** Returns `choice`, the choice of the initial surface, with the settings that a link contains in place of its own. */
 export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: Linked): StartChoice {
   return {
     kind: isStartKind(start) ? start : choice.kind,
@@ -84,7 +88,7 @@ export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: 
 
 const numbers = (values: number[]) => values.map((value) => Number(value.toPrecision(7))).join(',');
 
-/** Returns the hash of an address for a link's settings. */
+/** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: Linked): string {
   const query = new URLSearchParams();
   const { example, file, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
@@ -127,14 +131,15 @@ export function fromHash(hash: string): Linked | undefined {
 }
 
 /**
- * Adds the defaults that a link without a version relies on. Figures are excepted: they set all parameters themselves.
+ * Adds to the settings in a link without a version number the defaults of that time, on which it relies. Figures are
+ * excepted: they set all parameters themselves.
  */
 function asBefore(linked: Linked): Linked {
   if (isPreset(exampleById(linked.example ?? ''))) return linked;
   return { start: 'enclosing', ...linked, params: { ...PAPER, ...linked.params } };
 }
 
-/** Parses a parameter value: a number if possible, else the text. */
+/** Parses the value of a parameter in a link: a number if possible, else the text. */
 export function readValue(text: string): unknown {
   const value = Number(text);
   return text !== '' && Number.isFinite(value) ? value : text;

@@ -1,4 +1,4 @@
-/** Opens meshes of the Sculpt lab, from an example or from the user's files. */
+/** Reads meshes for the Sculpt lab, from an example or from the user's files. */
 
 import { dataUrl } from '../reconstruct/examples';
 import type { ExampleMesh, SculptExample } from '../sculpt/examples';
@@ -7,10 +7,10 @@ import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 
-/** File extensions that the Sculpt lab opens. */
+/** File extensions that the Sculpt lab opens, for the browser's file dialog. */
 export const ACCEPT = '.glb,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
 
-/** Media types of textures by file extension. */
+/** Media types of texture images by file extension. */
 const PICTURES: [RegExp, MeshTexture['type']][] = [
   [/\.png$/i, 'image/png'],
   [/\.jpe?g$/i, 'image/jpeg'],

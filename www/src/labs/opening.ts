@@ -5,22 +5,25 @@ import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
 
-/** Milliseconds that a busy worker has to save its model before it is stopped. */
+/** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
 const SAVE_TIMEOUT_MS = 1000;
 
-/** Something that a lab opens, with all that is needed to open it again after a failure of the engine. */
+/**
+ * Data that a lab opens (an example, the user's files, or data of another lab), with all that is needed to open it
+ * again after a failure of the engine.
+ */
 export interface Source<Example, Linked, Data> {
   name: string;
-  /** Reads or downloads the data. */
+  /** Reads or downloads the data; called when the source is opened. */
   load: () => Promise<Data>;
   example?: Example;
-  /** Settings of a link, in addition to the example. */
+  /** Settings in the link that opened the data; they take precedence over those of the example. */
   linked?: Linked;
   /** Unit of lengths, if there is no example to define it. */
   unit?: Unit;
 }
 
-/** The page's controls that opening affects. */
+/** The controls of a lab that opening data affects. */
 interface OpeningParts<Example> {
   makeParams(specs: ParamSpec[]): void;
   banner: ErrorBanner;
@@ -43,13 +46,19 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   readonly #ui: OpeningParts<Example>;
   protected readonly states: LabStates;
   #source: Source<Example, Linked, Data> | undefined;
-  /** Settings of a link whose file the user has yet to open. */
+  /**
+   * Settings in a link that names a file of the user's, to be applied when the user opens a file; undefined if there is
+   * no such link.
+   */
   #awaiting: Linked | undefined;
   /** Counts requests, so that a slow download does not replace what was opened after it. */
   #requestCount = 0;
-  /** Settles when the worker has answered the last load request. */
+  /** Settles when the worker has answered the last request to load data. */
   #loads: Promise<unknown> = Promise.resolve();
-  /** Whether the worker's model is not the one displayed, or is missing. */
+  /**
+   * Whether the worker's model is not the one displayed, or is missing; if opening fails then, the engine counts as
+   * broken.
+   */
   #modelMismatch = false;
 
   constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
@@ -61,20 +70,20 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** The example that opens by default. */
   protected abstract readonly first: Example;
 
-  /** Returns the example with this id. */
+  /** Returns the example with this id, undefined if there is none. */
   protected abstract find(id: string): Example | undefined;
 
-  /** Parses an address for this lab. */
+  /** Parses the hash of an address; undefined if it contains no settings for this lab. */
   protected abstract linkedBy(hash: string): Linked | undefined;
 
-  /** Returns what is needed to open an example. */
+  /** Returns all that is needed to open an example, without downloading it yet. */
   protected abstract fromExample(example: Example): Source<Example, Linked, Data>;
 
-  /** Returns what is needed to open the user's files. */
+  /** Returns all that is needed to open the user's files, without reading them yet. */
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
   /**
-   * Has the worker build a model of the data. With `reopening`, the source is already open, and the engine was
+   * Has the worker build a model of the data. With `reopening`, the same source was open before, and the engine was
    * restarted.
    */
   protected abstract load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened>;
@@ -85,7 +94,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, reopening: boolean): Promise<void>;
 
-  /** Returns the source to remember as open; a subclass may replace it. */
+  /**
+   * Returns the source to open again after a failure of the engine: by default `source`; a subclass may return another.
+   */
   protected sourceToRemember(
     source: Source<Example, Linked, Data>,
     _opened: Opened,
@@ -94,10 +105,15 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return source;
   }
 
-  /** Has the worker save the present model, so that it can be restored; does nothing by default. */
+  /**
+   * Has the worker save the present model, so that undo or a restarted engine can restore it; does nothing by default.
+   */
   protected save(): void {}
 
-  /** Settles when all pending saves are complete; at once, unless a subclass saves anything. */
+  /**
+   * Returns a promise that settles when all pending saves of the model are complete; at once, unless a subclass saves
+   * anything.
+   */
   protected async saved(): Promise<unknown> {
     return undefined;
   }
@@ -134,17 +150,17 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     this.onEngineReady(specs);
   }
 
-  /** The source that is open. */
+  /** The source of the data that is open; undefined if there is none. */
   get source(): Source<Example, Linked, Data> | undefined {
     return this.#source;
   }
 
-  /** Discards everything that is still being opened. */
+  /** Discards all data that is still being opened, since the lab is closed. */
   close(): void {
     this.#requestCount += 1;
   }
 
-  /** Opens an example, with the settings of a link. */
+  /** Opens an example, with the settings in a link, if given. */
   example(example: Example, linked?: Linked): Promise<void> {
     return this.open({ ...this.fromExample(example), ...(linked && { linked }) });
   }
@@ -158,7 +174,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
   }
 
-  /** Opens the example with this id, if there is one. */
+  /** Opens the example with the given id, if there is one. */
   byId(id: string): void {
     const example = this.find(id);
     if (example) void this.example(example);
@@ -170,8 +186,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /**
-   * Cancels opening or preparing: since the worker is busy with it, the engine is restarted, and the previous source,
-   * or else the first example, is opened again.
+   * Cancels the opening or preparation that the worker is busy with: restarts the engine, and opens the previous
+   * source, or else the first example, again.
    */
   async cancel(): Promise<void> {
     const request = this.#requestCount;
@@ -184,7 +200,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (own === this.#requestCount && !this.#ui.banner.shown) this.#ui.status.say(text('labs.cancelled'));
   }
 
-  /** Opens what the address asks for. If that is not possible, opens `otherwise` and says why. */
+  /**
+   * Opens the example that the page's address names, with the settings in the address. If that is not possible, opens
+   * `otherwise`, if given; if the address names an unknown example or the user's file, a banner says so.
+   */
   async #link(otherwise?: Example): Promise<void> {
     const linked = this.linkedBy(location.hash);
     const example = linked && this.#exampleOf(linked);
@@ -202,7 +221,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return file ? undefined : this.first;
   }
 
-  /** Opens a source, unless a newer request comes first. */
+  /**
+   * Opens a source: gets its data, has the worker build a model of it, and displays it. Stops if a newer request to
+   * open something has been made.
+   */
   protected async open(source: Source<Example, Linked, Data>, reopening = false): Promise<void> {
     const request = ++this.#requestCount;
     if (this.states.canChange) this.save();

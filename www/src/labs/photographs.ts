@@ -1,4 +1,4 @@
-/** Reads photographs with their cameras and masks. */
+/** Reads photographs with their cameras and masks, for the Reconstruct lab. */
 
 import type { CameraView } from '../reconstruct/protocol';
 import { text } from '../texts';
@@ -10,7 +10,7 @@ export interface Photograph {
   picture?: ImageBitmap;
 }
 
-/** One camera of a cameras.json: `P` is its 3 × 4 projection, nested or flat. */
+/** One camera in a cameras.json file: `P` is its 3 × 4 projection from world to pixels, row by row, nested or flat. */
 interface CameraEntry {
   image?: string;
   mask?: string;
@@ -25,15 +25,16 @@ interface CameraFile {
   cameras: CameraEntry[];
 }
 
-/** Finds a file by its name in the list of cameras; undefined if there is none. */
+/** Function that returns the file with a name given in the list of cameras; undefined if there is none. */
 export type FileByName = (name: string) => Promise<Blob | undefined>;
 
 /** Red value of a mask's pixel, 0 to 255, below which the photograph's pixel is masked out. */
 const MASKED = 128;
 
 /**
- * Reads all cameras of a list, and the photographs and masks that are available. Throws if the list is malformed, the
- * size of an image is unknown, a photograph or its mask cannot be decoded, or a photograph does not fit its camera.
+ * Reads all cameras of a list, `json`, and the photographs and masks that are available. Throws if the list is
+ * malformed, the size of an image is unknown, a photograph or its mask cannot be decoded, or a photograph does not fit
+ * its camera.
  */
 export async function readPhotographs(json: string, fileOf: FileByName): Promise<Photograph[]> {
   const file = parseCameras(json);

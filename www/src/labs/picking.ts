@@ -7,9 +7,9 @@ import type { Hit } from '../view/reconstruction';
 export const NO_EDITS: Edits = { added: [], removed: [], outside: [] };
 
 /**
- * Returns the edits after a click with a tool; undefined if it changes nothing. `distance`, in world units, is the
- * offset of a new point, or of a point marked as outside, along the outward normal of the surface; if the click missed
- * the surface, the point is not offset. Its magnitude is the radius for removal.
+ * Returns the manual edits of the points after a click with a tool; undefined if the click changes nothing. `distance`,
+ * in world units, is the offset of a new point, or of a point marked as outside, along the outward normal of the
+ * surface; if the click missed the surface, the point is not offset. Its magnitude is the radius for removal.
  */
 export function applyClick(
   tool: EditTool,
@@ -32,8 +32,8 @@ export function applyClick(
 }
 
 /**
- * Returns the edits with all points within `radius` of a position removed, including those added by hand; undefined if
- * there are no such points.
+ * Returns the manual edits with all points within `radius` (world units) of the position `place` removed, including
+ * those added by hand; undefined if there are no such points.
  */
 function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Array): Edits | undefined {
   const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= radius;

@@ -1,4 +1,4 @@
-/** Opens points, cameras and photographs of the Reconstruct lab, from an example or from the user's files. */
+/** Reads points, cameras and photographs for the Reconstruct lab, from an example or from the user's files. */
 
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
 import type { CloudSource } from '../reconstruct/protocol';
@@ -7,12 +7,12 @@ import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 import { type Photograph, readPhotographs } from './photographs';
 
-/** File extensions that the Reconstruct lab opens. */
+/** File extensions that the Reconstruct lab opens, for the browser's file dialog. */
 export const ACCEPT = '.ply,.obj,.xyz,.pts,.csv,.txt,.json,.png,.jpg,.jpeg,.webp';
 
 /** Points, and cameras with photographs, read from files that were opened together. */
 export interface PointFiles {
-  /** The points; undefined if only cameras were opened, for the present points. */
+  /** Source of the points; undefined if only cameras were opened, which belong to the points already open. */
   source?: CloudSource;
   photographs: Photograph[];
 }

@@ -10,10 +10,13 @@ const ADDRESS = '#reconstruct';
 /** Most points changed by hand that a link includes: some programs truncate long addresses. */
 export const MOST_EDITS = 200;
 
-/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
+/**
+ * Settings of the Reconstruct lab that are contained in a link; missing ones are as in the example, or else the
+ * method's defaults.
+ */
 export interface LinkedCloud extends Partial<CloudChoice> {
   example?: string;
-  /** Name of the user's own file, which is not part of the link. */
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
   params: ParamValues;
   edits: Edits;
@@ -22,7 +25,7 @@ export interface LinkedCloud extends Partial<CloudChoice> {
   photo?: number;
 }
 
-/** Present settings of the lab, from which a link is made. */
+/** Present settings of the Reconstruct lab, from which a link is made. */
 export interface CloudSettings {
   example: CloudExample | undefined;
   file: string;
@@ -35,8 +38,9 @@ export interface CloudSettings {
 }
 
 /**
- * Returns the settings that differ from those of the example, or else from the method's defaults; the points changed by
- * hand only if there are few enough. 0 stands for the default number of points, and for all clusters.
+ * Returns what a link to the lab's present state contains: the settings that differ from those of the example, or else
+ * from the method's defaults; the points changed by hand only if there are few enough. `maxPoints` is 0 for the default
+ * number of points, `keepComponents` is 0 for all clusters.
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
   const { example, file, choice, params, defaults, edits, color, photo } = settings;
@@ -53,14 +57,14 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
   };
 }
 
-/** Returns the index of the photograph that an example opens with, undefined if none. */
+/** Returns the index of the photograph whose camera the view uses when an example opens, undefined if none. */
 function photoOf(example: CloudExample | undefined): number | undefined {
   return isCloudPreset(example) ? example.photo : undefined;
 }
 
 /**
- * Returns the index of the photograph that the view opens with, undefined if none; `photo` of a link counts from 1, and
- * 0 means none.
+ * Returns the index of the photograph whose camera the view uses at first, undefined if none: that of a link, `photo`,
+ * which counts from 1 and is 0 for none, or else the example's.
  */
 export function photoFor(example: CloudExample | undefined, photo: number | undefined): number | undefined {
   if (photo === undefined) return photoOf(example);
@@ -73,8 +77,8 @@ export function fits({ added, removed, outside }: Edits): boolean {
 }
 
 /**
- * Returns the numbers of points and clusters, with those of a link in place of the given ones; 0 in a link stands for
- * the default number of points, and for all clusters.
+ * Returns `choice`, the numbers of points to use and of clusters to keep, with those in a link in place of its own; 0
+ * in a link stands for the default number of points, and for all clusters.
  */
 export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Partial<CloudChoice>): CloudChoice {
   return {
@@ -85,7 +89,7 @@ export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Par
 
 const coordinates = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
 
-/** Returns the hash of an address for a link's settings. */
+/** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: LinkedCloud): string {
   const query = new URLSearchParams();
   for (const name of ['example', 'file', 'maxPoints', 'keepComponents', 'color', 'photo'] as const) {

@@ -5,7 +5,7 @@ import type { History } from '../ui/history';
 import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
-/** Measures of the points and the fit, shown besides those of the surface. */
+/** Rows on the points and the fit in the Reconstruct lab's table of measures, listed after those on the surface. */
 export const FIT_ROWS: ExtraMeasure[] = [
   {
     name: 'fitMean',
@@ -50,7 +50,7 @@ export const FIT_ROWS: ExtraMeasure[] = [
   { name: 'residual', label: text('reconstruct.residual'), help: text('reconstruct.residualHelp'), text: figure },
 ];
 
-/** Returns the values of the measures of points and fit, by the names in {@link FIT_ROWS}. */
+/** Returns the values of the measures of points and fit, by the names of the rows in {@link FIT_ROWS}. */
 export function fitValues(fit: Fit): Record<string, unknown> {
   const { fitness, ...rest } = fit;
   if (!fitness) return { ...rest };
@@ -58,7 +58,7 @@ export function fitValues(fit: Fit): Record<string, unknown> {
   return { ...rest, fitMean: mean, fitRms: rms, fitMax: max, meanCurvature };
 }
 
-/** Plot of the solver's residual over the iterations. */
+/** Plot of the solver's residual and its tolerance over the iterations, for the Reconstruct lab. */
 export const RESIDUAL_PLOT: PlotKind = {
   title: text('reconstruct.residualPlot'),
   log: true,

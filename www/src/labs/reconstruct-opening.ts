@@ -15,13 +15,13 @@ import type { ReconstructSettings } from './reconstruct-settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
 
-/** Opened points, and the settings of their model, which the worker has built. */
+/** Points opened in the Reconstruct lab, and the settings of their model, which the worker has built. */
 export interface OpenedCloud {
   cloud: Cloud;
   params: ParamValues;
   photographs: Photograph[];
   setup: Setup;
-  /** Source of the points; if only cameras were opened, that of the present points. */
+  /** Source of the points; if only cameras were opened, that of the points already open. */
   from: CloudSource;
 }
 
@@ -31,7 +31,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   readonly #client: ReconstructClient;
   readonly #settings: ReconstructSettings;
   readonly #onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
-  /** Default parameters of the method. */
+  /** Default parameters of the method; links contain only the parameters that differ. */
   defaults: ParamValues = {};
 
   constructor(
@@ -77,8 +77,8 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /**
-   * Returns the source to remember as open: if only cameras were opened, the present points, with these cameras from
-   * now on.
+   * Returns the source to open again after a failure of the engine: the opened one or, if only cameras were opened, the
+   * present points with these cameras.
    */
   protected override sourceToRemember(
     origin: CloudOrigin,
@@ -93,7 +93,9 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     return this.#onOpened(opened, origin);
   }
 
-  /** Returns the present points, for cameras that are opened after them. Throws if there are none. */
+  /**
+   * Returns the source of the points that are open, for cameras that are opened after them. Throws if there are none.
+   */
   async #presentPoints(): Promise<CloudSource> {
     if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
     const { source } = await this.source.load();
@@ -112,9 +114,9 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /**
-   * Returns the settings before a link changes them: an example's own; for cameras alone, those in force; for points
-   * from a file opened without a link, when those before were from a file, too, the settings in force but the cell
-   * size; else the defaults.
+   * Returns the settings for newly opened data, before a link changes them: an example's own; for cameras alone, those
+   * in force; for points from a file opened without a link, when those before were from a file, too, the settings in
+   * force but the cell size; else the defaults.
    */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {

@@ -4,7 +4,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that {@link layOut} arranges on the lab's page. */
+/** Elements of the Reconstruct lab that {@link layOut} arranges on its page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -35,7 +35,10 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
+/**
+ * Arranges the elements of the Reconstruct lab in `root`: setup on one side, the view in the middle, results on the
+ * other side.
+ */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab reconstruct';
   const view = h(
@@ -70,7 +73,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** Names of the facts about points; they are shown before any are open, so that the layout does not shift. */
+/** Labels of the facts about the open points; shown before any are open, too, so that the layout does not shift. */
 const FACTS = [
   text('labs.factFile'),
   text('reconstruct.points'),
@@ -78,7 +81,7 @@ const FACTS = [
   text('reconstruct.factCameras'),
 ];
 
-/** Panel that shows the open points and opens others. */
+/** Panel of the Reconstruct lab with the facts about the open points, and controls to open examples and files. */
 export class CloudPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -86,7 +89,10 @@ export class CloudPanel {
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
-  /** `figures` are listed apart from the other examples. */
+  /**
+   * `figures`, the examples from the paper, are listed apart from the other examples; `chooser` is the control that
+   * opens files.
+   */
   constructor(
     examples: CloudExample[],
     figures: CloudExample[],
@@ -114,7 +120,7 @@ export class CloudPanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if the open points are no example. */
+  /** Selects the open example in the list of examples, or “Your file” if the open points are no example. */
   choose(example: CloudExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -170,7 +170,7 @@ export class ReconstructParts {
     this.#paramsHolder.replaceWith(this.#params.element);
   }
 
-  /** Shows newly opened points. */
+  /** Shows newly opened points with their cameras and facts. */
   adopt(cloud: Cloud, photographs: Photograph[], example: CloudExample | undefined, name: string): void {
     const { points, colors, normals } = cloud;
     this.#photographs = photographs;
@@ -191,7 +191,7 @@ export class ReconstructParts {
     this.warning.textContent = '';
   }
 
-  /** Shows the parameters in force; hides the constants of other kernels than the one in use. */
+  /** Shows the parameters in force; hides the constants of kernels that are not in use. */
   showParams(params: ParamValues, preset: CloudPreset | undefined, variant: CloudVariant | undefined): void {
     this.#params?.show(params);
     const isMulti = params.kernel === 'multi-order';

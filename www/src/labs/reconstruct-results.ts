@@ -11,7 +11,7 @@ import type { ReconstructParts } from './reconstruct-parts';
 
 export type ResultEvent = ProgressEvent | SurfaceEvent | ConstraintsEvent | MeasuredEvent | TimedEvent;
 
-/** Displays the worker's results: progress, constraints, surface and measures. */
+/** Displays the results of the Reconstruct lab's worker: progress, constraints, surface and measures. */
 export class ReconstructResults {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
@@ -30,7 +30,7 @@ export class ReconstructResults {
     this.#history = history;
   }
 
-  /** Whether there is a complete surface to save or pass on. */
+  /** Whether there is a complete surface, which can be saved or passed to another lab. */
   get complete(): boolean {
     return this.#complete;
   }
@@ -56,14 +56,16 @@ export class ReconstructResults {
     }
   }
 
-  /** Describes the state in the status line; if a finished run has no surface, a banner explains possible causes. */
+  /**
+   * Describes the lab's state in the status line; if a finished run has no surface, a banner explains possible causes.
+   */
   showState(state: LabState): void {
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
     if (state === 'done' && this.#history.reports.at(-1)?.vertices === 0) this.#showNothing();
   }
 
-  /** Describes a state for the status line. */
+  /** Returns the text for the status line in a state of the lab. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return text('labs.running');
@@ -78,12 +80,12 @@ export class ReconstructResults {
     });
   }
 
-  /** Clears the history for a new run; the surface stays until the new one is complete. */
+  /** Clears the history of iterations for a new run; the surface stays displayed until the new one is complete. */
   startOver(): void {
     this.#history.clear();
   }
 
-  /** Clears the history and the surface; only the points stay. */
+  /** Clears the history of iterations and the surface; only the points stay displayed. */
   clear(): void {
     this.#complete = false;
     this.#surface = undefined;
@@ -129,7 +131,10 @@ export class ReconstructResults {
     this.#ui.csv.disabled = this.#history.reports.length === 0;
   }
 
-  /** Clears a surface that belongs to other settings, and shows a banner with possible causes why there is none. */
+  /**
+   * For a run that ended without a surface: clears the one displayed, which belongs to other settings, and shows a
+   * banner with possible causes.
+   */
   #showNothing(): void {
     this.#complete = false;
     this.#ui.clearSurface();

@@ -16,14 +16,17 @@ const UNDO_LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which repeated changes of the same setting are undone as one, as when a slider is dragged. */
 const TOGETHER = 1500;
 
-/** The settings that undo restores. */
+/** Settings of the Reconstruct lab that undo restores. */
 interface Settings {
   choice: CloudChoice;
   params: ParamValues;
   edits: Edits;
 }
 
-/** The points and the settings of their model: changes them, sends them to the worker, and undoes changes. */
+/**
+ * Manages the edits of the points and the settings of their model: changes them, sends them to the worker, and undoes
+ * changes.
+ */
 export class ReconstructSettings {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
@@ -37,7 +40,7 @@ export class ReconstructSettings {
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
 
-  /** `onParams` is called whenever the parameters in force may have changed. */
+  /** `onParams` is called whenever the parameters in force may have changed, to display them. */
   constructor(
     client: ReconstructClient,
     ui: ReconstructParts,
@@ -66,7 +69,7 @@ export class ReconstructSettings {
     return this.#ui.setup.value;
   }
 
-  /** Adopts newly opened points, and clears the undo history. */
+  /** Takes over newly opened points and the settings of their model, and clears the undo history. */
   adopt(cloud: Cloud, setup: Setup): void {
     this.#cloud = cloud;
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
@@ -77,14 +80,15 @@ export class ReconstructSettings {
     this.#showEdits();
   }
 
-  /** Adopts the parameters in force, as reported by the worker, and shows them. */
+  /** Takes over and shows the parameters in force, as reported by the worker. */
   showParams(params: ParamValues): void {
     this.#params = params;
     this.#onParams(params);
   }
 
   /**
-   * Changes settings; the surface stays until the new one is complete. If the settings are rejected, nothing changes.
+   * Changes settings and runs the model; the surface stays until the new one is complete. `label` names the change for
+   * undo. If the settings are rejected, nothing changes.
    */
   change(changed: Partial<Settings>, label: string): Promise<void> {
     return this.#states.enqueue(() => this.#change(changed, label));
@@ -95,7 +99,7 @@ export class ReconstructSettings {
     return this.#states.enqueue(() => this.#setParam(name, value));
   }
 
-  /** Handles a click in the view with the selected tool. */
+  /** Edits the points by a click in the view with the selected tool. */
   pick(hit: Hit): Promise<void> {
     const { tool, distance } = this.#ui.tools;
     const length = distance * this.#ui.view.size;
@@ -115,7 +119,7 @@ export class ReconstructSettings {
     return this.#states.enqueue(() => this.#travel(way));
   }
 
-  /** Builds a new model with the same settings, before its first step. */
+  /** Has the worker build a new model with the same settings; the model does not run yet. */
   rebuild(): Promise<void> {
     return this.#states.enqueue(async () => this.showParams(await this.#handOver(this.#now)));
   }

@@ -8,7 +8,10 @@ import type { ReconstructOpening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ReconstructSettings } from './reconstruct-settings';
 
-/** Voxels along the longest side of a volume that is saved or passed on. */
+/**
+ * Number of voxels along the longest side of the volume in which the implicit function f is saved, or passed on to the
+ * Extract lab.
+ */
 const VOLUME_SIZE = 96;
 
 /**
@@ -36,7 +39,7 @@ export class ReconstructSharing {
     this.#opening = opening;
   }
 
-  /** Updates the page's address with what is open and the settings. */
+  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
   updateAddress(): void {
     const { source, defaults } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -71,8 +74,8 @@ export class ReconstructSharing {
   }
 
   /**
-   * Passes the implicit function f on to the Extract lab as a volume, with the level of the surface as iso value; f is
-   * above it inside.
+   * Opens the implicit function f in the Extract lab as a volume, with the value of f at the surface as iso value;
+   * inside the surface, f is above it.
    */
   toExtract(passOn: OpenInLab): void {
     this.#ui.status.say(text('reconstruct.samplingVolume'));
@@ -87,7 +90,7 @@ export class ReconstructSharing {
     });
   }
 
-  /** Passes the surface on as a mesh to deform. */
+  /** Opens the reconstructed surface in the Sculpt lab, as a mesh to deform. */
   toSculpt(passOn: OpenInLab): void {
     this.#tryTo(async () => {
       const bytes = await this.#client.request('export', { format: 'ply' });

@@ -73,7 +73,7 @@ export class ReconstructLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** Maps the user's actions to the parts that handle them. */
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -112,7 +112,7 @@ export class ReconstructLab implements Lab {
     ];
   }
 
-  /** Displays opened points, with the settings of their example or link, and runs the model. */
+  /** Displays newly opened points, with the settings of their example or link, and runs the model. */
   async #adopt(opened: OpenedCloud, { name, example, linked }: CloudOrigin): Promise<void> {
     const { cloud, params, photographs, setup } = opened;
     const pictured = photographs.some(({ picture }) => picture);
@@ -151,7 +151,7 @@ export class ReconstructLab implements Lab {
     this.#sharing.updateAddress();
   }
 
-  /** Rebuilds the model and clears the surface; only the points stay. */
+  /** Rebuilds the model with the same settings and clears the surface; only the points stay. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -178,7 +178,10 @@ export class ReconstructLab implements Lab {
     this.#ui.showState(modelState, ready, state !== 'loading' && this.#results.complete);
   }
 
-  /** Handles Escape: dismisses the message, else deselects the tool, else leaves the photograph. */
+  /**
+   * Handles the Escape key: dismisses the error message, else deselects the edit tool, else leaves the camera of a
+   * photograph.
+   */
   #escape(): void {
     const { banner, tools, photos } = this.#ui;
     if (banner.shown) this.#dismiss();

@@ -4,30 +4,36 @@ import { download } from '../ui/files';
 import type { History } from '../ui/history';
 import { toCsv } from './csv';
 
-/** Saves a lab's results as files named after the open volume or mesh; `say` shows the name of each file. */
+/** Saves a lab's results as files named after the open volume or mesh; `say` shows the name of each saved file. */
 export class Saving {
   readonly #fetch: (format: MeshFormat) => Promise<Uint8Array>;
   readonly #say: (text: string) => void;
-  /** Name of the open volume or file. */
+  /** Name of the open volume or file, from which the names of saved files are derived. */
   name = 'surface';
 
-  /** `fetch` returns the present surface as a file of the given format. */
+  /** `fetch` returns the present surface as a file of the given format; `say` shows a text in the status line. */
   constructor(fetch: (format: MeshFormat) => Promise<Uint8Array>, say: (text: string) => void) {
     this.#fetch = fetch;
     this.#say = say;
   }
 
-  /** Saves the present surface. */
+  /**
+   * Saves the present surface as a file; `type` is the media type of the format, and `suffix` is added to the file's
+   * name.
+   */
   async mesh(format: MeshFormat, type: string, suffix = ''): Promise<void> {
     this.bytes(format, await this.#fetch(format), type, suffix);
   }
 
-  /** Saves the data of the plots as CSV. */
+  /** Saves the data of the plots as CSV; `residual` is the heading of the residual's column. */
   plots(history: History, residual?: string): void {
     this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
   }
 
-  /** Saves bytes as a file; `suffix` distinguishes files of the same type. */
+  /**
+   * Saves bytes as a file of the media type `type`; `suffix` is added to the file's name, to distinguish files of the
+   * same type.
+   */
   bytes(extension: string, bytes: Uint8Array, type: string, suffix = ''): void {
     const stem = this.name
       .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')

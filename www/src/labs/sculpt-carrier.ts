@@ -4,14 +4,14 @@ import type { FrameEvent, Pose, Surface } from '../sculpt/protocol';
 import type { SculptureView } from '../view/sculpture';
 
 /**
- * Deforms the displayed surface along with the ellipsoids at once during a drag, between two frames of the model; each
- * frame of the model replaces the result.
+ * Deforms the displayed surface along with dragged ellipsoids at once, without waiting for the model; each frame that
+ * the model computes replaces this approximation.
  */
 export class SurfaceCarrier {
   readonly #view: SculptureView;
-  /** The last frame of the model. */
+  /** Last displayed frame of the model, whose surface is deformed; undefined before the first. */
   #frame: FrameEvent | undefined;
-  /** Pose under the pointer, and its id, until the model has reached it. */
+  /** Pose of the ellipsoids under the pointer, and its id, until the model has reached it. */
   #dragged: { pose: Pose; poseId: number } | undefined;
 
   constructor(view: SculptureView) {
@@ -19,8 +19,8 @@ export class SurfaceCarrier {
   }
 
   /**
-   * Deforms the displayed surface to a dragged pose; returns false if that was not possible, because there is no frame
-   * of the model yet or the number of ellipsoids has changed.
+   * Deforms the displayed surface to a dragged pose of the ellipsoids; returns false if that was not possible, because
+   * there is no frame of the model yet or the number of ellipsoids has changed.
    */
   dragTo(pose: Pose, poseId: number): boolean {
     this.#dragged = { pose, poseId };
@@ -28,8 +28,8 @@ export class SurfaceCarrier {
   }
 
   /**
-   * Takes a frame of the model that is displayed, and deforms its surface to the pointer's pose if the model has not
-   * reached it.
+   * Called when a frame of the model is displayed: deforms its surface to the pose under the pointer if the model has
+   * not reached that pose.
    */
   frameShown(frame: FrameEvent): void {
     this.#frame = frame;
@@ -42,14 +42,14 @@ export class SurfaceCarrier {
     else this.#deform();
   }
 
-  /** Displays the surface of the model itself, once nothing moves. */
+  /** Displays the model's own surface in place of the approximation, once the run has stopped. */
   stop(): void {
     if (!this.#dragged) return;
     this.#dragged = undefined;
     this.#place((surface) => surface.positions);
   }
 
-  /** Forgets the frame and the pose, for another scene. */
+  /** Forgets the model's frame and the dragged pose, for another scene. */
   clear(): void {
     this.#frame = undefined;
     this.#dragged = undefined;

@@ -6,10 +6,10 @@ import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 import type { SculptSettings } from './sculpt-settings';
 
-/** Duration of a recorded frame, in seconds. */
+/** Duration of a frame in a recorded film, in seconds. */
 const FRAME_SECONDS = 1 / 25;
 
-/** Edits films by keyframes, and records them as files. */
+/** Edits the Sculpt lab's film, a motion of the ellipsoids given by keyframes, and records it as a file. */
 export class Filming {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -23,7 +23,7 @@ export class Filming {
     this.#settings = settings;
   }
 
-  /** Appends the present pose to the film as a keyframe, and moves the film to it. */
+  /** Appends the present pose of the ellipsoids to the film as a keyframe, and makes it the film's present frame. */
   addKey(): void {
     const { film, pose } = this.#settings;
     const known =
@@ -52,7 +52,7 @@ export class Filming {
     if (film) this.#change({ ...film, loop }, text('sculpt.loopChange'), frame);
   }
 
-  /** Moves the film to a frame, and the ellipsoids to its pose, without playing. */
+  /** Makes a frame the film's present one, and moves the ellipsoids to its pose, without playing the film. */
   seek(frame: number): void {
     const { film } = this.#settings;
     if (!film || !this.#states.canChange) return;
@@ -61,7 +61,7 @@ export class Filming {
     void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
-  /** Records the whole film as one file. */
+  /** Records the whole film as a GLB file with an animated surface, and saves the file. */
   async record(): Promise<void> {
     if (!this.#states.canChange) return;
     this.#ui.film.showRecording(0);

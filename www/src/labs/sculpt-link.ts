@@ -10,13 +10,16 @@ const ADDRESS = '#sculpt';
 /** Most keyframes that a link includes: some programs truncate long addresses. */
 export const MOST_KEYS = 12;
 
-/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
+/**
+ * Settings of the Sculpt lab that are contained in a link; missing ones are as in the example, or else the method's
+ * defaults.
+ */
 export interface LinkedScene {
   example?: string;
-  /** Name of the user's own file, which is not part of the link. */
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
   params: ParamValues;
-  /** Pose that the ellipsoids move to, if it was set by hand. */
+  /** Target pose of the ellipsoids, if it was set by hand. */
   pose?: Pose;
   names?: string[];
   /** Keyframes of the user's own film; without them, `loop` applies to the example's film. */
@@ -27,7 +30,7 @@ export interface LinkedScene {
   layout?: string;
 }
 
-/** Present settings of the lab, from which a link is made. */
+/** Present settings of the Sculpt lab, from which a link is made. */
 export interface SceneSettings {
   example: SculptExample | undefined;
   file: string;
@@ -41,8 +44,8 @@ export interface SceneSettings {
 }
 
 /**
- * Returns the settings that differ from those of the example, and the parameters that differ from `usual`; keyframes
- * only if there are at most {@link MOST_KEYS}.
+ * Returns what a link to the lab's present state contains: the settings that differ from those of the example, and the
+ * parameters that differ from `usual`; keyframes only if there are at most {@link MOST_KEYS}.
  */
 export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
   const own = film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS;
@@ -60,8 +63,8 @@ export function linkOf({ example, file, params, usual, pose, film, color, layout
 }
 
 /**
- * Returns the film that a link asks for: of its keyframes or, if it has none, the example's, `usual`; the link may also
- * set whether the film loops.
+ * Returns the film for the settings in a link: of the link's keyframes or, if it has none, `usual`, the example's film;
+ * the link may also set whether the film loops.
  */
 export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undefined): Film | undefined {
   const film = keys && keys.length > 0 ? { keys, between: between ?? 24, loop: false } : usual;
@@ -69,8 +72,8 @@ export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undef
 }
 
 /**
- * Converts a pose to text. The numbers of an ellipsoid are rounded to multiples of a power of ten that is at most 10⁻⁴
- * of its longest semi-axis, which is finer than any drag.
+ * Converts a pose of the ellipsoids to text for a link. The numbers of an ellipsoid are rounded to multiples of a power
+ * of ten that is at most 10⁻⁴ of its longest semi-axis, which is finer than any drag.
  */
 function asText(pose: Pose): string {
   return pose
@@ -92,7 +95,7 @@ function asPose(text: string): Pose | undefined {
   return pose.every((one) => one !== undefined) ? pose : undefined;
 }
 
-/** Returns the hash of an address for a link's settings. */
+/** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: LinkedScene): string {
   const query = new URLSearchParams();
   for (const name of ['example', 'file', 'color', 'layout', 'between', 'loop'] as const) {

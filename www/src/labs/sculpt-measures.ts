@@ -5,7 +5,9 @@ import type { History } from '../ui/history';
 import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
-/** Measures of frames, detail and correspondence, shown besides those of the surface. */
+/**
+ * Rows on frames, detail and correspondence in the Sculpt lab's table of measures, listed after those on the surface.
+ */
 export const SCULPT_ROWS: ExtraMeasure[] = [
   { name: 'frameMs', label: text('sculpt.frameTime'), help: text('sculpt.frameTimeHelp'), text: milliseconds },
   {
@@ -50,7 +52,9 @@ export const SCULPT_ROWS: ExtraMeasure[] = [
   },
 ];
 
-/** Plots of the Sculpt lab, over the frames. */
+/**
+ * Plots of the Sculpt lab over the frames that the model computes: residual, number of vertices, and time per frame.
+ */
 export const SCULPT_PLOTS: PlotKind[] = [
   {
     title: text('sculpt.residualPlot'),

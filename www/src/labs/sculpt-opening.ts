@@ -12,8 +12,8 @@ import type { SculptParts } from './sculpt-parts';
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 
 /**
- * Parameters for the user's own meshes: each edge of the base may be halved twice for the detail, since the base has
- * fewer triangles than the detail needs.
+ * Parameters for the user's own meshes: each edge of the base may be halved twice where the detail needs more vertices,
+ * since the base has fewer triangles than the detail.
  */
 const OWN_PARAMS = { supersample: 2 };
 
@@ -34,7 +34,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     this.#onOpened = onOpened;
   }
 
-  /** Opens a mesh passed on by another lab. */
+  /** Opens a mesh passed on by another lab, given as the name and the content of a file. */
   bytes(name: string, bytes: Uint8Array): Promise<void> {
     return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }) });
   }

@@ -4,7 +4,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that {@link layOut} arranges on the lab's page. */
+/** Elements of the Sculpt lab that {@link layOut} arranges on its page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -29,7 +29,10 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
+/**
+ * Arranges the elements of the Sculpt lab in `root`: setup on one side, the view in the middle, results on the other
+ * side.
+ */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab sculpt';
   const scene = h('div', { class: 'scene' }, parts.canvas, parts.legend, parts.coarse, parts.captions);
@@ -62,10 +65,13 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** Names of the facts about a scene; they are shown before one is open, so that the layout does not shift. */
+/** Labels of the facts about the open scene; shown before a scene is open, too, so that the layout does not shift. */
 const FACTS = [text('labs.factFile'), text('sculpt.factDetail'), text('sculpt.factBands'), text('sculpt.factDuration')];
 
-/** Panel that shows the open scene and opens others. */
+/**
+ * Panel of the Sculpt lab with the facts about the open scene (meshes and ellipsoids), and controls to open examples
+ * and files.
+ */
 export class ScenePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -73,7 +79,10 @@ export class ScenePanel {
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
-  /** `figures` are listed apart from the other examples. */
+  /**
+   * `figures`, the examples from the paper, are listed apart from the other examples; `chooser` is the control that
+   * opens files.
+   */
   constructor(
     examples: SculptExample[],
     figures: SculptExample[],
@@ -104,7 +113,7 @@ export class ScenePanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if the open scene is no example. */
+  /** Selects the open example in the list of examples, or “Your file” if the open scene is no example. */
   choose(example: SculptExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -149,7 +149,7 @@ export class SculptParts {
     this.#paramsHolder.replaceWith(this.#params.element);
   }
 
-  /** Shows a newly opened scene. */
+  /** Shows a newly opened scene: meshes with their texture, ellipsoids and facts. */
   adopt(
     { box, start, pose, detail, bands, buildMs, texture }: OpenedScene,
     example: SculptExample | undefined,
@@ -196,8 +196,8 @@ export class SculptParts {
   }
 
   /**
-   * Enables and disables controls according to the state; with `canPlay`, a converged model can be played, since there
-   * is a film.
+   * Enables and disables controls according to the lab's state. `ready`: whether there is a model; `canPlay`: whether
+   * there is a film, which can be played even when the model has converged.
    */
   showState(state: LabState, ready: boolean, canPlay: boolean): void {
     this.transport.showState(state === 'done' && canPlay ? 'paused' : state, ready);

@@ -6,19 +6,19 @@ import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
 import type { SculptSettings } from './sculpt-settings';
 
-/** Displacement by one key press, as a fraction of the scene's size. */
+/** Displacement of an ellipsoid by one key press, as a fraction of the diagonal of the scene's bounding box. */
 const MOVE_STEP = 0.02;
-/** Rotation by one key press, radians. */
+/** Rotation of an ellipsoid by one key press, radians. */
 const ROTATION_STEP = 0.1;
-/** Scale factor by one key press. */
+/** Factor by which one key press scales an ellipsoid. */
 const SCALE_STEP = 1.06;
-/** Fraction of the effect of one key press while Shift is held. */
+/** Share of a key press's effect on an ellipsoid that remains while Shift is held. */
 const FINE_FACTOR = 0.2;
 
-/** Radius of a new ellipsoid, as a fraction of the scene's size. */
+/** Radius of a new ellipsoid, as a fraction of the diagonal of the scene's bounding box. */
 const NEW_RADIUS = 0.12;
 
-/** Milliseconds after the last key press until the change counts as ended. */
+/** Milliseconds after the last key press until the change of an ellipsoid by keys counts as ended. */
 const IDLE_MS = 350;
 
 const MODE_KEYS: Record<string, HandleMode> = { m: 'move', t: 'turn', e: 'size' };
@@ -28,7 +28,7 @@ const DONE: Record<HandleMode, string> = {
   size: text('sculpt.scaled'),
 };
 
-/** Keys, in the catalogue of texts, of the messages on what handles and arrow keys do. */
+/** Keys, in the catalogue of texts, of the messages that tell what handles and arrow keys do in each mode. */
 const MODE_TEXTS = { move: 'sculpt.handlesMove', turn: 'sculpt.handlesRotate', size: 'sculpt.handlesScale' } as const;
 
 /** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
@@ -36,7 +36,7 @@ export class Posing {
   readonly #ui: SculptParts;
   readonly #settings: SculptSettings;
   #mode: HandleMode = 'move';
-  /** Timer that ends a series of key presses. */
+  /** Id of the timer that ends a series of key presses. */
   #resting = 0;
 
   constructor(ui: SculptParts, settings: SculptSettings) {
@@ -55,14 +55,16 @@ export class Posing {
     this.#ui.status.say(text(MODE_TEXTS[mode]));
   }
 
-  /** Replaces the selected ellipsoid by one entered as numbers. */
+  /** Replaces the selected ellipsoid by one entered as numbers; `what` names the change. */
   change(ellipsoid: ControlEllipsoid, what: string): void {
     this.#checkpoint(what, true);
     this.#send(ellipsoid, false);
     this.#announce(what);
   }
 
-  /** Adds an ellipsoid beside the selected one, or else in the middle of the scene; the model lets it grow. */
+  /**
+   * Adds an ellipsoid beside the selected one, or else in the middle of the scene; in the model it grows from nothing.
+   */
   add(): void {
     const { pose, chosen, names } = this.#settings;
     const size = NEW_RADIUS * this.#ui.view.size;
@@ -78,7 +80,7 @@ export class Posing {
     this.#settings.choose(pose.length);
   }
 
-  /** Removes the selected ellipsoid, unless it is the only one; the model lets it shrink until it vanishes. */
+  /** Removes the selected ellipsoid, unless it is the only one; in the model it shrinks until it vanishes. */
   remove(): void {
     const { pose, chosen, names } = this.#settings;
     if (chosen === undefined || pose.length < 2) return;
@@ -114,7 +116,10 @@ export class Posing {
     this.#settings.checkpoint(label, merge ? label : '');
   }
 
-  /** Describes the ellipsoid's new position in the status line, once the change has ended. */
+  /**
+   * Describes the new position of the selected ellipsoid in the status line, once a change has ended; `what` names the
+   * change.
+   */
   #announce(what: string): void {
     const { pose, chosen } = this.#settings;
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
@@ -124,8 +129,9 @@ export class Posing {
   }
 
   /**
-   * Handles a key in the view: selects an ellipsoid, chooses what handles and arrow keys do, or changes the selected
-   * ellipsoid. Returns whether the key did one of these.
+   * Handles a key in the 3D view: selects an ellipsoid, chooses what handles and arrow keys do, or changes the selected
+   * ellipsoid. `directions` are the view's axes: to the right, upwards and towards the viewer. Returns whether the key
+   * did one of these.
    */
   #key({ key, shiftKey }: KeyboardEvent, directions: Vec3[]): boolean {
     const mode = MODE_KEYS[key];
@@ -140,7 +146,10 @@ export class Posing {
     return true;
   }
 
-  /** Ends a series of key presses, so that the preview ends, too. */
+  /**
+   * Ends a series of key presses: sends the pose once more, as final, so that the model's preview ends, and announces
+   * it.
+   */
   #rest(): void {
     this.#settings.send(this.#settings.pose, false);
     this.#announce(DONE[this.#mode]);
@@ -167,7 +176,7 @@ export class Posing {
 }
 
 interface Step {
-  /** Axis of the view: 0 to the right, 1 upwards, 2 towards the viewer. */
+  /** Axis of the view to which an arrow or page key belongs: 0 to the right, 1 upwards, 2 towards the viewer. */
   axis: 0 | 1 | 2;
   sign: 1 | -1;
 }
@@ -182,14 +191,14 @@ const STEPS: Record<string, Step> = {
 };
 
 /**
- * Signs of the rotations by arrow and page keys, by axis of the key: the front of the ellipsoid turns in the direction
- * of the arrow.
+ * Signs of the rotations by the keys for the three axes of the view (to the right, upwards, towards the viewer): the
+ * front of the ellipsoid turns in the direction of the arrow.
  */
 const TURN_SIGNS = [1, -1, 1] as const;
 
 /**
- * Scales an ellipsoid by a key: by up and down along all axes, by left and right along the first, by the page keys
- * along the third.
+ * Returns an ellipsoid scaled by a key: by up and down along all its axes, by left and right along the first, by the
+ * page keys along the third. `much` is the strength, 1 for a full step.
  */
 function sized(ellipsoid: ControlEllipsoid, { axis, sign }: Step, much: number): ControlEllipsoid {
   const factor = SCALE_STEP ** (sign * much);

@@ -10,7 +10,7 @@ import type { SculptParts } from './sculpt-parts';
 /** Smallest number of milliseconds between two updates of the plots, which take time to draw. */
 const SHOW_EVERY = 250;
 
-/** Displays the worker's results: frames, measures and plots. */
+/** Displays the results of the Sculpt lab's worker: frames of the model, measures and plots. */
 export class SculptResults {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -23,10 +23,10 @@ export class SculptResults {
   #more: Record<string, unknown> = {};
   /** Whether the undeformed meshes are displayed or were requested. */
   #originals = false;
-  /** Counts scenes, so that replies for a previous one are discarded. */
+  /** Counts the scenes opened, so that the worker's replies for a previous scene are discarded. */
   #scene = 0;
 
-  /** `follow` is called with each frame when it is displayed. */
+  /** `follow` is called with each frame of the model when it is displayed. */
   constructor(
     client: SculptClient,
     ui: SculptParts,
@@ -53,13 +53,13 @@ export class SculptResults {
     this.startOver();
   }
 
-  /** Clears the history, for a new run of the same scene. */
+  /** Clears the history of steps, for a new run of the same scene. */
   startOver(): void {
     this.#history.clear();
     this.#showHistory();
   }
 
-  /** Displays a frame at the next animation frame; only then does the worker continue. */
+  /** Displays a frame of the model at the browser's next animation frame; only then does the worker continue. */
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
     if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
@@ -94,7 +94,7 @@ export class SculptResults {
     this.#ui.status.say(this.describe(state));
   }
 
-  /** Describes a state for the status line. */
+  /** Returns the text for the status line in a state of the lab. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return text('labs.running');
@@ -109,7 +109,7 @@ export class SculptResults {
       : text('sculpt.pausedAt', { iteration: count(last.iteration), surface: what });
   }
 
-  /** Requests and displays the undeformed meshes, if the layout includes them. */
+  /** Requests and displays the undeformed meshes, if the layout of the view includes them. */
   showOriginals(): void {
     if (this.#originals || this.#ui.options.value.layout !== 'row' || !this.#states.ready) return;
     this.#originals = true;
@@ -124,7 +124,10 @@ export class SculptResults {
     );
   }
 
-  /** Requests and displays the stages of restructuring shown in a figure of the paper, which need no model. */
+  /**
+   * Requests and displays the stages of restructuring shown in a figure of the paper, for which the worker needs no
+   * model.
+   */
   showStages(kind: StageKind): void {
     const scene = this.#scene;
     this.#client.request('stages', kind).then(

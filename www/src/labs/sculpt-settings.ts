@@ -9,7 +9,7 @@ import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 import { UndoHistory } from './undo-history';
 
-/** State of the page besides the model, which undo restores. */
+/** The page's part of a saved state; the worker saves the model. Undo restores both. */
 interface PageState {
   names: string[];
   posed: boolean;
@@ -17,17 +17,20 @@ interface PageState {
   mark: (iteration: number) => HistoryMark;
 }
 
-/** The settings that a scene opens with. */
+/** The settings that a scene (meshes and ellipsoids) of the Sculpt lab opens with. */
 export interface Adopted {
   pose: Pose;
   names: string[];
-  /** Whether the pose was set by hand, rather than by the example. */
+  /** Whether the pose of the ellipsoids was set by hand, rather than by the example, so that links must contain it. */
   posed: boolean;
   film: Film | undefined;
   params: ParamValues;
 }
 
-/** Ellipsoids, film and parameters of the Sculpt lab: changes them, sends them to the worker, and undoes changes. */
+/**
+ * Manages the ellipsoids, film and parameters of the Sculpt lab: changes them, sends them to the worker, and undoes
+ * changes.
+ */
 export class SculptSettings {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -42,10 +45,13 @@ export class SculptSettings {
   #posed = false;
   #film: Film | undefined;
   #frame = 0;
-  /** Id of the last pose sent; ids count up. */
+  /** Id of the last pose sent to the worker; ids count up. */
   #poseId = 0;
 
-  /** `onChange` is called whenever the settings in force may have changed. */
+  /**
+   * `onChange` is called whenever the settings in force may have changed, to display them and to update the page's
+   * address.
+   */
   constructor(client: SculptClient, ui: SculptParts, states: LabStates, history: History, onChange: () => void) {
     this.#client = client;
     this.#ui = ui;
@@ -67,7 +73,7 @@ export class SculptSettings {
     return this.#pose;
   }
 
-  /** Whether the pose was set by hand. */
+  /** Whether the pose of the ellipsoids was set by hand, so that links must contain it. */
   get posed(): boolean {
     return this.#posed;
   }
@@ -84,7 +90,7 @@ export class SculptSettings {
     return this.#chosen;
   }
 
-  /** Returns the number and name of an ellipsoid, for messages. */
+  /** Returns number and name, for messages, of the ellipsoid with the given index. */
   nameOf(index: number): string {
     const name = this.#names[index];
     return name
@@ -92,7 +98,7 @@ export class SculptSettings {
       : text('sculpt.ellipsoid', { number: index + 1 });
   }
 
-  /** Adopts another scene, and clears the undo history. */
+  /** Takes over the settings of a newly opened scene, and clears the undo history. */
   adopt({ pose, names, posed, film, params }: Adopted): void {
     this.#undo.clear();
     this.#pose = pose;
@@ -105,7 +111,7 @@ export class SculptSettings {
     this.show();
   }
 
-  /** Selects an ellipsoid, or none. */
+  /** Selects the ellipsoid with the given index, or none. */
   choose(index: number | undefined): void {
     const chosen = index !== undefined && index < this.#pose.length ? index : undefined;
     if (chosen !== this.#chosen)
@@ -117,16 +123,17 @@ export class SculptSettings {
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
-   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state before a change, so that undo can restore it; `label` names the change. Changes with the
+   * same `mergeKey`, unless empty, in short succession are undone as one. Returns a function that discards the saved
+   * state, to call if the change fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
   /**
-   * Sends the worker a target pose for the ellipsoids, unless settings cannot be changed now; `names` are the
-   * ellipsoids' names if some were added or removed.
+   * Sends the worker a target pose for the ellipsoids, unless settings cannot be changed now. `dragging`: whether the
+   * pose is part of a drag that continues; `names` are the ellipsoids' names if some were added or removed.
    */
   send(pose: Pose, dragging: boolean, names = this.#names): void {
     if (!this.#states.canChange) return;
@@ -158,7 +165,7 @@ export class SculptSettings {
     return this.#names;
   }
 
-  /** Sets the film and its frame; the ellipsoids do not move. */
+  /** Sets the film and its present frame; the ellipsoids do not move. */
   async setFilm(film: Film | undefined, frame: number): Promise<void> {
     this.#film = film;
     this.#frame = frame;
@@ -166,7 +173,10 @@ export class SculptSettings {
     await this.#client.request('film', { film, frame });
   }
 
-  /** Adopts the film's frame and the target pose of a frame computed by the model, unless a newer pose was sent. */
+  /**
+   * Takes over the film's present frame and the target pose of the ellipsoids from a frame computed by the model,
+   * unless a newer pose has been sent to it.
+   */
   follow({ poseId, frame, pose }: FrameEvent, playing: boolean): void {
     if (poseId < this.#poseId) return;
     if (playing && frame !== this.#frame) this.#posed = false;
@@ -179,7 +189,10 @@ export class SculptSettings {
     this.#ui.film.show(this.#film, frame);
   }
 
-  /** Returns to `pose`, the previous target, after the worker has rejected a pose, and shows why. */
+  /**
+   * Returns the page to `pose`, the previous target of the ellipsoids, after the worker has rejected a pose, and shows
+   * why.
+   */
   reject(pose: Pose, why: string): void {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
@@ -187,7 +200,10 @@ export class SculptSettings {
     this.#ui.ellipsoids.showError(why);
   }
 
-  /** Sets parameters of the live model; a run continues, and a converged model is resumed. */
+  /**
+   * Sets parameters of the live model; a run continues, and a converged model is resumed. `what` names the change for
+   * undo.
+   */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return this.show();
@@ -220,7 +236,8 @@ export class SculptSettings {
   }
 
   /**
-   * Builds a new model of the same meshes with the parameters in force, before its first step; clears the undo history.
+   * Has the worker build a new model of the same meshes with the parameters in force, which does not run yet; clears
+   * the undo history. `start` are the ellipsoids before the first step; undefined keeps those of the previous model.
    */
   rebuild(start: Pose | undefined): Promise<void> {
     return this.#states.enqueue(async () => {
@@ -236,7 +253,7 @@ export class SculptSettings {
     });
   }
 
-  /** Shows all settings in force on the page. */
+  /** Shows the settings in force on the page: ellipsoids, film and parameters. */
   show(): void {
     this.#showPose();
     this.#ui.film.show(this.#film, this.#frame);
@@ -264,7 +281,7 @@ export class SculptSettings {
   }
 }
 
-/** Returns `count` names, padded with empty ones. */
+/** Returns the names of `count` ellipsoids: `names`, cut off or filled up with empty ones. */
 function named(names: string[], count: number): string[] {
   return Array.from({ length: count }, (_, k) => names[k] ?? '');
 }

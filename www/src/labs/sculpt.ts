@@ -28,7 +28,7 @@ import { Posing } from './sculpt-posing';
 import { SculptResults } from './sculpt-results';
 import { SculptSettings } from './sculpt-settings';
 
-/** The colourings whose values the worker has to compute at the vertices. */
+/** The colourings of the surface for which the worker has to compute values at the vertices. */
 const QUANTITIES: readonly string[] = [
   'area distortion',
   'angle distortion',
@@ -50,7 +50,10 @@ export class SculptLab implements Lab {
   readonly #posing: Posing;
   readonly #filming: Filming;
   readonly #opening: SculptOpening;
-  /** Parameters that the scene opened with, including the model's own choices, but without changes by a link. */
+  /**
+   * Parameters that the scene opened with, including the model's own choices, but without changes by a link, which
+   * contains only parameters that differ from these.
+   */
   #usual: ParamValues = {};
   #shown: FrameContents = { layout: 'result', quantity: undefined, textured: false };
 
@@ -87,7 +90,7 @@ export class SculptLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** Maps the user's actions to the parts that handle them. */
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -137,8 +140,8 @@ export class SculptLab implements Lab {
   }
 
   /**
-   * Displays an opened scene, with the settings of its example or link. Plays its film; without one, with a pose from a
-   * link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
+   * Displays a newly opened scene, with the settings of its example or link. Plays its film; without a film, with a
+   * pose from a link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
    */
   async #adopt(opened: OpenedScene, { name, example, linked }: SculptSource): Promise<void> {
     this.#states.ready = true;
@@ -225,7 +228,7 @@ export class SculptLab implements Lab {
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
-  /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history cleared. */
+  /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history of steps cleared. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -246,7 +249,7 @@ export class SculptLab implements Lab {
     request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
-  /** Updates the page's address with what is open and the settings. */
+  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
   #updateAddress(): void {
     const { source } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;

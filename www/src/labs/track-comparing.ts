@@ -5,7 +5,7 @@ import { comparedRun, type TrackingRun } from '../ui/track-compare';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
-/** Names of the enrichments in the comparison. */
+/** Displayed names, in the comparison of two runs, of the methods that insert slices into the image. */
 const NAMES: Record<Enrichment, string> = {
   none: text('track.withoutEnrichment'),
   linear: text('track.linear'),
@@ -13,8 +13,8 @@ const NAMES: Record<Enrichment, string> = {
 };
 
 /**
- * Tracks the present image again with one setting changed; returns the present and the new run for comparison, or
- * undefined if cancelled.
+ * Tracks the present image again with one setting, `other`, changed; returns the present and the new run for
+ * comparison, or undefined if cancelled.
  */
 export async function compareWith(
   client: TrackClient,

@@ -8,10 +8,10 @@ import { differing, readValue } from './link';
 
 const ADDRESS = '#track';
 
-/** The settings in a link; missing ones are as in the example, or else the defaults. */
+/** Settings of the Track lab that are contained in a link; missing ones are as in the example, or else the defaults. */
 export interface LinkedTrack {
   example?: string;
-  /** Name of the user's own file, which is not part of the link. */
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
   params: ParamValues;
   preparation: Partial<Preparation>;
@@ -20,7 +20,7 @@ export interface LinkedTrack {
   view: Partial<TrackViewOptions>;
 }
 
-/** Present settings of the lab, from which a link is made. */
+/** Present settings of the Track lab, from which a link is made. */
 export interface LinkableTrack {
   example: TrackExample | undefined;
   file: string;
@@ -31,7 +31,10 @@ export interface LinkableTrack {
 const SWITCHES = ['surface', 'edges', 'region'] as const;
 const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enrichment[];
 
-/** Returns the setup that an example, or else the user's own image, opens with, changed by a link. */
+/**
+ * Returns the setup of the tracker that an example, or else the user's own image, opens with, changed by the settings
+ * in a link.
+ */
 export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack): Setup {
   const { box, at } = linked ?? {};
   return {
@@ -42,7 +45,10 @@ export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack)
   };
 }
 
-/** Returns the settings that differ from those of the example, or else from the defaults. */
+/**
+ * Returns what a link to the lab's present state contains: the settings that differ from those of the example, or else
+ * from the defaults.
+ */
 export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTrack {
   const usual = setupOf(example);
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
@@ -59,7 +65,7 @@ export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTra
 
 const asText = (values: number[]) => values.map((value) => Number(value.toFixed(3))).join(',');
 
-/** Returns the hash of an address for a link's settings. */
+/** Converts the settings in a link to the hash of an address. */
 export function toHash({ example, file, params, preparation, box, at, view }: LinkedTrack): string {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))

@@ -7,7 +7,7 @@ import type { ExtraMeasure } from '../ui/measures';
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const round = (value: number) => figure(Number(value.toPrecision(3)));
 
-/** Measures of the tracking, shown besides those of the frame's surface. */
+/** Rows on the tracking in the Track lab's table of measures, listed after those on the displayed frame's surface. */
 export const TRACK_ROWS: ExtraMeasure[] = [
   {
     name: 'ejection',
@@ -45,7 +45,7 @@ export const TRACK_ROWS: ExtraMeasure[] = [
   { name: 'noise', label: text('track.noise'), help: text('track.noiseHelp'), text: round },
 ];
 
-/** The results so far from which the lab's measures are computed. */
+/** The tracking results so far, from which the Track lab's measures are computed. */
 export interface Tracked {
   frames: readonly TrackedFrame[];
   /** Number of frames of the image. */
@@ -56,8 +56,8 @@ export interface Tracked {
 }
 
 /**
- * Returns the values of the tracking's measures by the names in {@link TRACK_ROWS}, and more for programs that read the
- * page.
+ * Returns the values of the tracking's measures by the names of the rows in {@link TRACK_ROWS}, and some that have no
+ * row, for programs that read the page.
  */
 export function moreOf({ frames, count, frame, closing, noise }: Tracked): Record<string, unknown> {
   const beat = frames.length === count ? beatOf(frames.map(({ facts }) => facts.volume)) : undefined;
@@ -88,7 +88,10 @@ const COLUMNS = [
   ],
 ] as const;
 
-/** Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units. */
+/**
+ * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units. `truth`
+ * are the true volumes of the frames, if known.
+ */
 export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
   const known = frames.some(({ error }) => error);
   const head = ['frame', ...COLUMNS, 'self-intersections', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];

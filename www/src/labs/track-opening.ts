@@ -12,7 +12,7 @@ import type { TrackParts } from './track-parts';
 
 export type TrackSource = Source<TrackExample, LinkedTrack, ImageSource>;
 
-/** An opened image, and the setup of its tracker. */
+/** A 4D image opened in the Track lab, and the setup of its tracker. */
 export interface OpenedTrack extends OpenedFilm {
   setup: Setup;
 }

@@ -5,7 +5,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { figure, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** Elements that {@link layOut} arranges on the lab's page. */
+/** Elements of the Track lab that {@link layOut} arranges on its page. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -34,7 +34,10 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: setup on one side, view and slices in the middle, results on the other side. */
+/**
+ * Arranges the elements of the Track lab in `root`: setup on one side, view and slices in the middle, results on the
+ * other side.
+ */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab track';
   const scene = h('div', { class: 'scene' }, parts.canvas);
@@ -79,7 +82,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** Names of the facts about an image; they are shown before one is open, so that the layout does not shift. */
+/** Labels of the facts about the open image; shown before an image is open, too, so that the layout does not shift. */
 const FACTS = [
   text('labs.factFile'),
   text('labs.frames'),
@@ -89,7 +92,7 @@ const FACTS = [
   text('track.factOpening'),
 ];
 
-/** Panel that shows the open image and opens others. */
+/** Panel of the Track lab with the facts about the open image, and controls to open examples and files. */
 export class ImagePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -97,7 +100,10 @@ export class ImagePanel {
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
-  /** `figures` are listed apart from the other examples. */
+  /**
+   * `figures`, the examples from the paper, are listed apart from the other examples; `chooser` is the control that
+   * opens files.
+   */
   constructor(
     examples: TrackExample[],
     figures: TrackExample[],
@@ -130,7 +136,7 @@ export class ImagePanel {
     );
   }
 
-  /** Selects the open example in the list, or “Your file” if the open image is no example. */
+  /** Selects the open example in the list of examples, or “Your file” if the open image is no example. */
   choose(example: TrackExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -95,7 +95,10 @@ export class TrackParts {
   readonly #thresholdHolder = h('div');
   #params: ParamControls | undefined;
   #threshold: EdgeThreshold | undefined;
-  /** Half width k of the window, in voxels. */
+  /**
+   * Half width k, in voxels, of the windows in which the tracker finds the boundary; the preview of an edge threshold
+   * uses it.
+   */
   #window = 2;
 
   constructor(root: HTMLElement, client: TrackClient, signal: AbortSignal, events: PartEvents) {
@@ -221,8 +224,8 @@ export class TrackParts {
   }
 
   /**
-   * Enables and disables controls according to the state; `tracked` is the number of frames with a surface; `here`,
-   * whether the displayed frame has one.
+   * Enables and disables controls according to the lab's state. `ready`: whether there is a tracker; `tracked`: number
+   * of frames with a surface; `here`: whether the displayed frame has one.
    */
   showState(state: LabState, ready: boolean, tracked: number, here: boolean): void {
     this.transport.showState(state, ready);

@@ -8,22 +8,22 @@ import type { LabStates } from './lab-states';
 import { moreOf } from './track-measures';
 import type { TrackParts } from './track-parts';
 
-/** Immutable snapshot of the results so far, for undo. */
+/** Immutable snapshot of the tracking results so far, for undo. */
 export interface TrackRecord {
   frames: readonly TrackedFrame[];
   closing: number | undefined;
   mark: (iteration: number) => HistoryMark;
 }
 
-/** The image, as far as the results need it. */
+/** Facts about the open image that the display of results needs. */
 interface ShownImage {
   volume: VolumeView;
-  /** Number of slices of the image before its preparation. */
+  /** Number of slices of the image before its preparation, which may insert some. */
   slices: number;
   truth: number[] | undefined;
 }
 
-/** Displays the worker's results: one frame at a time, and the volume curve of all. */
+/** Displays the Track lab's results: one frame at a time, and the volume curve of all frames. */
 export class TrackResults {
   readonly #client: TrackClient;
   readonly #ui: TrackParts;
@@ -33,18 +33,18 @@ export class TrackResults {
   #frames: readonly TrackedFrame[] = [];
   #closing: number | undefined;
   #frame = 0;
-  /** Whether the user has chosen the displayed frame, so that new frames do not replace it. */
+  /** Whether the user has chosen the displayed frame, so that newly tracked frames do not replace it. */
   #frameChosen = false;
   #votes: BoundaryVotes | undefined;
   #between: { key: string; between: InterpolatedSlice } | undefined;
-  /** Kinds of requests that are pending. */
+  /** Kinds of data requests ('votes', 'between') that the worker has not answered yet. */
   #pendingRequests = new Set<string>();
-  /** Counts runs, so that replies for a previous one are discarded. */
+  /** Counts how often the results were reset, so that replies to data requests made before are discarded. */
   #run = 0;
   #comparedVolumes: { volumes: number[]; name: string } | undefined;
-  /** Half width k of the windows in force, in voxels. */
+  /** Half width k, in voxels, of the tracker's windows, with the parameters in force. */
   window = 2;
-  /** Edge threshold τ in force, in intensity units. */
+  /** Edge threshold τ of the tracker, in intensity units, with the parameters in force. */
   threshold = 1;
   /** Standard deviation of the image's noise, in intensity units. */
   noise = 0;
@@ -60,7 +60,7 @@ export class TrackResults {
     return this.#frames;
   }
 
-  /** Whether no step has been done yet. */
+  /** Whether the tracker has not done any step yet. */
   get isNew(): boolean {
     return this.#history.reports.length === 0;
   }
@@ -78,8 +78,8 @@ export class TrackResults {
   }
 
   /**
-   * Sets the image: another one, or with `keep` the same after another preparation. `slices` is their number before
-   * preparation, `truth` the true volumes if the image is synthetic.
+   * Sets the image to display: another one or, with `keep`, the same after another preparation. `slices` is the number
+   * of slices before preparation; `truth` are the true volumes of the frames if the image is synthetic.
    */
   setImage(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
     this.#image = { volume, slices, truth };
@@ -87,26 +87,26 @@ export class TrackResults {
     this.#ui.view.setVolume(volume, keep);
   }
 
-  /** Clears all results, for a new run. */
+  /** Clears all results, for a new run of the tracker. */
   startOver(): void {
     this.#history.clear();
     this.#reset([], undefined);
   }
 
-  /** Sets the results back to an iteration at which no surface was found yet. */
+  /** Sets the results back to an iteration of the tracker at which it had found no surface yet. */
   rewind(iteration: number): void {
     this.#history.rewind(this.#history.marker()(iteration));
     this.#reset([], undefined);
   }
 
-  /** Returns the results so far, for undo. */
+  /** Returns the tracking results so far, for undo. */
   record(): TrackRecord {
     return { frames: this.#frames, closing: this.#closing, mark: this.#history.marker() };
   }
 
   /**
-   * Restores the results of a snapshot, as far as they existed at an iteration; `done`: whether the run was finished
-   * then.
+   * Restores the results in a snapshot, as far as they existed at the given iteration of the tracker; `done`: whether
+   * the run was finished then.
    */
   restore({ frames, closing, mark }: TrackRecord, iteration: number, done: boolean): void {
     this.#history.rewind(mark(iteration));
@@ -127,12 +127,12 @@ export class TrackResults {
     this.show(frames.length > 0 ? Math.min(this.#frame, frames.length - 1) : 0);
   }
 
-  /** Displays the newest frame from now on, as the run continues. */
+  /** Displays the newest tracked frame from now on, as the run continues. */
   follow(): void {
     this.#frameChosen = false;
   }
 
-  /** Records the result of a step; displays the newest frame, unless the user has chosen another. */
+  /** Records the result of a step of the tracker; displays the newest frame, unless the user has chosen another. */
   take({ report, index, frame, closing }: StepEvent): void {
     this.#history.add([report]);
     this.#closing = closing;
@@ -149,7 +149,7 @@ export class TrackResults {
     this.show(frame);
   }
 
-  /** Displays a frame with its measures, and updates everything that depends on it. */
+  /** Displays a frame with its surface and measures, and updates all that depends on the displayed frame. */
   show(frame: number): void {
     const { view, frames: bar, measures } = this.#ui;
     const count = this.#image?.volume.frames ?? 1;
@@ -168,7 +168,7 @@ export class TrackResults {
     this.#root.dataset.frame = String(this.#frame + 1);
   }
 
-  /** Shows the volume curve and the table of frames. */
+  /** Shows the curve of the volume enclosed in each frame, and the table of frames. */
   showCurve(): void {
     const { curve, table } = this.#ui;
     const frames = this.#image?.volume.frames ?? 1;
@@ -186,13 +186,16 @@ export class TrackResults {
     table.show(facts, errors, this.#frame);
   }
 
-  /** Unit of lengths, for the volume curve. */
+  /** Unit of lengths of the image, for the volume curve. */
   #unit = 'mm';
   set unit(unit: string) {
     this.#unit = unit;
   }
 
-  /** Sets the volumes of another run, shown beside the present ones for comparison; undefined for none. */
+  /**
+   * Sets the enclosed volume in each frame of another run, shown beside the present run's for comparison; undefined for
+   * none.
+   */
   set other(other: { volumes: number[]; name: string } | undefined) {
     this.#comparedVolumes = other;
     this.showCurve();
@@ -223,7 +226,7 @@ export class TrackResults {
     });
   }
 
-  /** Describes a state for the status line. */
+  /** Returns the text for the status line in a state of the lab. */
   describe(state: LabState): string {
     const count = this.#image?.volume.frames ?? 0;
     const steps = this.#history.reports.length;
@@ -275,7 +278,10 @@ export class TrackResults {
     );
   }
 
-  /** Sends at most one request of a kind at a time; after the reply, requests what is needed by then. */
+  /**
+   * Sends a request for data unless one of the same kind is pending; after the reply, requests what the display needs
+   * by then.
+   */
   #request<Reply>(kind: string, request: () => Promise<Reply>, take: (reply: Reply) => void): void {
     if (this.#pendingRequests.has(kind)) return;
     this.#pendingRequests.add(kind);

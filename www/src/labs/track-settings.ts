@@ -8,12 +8,15 @@ import type { TrackParts } from './track-parts';
 import type { TrackRecord, TrackResults } from './track-results';
 import { UndoHistory } from './undo-history';
 
-/** State of the page besides the tracker, which undo restores. */
+/** The page's part of a saved state; the worker saves the tracker. Undo restores both. */
 interface PageState {
   record: TrackRecord;
 }
 
-/** Setup of the tracking: changes it, sends it to the worker, and undoes changes. */
+/**
+ * Manages the setup of the tracker (preparation of the image, region, tracked component, parameters): changes it, sends
+ * it to the worker, and undoes changes.
+ */
 export class TrackSettings {
   readonly #client: TrackClient;
   readonly #ui: TrackParts;
@@ -31,7 +34,8 @@ export class TrackSettings {
   #ready: Omit<Ready, 'volume'> = { params: {}, suggested: 1, noise: 0 };
 
   /**
-   * `onChange` is called whenever the settings in force may have changed, `onVolume` when the image was prepared again.
+   * `onChange` is called whenever the settings in force may have changed, to display them and to update the page's
+   * address; `onVolume` when the image was prepared again.
    */
   constructor(
     client: TrackClient,
@@ -54,17 +58,17 @@ export class TrackSettings {
     );
   }
 
-  /** The setup as requested; its `params` are only those set by the example, a link or the user. */
+  /** The setup of the tracker as requested; its `params` are only those set by the example, a link or the user. */
   get setup(): Setup {
     return this.#setup;
   }
 
-  /** All parameters in force. */
+  /** All parameters of the tracker in force, defaults included. */
   get params(): ParamValues {
     return this.#ready.params;
   }
 
-  /** The edge threshold τ suggested by the noise of the image, in intensity units. */
+  /** The edge threshold τ suggested by the noise and the range of the image's intensities, in intensity units. */
   get suggested(): number {
     return this.#ready.suggested;
   }
@@ -74,21 +78,25 @@ export class TrackSettings {
     return this.#ready.noise;
   }
 
-  /** Adopts a newly opened image, and clears the undo history. */
+  /** Takes over the setup of a newly opened image and of its tracker, and clears the undo history. */
   adopt(setup: Setup, ready: Ready): void {
     this.#undo.clear();
     this.#take(setup, ready);
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `mergeKey`, unless empty, in short
-   * succession are undone as one. Returns a function that discards the saved state, for a change that fails.
+   * Saves the present state before a change, so that undo can restore it; `label` names the change. Changes with the
+   * same `mergeKey`, unless empty, in short succession are undone as one. Returns a function that discards the saved
+   * state, to call if the change fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     return this.#undo.checkpoint(label, mergeKey);
   }
 
-  /** Changes preparation, region or component: builds a new tracker, and runs it. */
+  /**
+   * Changes the preparation of the image, the region of interest or the tracked component: builds a new tracker, and
+   * runs it. `what` names the change for undo.
+   */
   change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
@@ -114,7 +122,7 @@ export class TrackSettings {
 
   /**
    * Sets parameters, discards the surfaces tracked so far, and runs the tracker again from the first step that depends
-   * on the changed parameters. If the values are in force already, nothing changes.
+   * on the changed parameters. If the values are in force already, nothing changes. `what` names the change for undo.
    */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
@@ -145,7 +153,7 @@ export class TrackSettings {
     });
   }
 
-  /** Builds a new tracker of the same image, before its first step; clears the undo history. */
+  /** Has the worker build a new tracker of the same image, which does not run yet; clears the undo history. */
   rebuild(): Promise<void> {
     return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', this.#setup);

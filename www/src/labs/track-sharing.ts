@@ -1,5 +1,5 @@
 /**
- * Shares the state of the Track lab as an address, saves its results as files, and passes a surface to the Sculpt lab.
+ * Shares the state of the Track lab as an address, saves its results as files, and opens a surface in the Sculpt lab.
  */
 
 import { zipSync } from 'three/addons/libs/fflate.module.js';
@@ -39,7 +39,7 @@ export class TrackSharing {
     this.#opening = opening;
   }
 
-  /** Updates the page's address with what is open and the settings. */
+  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
   updateAddress(): void {
     const { source } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -58,7 +58,7 @@ export class TrackSharing {
     work[what]().catch((error) => this.#states.fail(text('track.fileFailed'), error));
   }
 
-  /** Passes the displayed frame's surface on as a mesh to deform. */
+  /** Opens the displayed frame's surface in the Sculpt lab, as a mesh to deform. */
   toSculpt(passOn: OpenInLab): void {
     const { frame } = this.#results;
     this.#client.request('export', { frame, format: 'ply' }).then(
@@ -73,7 +73,7 @@ export class TrackSharing {
     );
   }
 
-  /** Saves the surfaces of all tracked frames as PLY files in one archive. */
+  /** Saves the surfaces of all tracked frames as PLY files in one ZIP archive. */
   async #frames(): Promise<void> {
     const { frames } = this.#results;
     const files: Record<string, Uint8Array> = {};

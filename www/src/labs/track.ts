@@ -35,12 +35,18 @@ export class TrackLab implements Lab {
   readonly #sharing: TrackSharing;
   readonly #passOn: OpenInLab;
   #volume: VolumeView | undefined;
-  /** Number of slices of the image before its preparation. */
+  /** Number of slices of the image before its preparation, which may insert some. */
   #slices = 1;
   #truth: number[] | undefined;
-  /** Time in milliseconds at which the present run began; undefined if none is running, or if it was resumed midway. */
+  /**
+   * Time in milliseconds at which the present run of the tracker began; undefined if none is running, or if it was
+   * resumed midway.
+   */
   #began: number | undefined;
-  /** Duration in milliseconds of the last run without a pause, for comparisons; undefined after a pause. */
+  /**
+   * Duration in milliseconds of the last complete run of the tracker, for comparisons; undefined before the first, and
+   * after a pause.
+   */
   #duration: number | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
@@ -79,7 +85,7 @@ export class TrackLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** Maps the user's actions to the parts that handle them. */
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -125,7 +131,7 @@ export class TrackLab implements Lab {
     ];
   }
 
-  /** Displays an opened image, with the settings of its example or link, and starts tracking. */
+  /** Displays a newly opened image, with the settings of its example or link, and starts tracking. */
   async #adopt(opened: OpenedTrack, { name, example, linked }: TrackSource): Promise<void> {
     const { setup } = opened;
     this.#states.ready = true;
@@ -148,7 +154,7 @@ export class TrackLab implements Lab {
     this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 
-  /** The region of interest in voxels; the whole image by default. */
+  /** The region of interest in voxels, the whole image by default; undefined if no image is open. */
   get #region(): VoxelBox | undefined {
     if (!this.#volume) return undefined;
     const { dims, affine } = this.#volume;
@@ -221,7 +227,7 @@ export class TrackLab implements Lab {
     this.#client.request('step', { count: steps }).catch((error) => this.#states.fail(text('track.stepFailed'), error));
   }
 
-  /** Rebuilds the tracker, with the same settings. */
+  /** Rebuilds the tracker with the same settings, and clears the results. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -267,7 +273,7 @@ export class TrackLab implements Lab {
     } else if (this.#states.setModelState(event.state)) this.#settled(event.state);
   }
 
-  /** Reports progress to screen readers occasionally: every frame would be too often. */
+  /** Reports progress of the tracking to screen readers occasionally: every frame would be too often. */
   #report({ index }: StepEvent): void {
     if (index === undefined || this.#states.value !== 'running') return;
     const { frames } = this.#results;
@@ -285,7 +291,10 @@ export class TrackLab implements Lab {
     else this.#ui.frames.stop();
   }
 
-  /** Measures the duration of a run from its first step to its end; one that was paused has none for the comparison. */
+  /**
+   * Measures the duration of a run from its first step to its end; a run that was paused has no duration, for the
+   * comparison.
+   */
   #time(state: 'running' | 'paused' | 'done'): void {
     if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
     else if (state === 'done' && this.#began !== undefined) this.#duration = performance.now() - this.#began;

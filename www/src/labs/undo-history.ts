@@ -5,13 +5,13 @@ const LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which repeated changes of the same setting are undone as one, as when a slider is dragged. */
 const MERGE_MS = 1500;
 
-/** A state to go back to: of the model, and of the page. */
+/** A saved state of a lab to go back to: of the worker's model, and of the page. */
 export interface SavedMoment<Page, Saved> {
   saved: Saved;
   page: Page;
 }
 
-/** A worker whose model can be saved and restored. */
+/** Interface to a lab's worker whose model can be saved and restored, as undo needs it. */
 export interface SavingWorker<Saved> {
   request(kind: 'save', body: undefined): Promise<Saved>;
   request(kind: 'pause', body: undefined): Promise<undefined>;
@@ -29,7 +29,7 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   #lastChange = { mergeKey: '', at: 0 };
   #newest: SavedMoment<Page, Saved> | undefined;
   #saving: Promise<unknown> = Promise.resolve();
-  /** Counts the volumes or meshes opened, so that saves of a previous one are discarded. */
+  /** Counts the volumes, meshes or images opened, so that saved states of a previous one are discarded. */
   #volume = 0;
 
   constructor(
@@ -42,17 +42,20 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
     this.#onChange = onChange;
   }
 
-  /** The newest saved state, even if no change followed it: to resume from after a failure of the engine. */
+  /**
+   * The newest saved state, even if no change followed it: to resume from after a failure of the engine; undefined if
+   * there is none.
+   */
   get newest(): SavedMoment<Page, Saved> | undefined {
     return this.#newest;
   }
 
-  /** Settles when the worker has answered the last save request. */
+  /** Promise that settles when the worker has answered the last save request. */
   get saved(): Promise<unknown> {
     return this.#saving;
   }
 
-  /** Forgets all states, since they do not fit another volume or mesh. */
+  /** Forgets all saved states, since they do not fit the volume, mesh or image opened next. */
   clear(): void {
     this.#volume += 1;
     this.#lastChange = { mergeKey: '', at: 0 };
@@ -62,8 +65,8 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   }
 
   /**
-   * Saves the present state as {@link newest}, without a step of undo. Returns undefined if the worker could not save
-   * it.
+   * Saves the present state as {@link newest}, without adding it to the undo stack. Returns undefined if the worker
+   * could not save its model.
    */
   async save(): Promise<SavedMoment<Page, Saved> | undefined> {
     const page = this.#page();
@@ -81,9 +84,10 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   }
 
   /**
-   * Saves the present state for undo, before a change. Requests are answered in order, so the state is that before any
-   * request made after this call. Changes with the same `mergeKey`, unless empty, in short succession ({@link
-   * MERGE_MS}) are undone as one. Returns a function that forgets the state, to call if the change fails.
+   * Saves the present state before a change, so that undo can restore it; `label` names the change. The worker answers
+   * requests in order, so the state is that before any request made after this call. Changes with the same `mergeKey`,
+   * unless empty, in short succession ({@link MERGE_MS}) are undone as one. Returns a function that forgets the state,
+   * to call if the change fails.
    */
   checkpoint(label: string, mergeKey = ''): () => void {
     const now = performance.now();
@@ -110,8 +114,8 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   }
 
   /**
-   * Undoes or redoes a change; returns the state that the model is in then, or undefined if there is nothing to undo or
-   * redo.
+   * Undoes or redoes a change: restores the worker's model, and returns the state restored, from which the caller
+   * restores the page; undefined if there is nothing to undo or redo.
    */
   async step(direction: 'undo' | 'redo'): Promise<SavedMoment<Page, Saved> | undefined> {
     await this.#ready;

@@ -1,8 +1,11 @@
 /** Undo history: stacks of saved states, newest last, within limits. */
 
-/** A saved state, from before a change. */
+/** A saved state of a lab, kept for undo or redo. */
 export interface Checkpoint<State> {
-  /** Name of the change that followed, such as 'change of rigidity' or 'step'. */
+  /**
+   * Displayed name of the change that undo reverts, or redo repeats, by restoring this state, such as 'change of
+   * rigidity' or 'step'.
+   */
   label: string;
   bytes: number;
   state: State;
@@ -14,7 +17,7 @@ export interface UndoLimits {
   bytes: number;
 }
 
-/** Undo and redo stacks; a new change clears the redo stack. */
+/** Undo and redo stacks of a lab's saved states; a new change clears the redo stack. */
 export class UndoStack<State> {
   readonly #limits: UndoLimits;
   #past: Checkpoint<State>[] = [];
@@ -24,12 +27,12 @@ export class UndoStack<State> {
     this.#limits = limits;
   }
 
-  /** Name of the change that undo would revert. */
+  /** Name of the change that undo would revert; undefined if there is none. */
   get undoable(): string | undefined {
     return this.#past.at(-1)?.label;
   }
 
-  /** Name of the change that redo would repeat. */
+  /** Name of the change that redo would repeat; undefined if there is none. */
   get redoable(): string | undefined {
     return this.#future.at(-1)?.label;
   }
@@ -39,24 +42,29 @@ export class UndoStack<State> {
     this.#future = [];
   }
 
-  /** Adds the state before a change, and clears the redo stack. */
+  /** Adds the state before a change to the undo stack, and clears the redo stack. */
   push(checkpoint: Checkpoint<State>): void {
     this.#future = [];
     this.#past.push(checkpoint);
     this.#trim();
   }
 
-  /** Removes a state whose change did not happen. */
+  /** Removes a state from the undo stack, because the change for which it was saved has failed. */
   drop(checkpoint: Checkpoint<State>): void {
     this.#past = this.#past.filter((one) => one !== checkpoint);
   }
 
-  /** Returns the state before the last change, undefined if there is none; `now` is kept for redo. */
+  /**
+   * Returns the state before the last change, undefined if there is none; `now`, the present state, is kept for redo.
+   */
   undo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#past, this.#future, now);
   }
 
-  /** Returns the state after the change undone last, undefined if there is none; `now` is kept for undo. */
+  /**
+   * Returns the state after the change undone last, undefined if there is none; `now`, the present state, is kept for
+   * undo.
+   */
   redo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#future, this.#past, now);
   }
@@ -73,7 +81,10 @@ export class UndoStack<State> {
     return checkpoint.state;
   }
 
-  /** Removes the oldest states to undo to while limits are exceeded; of these, at least one stays, however large. */
+  /**
+   * Removes the oldest states from the undo stack while it has too many, or both stacks together have too many bytes;
+   * at least one stays, however large.
+   */
   #trim(): void {
     const size = () => [...this.#past, ...this.#future].reduce((sum, { bytes }) => sum + bytes, 0);
     while (this.#past.length > this.#limits.entries || (this.#past.length > 1 && size() > this.#limits.bytes))

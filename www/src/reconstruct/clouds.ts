@@ -1,16 +1,19 @@
-/** Computed example point clouds: reproducible on every machine, by seeded random numbers. */
+/**
+ * Computes the example point clouds of the Reconstruct lab from seeded random numbers, so that they are the same on
+ * every machine.
+ */
 import type { Vec3 } from '../protocol';
 import type { Cloud } from './protocol';
 
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
 
 /**
- * Standard deviation of the points' distance from their surface, in the units of the shapes, which are about 1 in size;
- * some shapes use a fraction of it.
+ * Standard deviation of the noise by which example points are displaced, in the units of their shapes, which are about
+ * 1 in size; some shapes use a fraction of it.
  */
 const NOISE = 0.02;
 
-/** Returns a generator of pseudo-random numbers from 0 to below 1 (mulberry32). */
+/** Returns a generator of pseudo-random numbers from 0 to below 1 (mulberry32), reproducible by its seed. */
 export function seeded(seed: number): () => number {
   let state = seed;
   return () => {
@@ -33,7 +36,7 @@ const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: 
   'uneven ball': { seed: 4, count: 1200, point: onUnevenBall },
 };
 
-/** Returns the points of a computed shape. */
+/** Returns the points of a computed example shape, without normals and colours; the same at every call. */
 export function computedCloud(shape: PointShape): Cloud {
   const { seed, count, point } = SHAPES[shape];
   const random = seeded(seed);
@@ -60,7 +63,7 @@ function onTorus(random: () => number): Vec3 | undefined {
   return [out * Math.cos(around), out * Math.sin(around), thick * Math.sin(across)];
 }
 
-/** Returns a random point near one of two spheres of radius 0.6, apart from each other. */
+/** Returns a random point near one of two disjoint spheres of radius 0.6. */
 function onTwoBalls(random: () => number): Vec3 {
   const [x, y, z] = direction(random);
   const radius = 0.6 + 0.5 * NOISE * gauss(random);
@@ -76,8 +79,8 @@ function direction(random: () => number): Vec3 {
 }
 
 /**
- * Returns a random point near the three faces of a cube that a scanner in front of their common corner sees, with noise
- * along its rays.
+ * Returns a random point near one of the three faces of a cube that meet at a corner, as a distant scanner in front of
+ * that corner sees them: the noise is along its viewing direction.
  */
 function onCorner(random: () => number): Vec3 {
   const [u, v, face] = [random(), random(), Math.floor(3 * random())];
@@ -90,8 +93,8 @@ function onCorner(random: () => number): Vec3 {
 }
 
 /**
- * Returns a random point near a sphere of radius 1: dense on one side, sparse on the other, none at the top and bottom.
- * Undefined for rejected samples.
+ * Returns a random point near a sphere of radius 1, dense at positive x, sparse at negative x, and none where |z| >
+ * 0.8; undefined for samples that are rejected to obtain this density.
  */
 function onUnevenBall(random: () => number): Vec3 | undefined {
   const [x, y, z] = direction(random);

@@ -7,12 +7,15 @@ import type { ParamValues } from './protocol';
 export interface CloudExample {
   id: string;
   name: string;
-  /** A file served with the page, or a computed shape. */
+  /** Source of the points: a file served with the page, by its path in the folder `data`, or a computed shape. */
   source: { file: string } | { shape: PointShape };
-  /** Folder with the photographs that the points were made from, and their cameras. */
+  /**
+   * Folder, within the page's folder `data`, with the photographs that the points were made from and a list of their
+   * cameras; undefined if there are none.
+   */
   photographs?: string;
   up: 'y' | 'z';
-  /** −1 to show the example from behind at first; by default it is seen from the front. */
+  /** −1 if the object faces away from the default viewpoint, so that the first view is from the opposite side. */
   front?: -1;
   maxPoints?: number;
   keepComponents?: number;
@@ -77,7 +80,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
   },
 ];
 
-/** Returns the address of a data file served with the page. */
+/** Returns the absolute URL of a data file served with the page; `file` is its path in the folder `data`. */
 export function dataUrl(file: string): string {
   return new URL(`data/${file}`, document.baseURI).href;
 }

@@ -1,4 +1,7 @@
-/** The radial basis functions, for plotting. The solver has its own implementation. */
+/**
+ * Evaluates the Reconstruct lab's radial basis functions, to plot them on the page; the solver has its own
+ * implementation.
+ */
 import type { ParamValues } from '../protocol';
 
 export interface KernelParams {
@@ -9,12 +12,15 @@ export interface KernelParams {
 }
 
 /**
- * Distance r, as a multiple of τ, below which the multi-order kernel uses its value at 0: the closed form loses its
- * digits there.
+ * Distance r, as a multiple of τ, below which the multi-order kernel is replaced by its value at 0: its closed form
+ * loses its digits there.
  */
 const SMALL_R = 1e-4;
 
-/** Returns the radial basis function and its constants from the method's parameters, with defaults for missing ones. */
+/**
+ * Reads the name and constants of the radial basis function from the method's parameters, with defaults for missing
+ * ones.
+ */
 export function kernelParams(params: ParamValues): KernelParams {
   const number = (name: string, otherwise: number) => (typeof params[name] === 'number' ? params[name] : otherwise);
   return {
@@ -25,7 +31,10 @@ export function kernelParams(params: ParamValues): KernelParams {
   };
 }
 
-/** Returns the value φ(r) of the chosen radial basis function at the distance `r`. */
+/**
+ * Returns the value φ(r) of the chosen radial basis function at the distance `r`, in units of the normalised box, which
+ * is 2 long.
+ */
 export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): number {
   switch (kernel) {
     case 'thin-plate':
@@ -40,8 +49,8 @@ export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): num
 }
 
 /**
- * Returns the value φ(r) of the multi-order radial basis function at the distance `r`: equation 6 of the paper in real
- * form, with δ and τ squared in the energy.
+ * Returns the value φ(r) of the multi-order radial basis function at the distance `r`: equation 6 of the paper by Dinh,
+ * Turk and Slabaugh in real form, with δ and τ squared in the energy.
  */
 function multiOrder(delta: number, tau: number, r: number): number {
   if (r < SMALL_R * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));

@@ -1,19 +1,22 @@
-/** Builds point clouds and models for the page's requests. Used by the worker only. */
+/** Builds point clouds and surface models for the requests of the Reconstruct lab's page. Used by the worker only. */
 import { type ImplicitOptions, ImplicitSurface, type PointEdits, parsePoints } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
 import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
 
-/** Least number of voxels along each side of an exported grid. */
+/** Least number of voxels along each side of the grid on which the fitted function is exported as a volume. */
 const LEAST_DIM = 8;
 
-/** Returns the points of a source: computed, or read from a file. */
+/** Returns the point cloud of a source: computed from a shape, or read from a file. */
 export function cloudFrom(source: CloudSource): Cloud {
   return 'shape' in source ? computedCloud(source.shape) : parsePoints(source.file.bytes);
 }
 
-/** Builds a model of the points and applies the edits. */
+/**
+ * Builds the model that reconstructs a surface from a point cloud, with the settings and the manual point edits in
+ * `setup`.
+ */
 export function buildModel({ points, normals, colors }: Cloud, cameras: CameraView[], setup: Setup): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
   const options: ImplicitOptions = { points, cameras, params };
@@ -31,7 +34,7 @@ export function buildModel({ points, normals, colors }: Cloud, cameras: CameraVi
   }
 }
 
-/** Converts edits to the typed arrays that the model expects. */
+/** Converts the user's point edits to the typed arrays that the model expects. */
 export function toPointEdits({ added, removed, outside }: Edits): Required<PointEdits> {
   return {
     added: Float32Array.from(added.flat()),
@@ -40,7 +43,7 @@ export function toPointEdits({ added, removed, outside }: Edits): Required<Point
   };
 }
 
-/** Returns the loaded points without the removed ones, followed by the added ones. */
+/** Returns the points in use, packed xyz: the loaded `points` without the removed ones, followed by the added ones. */
 export function applyEdits(points: Float32Array, { added, removed }: Edits): Float32Array {
   if (added.length + removed.length === 0) return points;
   const gone = new Set(removed);
@@ -51,23 +54,26 @@ export function applyEdits(points: Float32Array, { added, removed }: Edits): Flo
   return all;
 }
 
-/** For each quantity, a function that returns one value per vertex, in the order of the mesh's arrays. */
+/**
+ * For each quantity by which the surface can be coloured, a function that computes one value per vertex, in the order
+ * of the mesh's arrays.
+ */
 const QUANTITIES: Record<PointQuantity, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
   'mean curvature': ({ mesh }) => mesh.curvature('mean'),
   distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
 };
 
 /**
- * Returns the values of a quantity at the vertices, to colour the surface by. `points` are the points in use, after
- * edits.
+ * Returns one value of the quantity per vertex of the model's surface, to colour it by. `points` are the points in use,
+ * with the user's edits applied.
  */
 export function valuesFor(model: ImplicitSurface, points: Float32Array, quantity: PointQuantity): Float32Array {
   return QUANTITIES[quantity](model, points);
 }
 
 /**
- * Returns the level of the fitted function f at which the surface is extracted: 0, or the mean of f over the surface
- * constraints.
+ * Returns the level of the fitted function f at which the surface is extracted, for the export of f as a volume: 0, or
+ * the mean of f over the surface constraints.
  */
 export function levelOf(model: ImplicitSurface): number {
   if (model.params.level === 'zero') return 0;
@@ -76,8 +82,8 @@ export function levelOf(model: ImplicitSurface): number {
 }
 
 /**
- * Returns the dimensions of a grid around the points with nearly cubic voxels: `size` of them along the longest side,
- * and at least `LEAST_DIM` along each.
+ * Returns the dimensions of a grid around the points, for the export of the fitted function as a volume with nearly
+ * cubic voxels: `size` along the longest side, and at least `LEAST_DIM` along each.
  */
 export function cubicDims(points: Float32Array, size: number): Vec3 {
   const sides = [0, 1, 2].map((axis) => {
@@ -89,8 +95,8 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
 }
 
 /**
- * Collects the facts about the fit that the page displays. `complete` tells whether there is a complete surface; only
- * then the distances of the points from it are included.
+ * Collects the facts about the fitted model that the page displays. `residual` is the relative error of the solution;
+ * point-to-surface distances are included only if the surface is `complete`.
  */
 export function fitOf(model: ImplicitSurface, residual: number, complete: boolean): Fit {
   const { surface, exterior } = model.constraints();

@@ -1,19 +1,25 @@
-/** Distances to the nearest point of a cloud, by a uniform grid. */
+/** Computes the distances of positions from the nearest point of a cloud, by a uniform grid, to colour the surface. */
 
-/** Target mean number of points per occupied cell: with fewer many cells are empty, with more searches take longer. */
+/**
+ * Target mean number of points per occupied cell of the grid: smaller ones leave many cells empty, larger ones make
+ * searches slower.
+ */
 const PER_CELL = 4;
-/** Largest length of the longest side of the grid, in cells; points on its far border take one more. */
+/**
+ * Largest number of grid cells along the longest side of the points' bounding box; points on the far border take one
+ * more.
+ */
 const MOST_CELLS = 96;
 
-/** Points sorted into the cells of a uniform grid. */
+/** Points sorted into the cells of a uniform grid, for nearest-point queries. */
 class PointGrid {
   readonly #points: Float32Array;
   readonly #low = [0, 0, 0];
   readonly #dims = [1, 1, 1];
   readonly #cell: number;
   /**
-   * For each cell, the place in the list (of point indices, sorted by cell) of its first point; a final entry holds the
-   * number of points.
+   * For each cell, the index of its first entry in `#list`, the indices of all points sorted by cell; a final entry
+   * holds the number of points.
    */
   readonly #begin: Uint32Array;
   readonly #list: Uint32Array;
@@ -43,8 +49,8 @@ class PointGrid {
   }
 
   /**
-   * Returns the distance from the position at `offset` in packed `positions` to its nearest point: searches shell by
-   * shell around its cell, until no nearer point can follow.
+   * Returns the distance from the position that begins at element `offset` of packed `positions` to the nearest point
+   * of the cloud: searches shell by shell around the position's cell, until no nearer point can follow.
    */
   distance(positions: Float32Array, offset: number): number {
     const centre = [0, 1, 2].map((axis) => this.#index(positions[offset + axis] ?? 0, axis));
@@ -111,7 +117,7 @@ class PointGrid {
   }
 }
 
-/** Returns the smallest and largest coordinate of packed points along an axis. */
+/** Returns the smallest and the largest coordinate of packed points along an axis, 0 to 2. */
 export function span(points: Float32Array, axis: number): [number, number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (let i = axis; i < points.length; i += 3) {
@@ -128,7 +134,10 @@ function squared(a: Float32Array, i: number, b: Float32Array, j: number): number
   return x * x + y * y + z * z;
 }
 
-/** Returns the distance of each position to the nearest point; both packed xyz. Infinite if there are no points. */
+/**
+ * Returns, for each of the `positions`, the distance to the nearest of the `points`, both packed xyz; infinite if there
+ * are no points.
+ */
 export function distances(positions: Float32Array, points: Float32Array): Float32Array {
   const out = new Float32Array(positions.length / 3).fill(Number.POSITIVE_INFINITY);
   if (points.length === 0) return out;

@@ -1,29 +1,32 @@
-/** Presets of the Reconstruct lab: the paper's figures, on points that are served with the page or computed in it. */
+/**
+ * Presets of the Reconstruct lab: the figures of the paper by Dinh, Turk and Slabaugh, on points that are served with
+ * the page or computed in it.
+ */
 import { text } from '../texts';
 import type { CloudViewOptions } from '../view/reconstruction';
 import { CLOUDS, type CloudExample } from './examples';
 import type { ParamValues } from './protocol';
 
 /**
- * An expected count, or its least and largest value where rounding errors decide into how many pieces a surface falls
- * apart.
+ * Expected number of components or genus of a surface; a range where rounding errors decide into how many pieces the
+ * surface breaks.
  */
 export type Count = number | readonly [least: number, most: number];
 
-/** Expected result of a run of a variant; tests run the variant and compare. */
+/** Expected surface of a preset's variant, one picture of a figure; tests run the variant and compare. */
 export interface CloudOutcome {
   components: Count;
   genus: Count;
   /**
-   * Mean of the absolute mean curvature |H| over the vertices, in 1 / the points' unit; tests allow a deviation of 10
-   * %.
+   * Mean of the absolute mean curvature |H| over the vertices, in 1 / the points' unit; tests allow a deviation of
+   * 10 %.
    */
   meanCurvature?: number;
   /** Mean distance of the points from the surface, in the points' units; tests allow a deviation of 10 %. */
   fitness?: number;
 }
 
-/** One picture of a figure: the preset's points with other settings. */
+/** One picture of a figure, as a variant of the preset: the same points with other settings. */
 export interface CloudVariant {
   id: string;
   name: string;
@@ -33,22 +36,22 @@ export interface CloudVariant {
   expected: CloudOutcome;
 }
 
-/** A figure of the paper, as an example of the Reconstruct lab. */
+/** A figure of the paper, as an example of the Reconstruct lab, with a variant for each of its pictures. */
 export interface CloudPreset extends CloudExample {
   paperResult: string;
   variants: [CloudVariant, ...CloudVariant[]];
   hint?: string;
-  /** View options that differ from the defaults. */
+  /** View options with which the preset opens, where they differ from the lab's defaults. */
   view?: Partial<CloudViewOptions>;
-  /** Index of the photograph whose camera the view uses, from 0. */
+  /** Index, from 0, of the photograph whose camera the preset's view uses; undefined for the usual view. */
   photo?: number;
 }
 
 const CARVED = text('reconstructPresets.carvedCredit');
 const STEREO = text('reconstructPresets.stereoCredit');
 /**
- * Settings shared by the figures with the carved cow: points on a voxel grid, of which a subsample is used, as in the
- * paper.
+ * Settings shared by the presets that use the carved cow: its points on a voxel grid, of which a subsample is used, as
+ * in the paper.
  */
 const CARVED_COW = {
   source: { file: 'spot/carved.ply' },
@@ -310,7 +313,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
   },
 ];
 
-/** Returns the example or preset with this id. */
+/** Returns the Reconstruct lab's example or preset with this id, undefined if there is none. */
 export function cloudById(id: string): CloudExample | undefined {
   return [...CLOUDS, ...CLOUD_PRESETS].find((one) => one.id === id);
 }
@@ -320,8 +323,8 @@ export function isCloudPreset(example: CloudExample | undefined): example is Clo
 }
 
 /**
- * Returns the first variant of a figure whose settings are all in force, if there is one; parameters that neither it
- * nor the figure sets must equal `defaults`.
+ * Returns the first variant of a figure that the current settings match, to mark its button; undefined if none does.
+ * Parameters that neither the variant nor the figure sets must equal `defaults`.
  */
 export function variantInForce(
   preset: CloudPreset,

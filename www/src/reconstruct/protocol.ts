@@ -40,30 +40,32 @@ export interface CameraView {
   image?: Uint8ClampedArray;
 }
 
-/** Source of points: a file, or a computed shape. */
+/** Source of a point cloud: the bytes of a file, or a computed shape. */
 export type CloudSource = { file: NamedBytes } | { shape: PointShape };
 
-/** Manual changes of the points. */
+/** The user's manual changes of the loaded points. */
 export interface Edits {
   added: Vec3[];
-  /** Indices of removed points in the cloud as loaded. */
+  /** Indices, from 0, of removed points in the cloud as loaded. */
   removed: number[];
   /** Points added outside the object; they become exterior constraints. */
   outside: Vec3[];
 }
 
-/** All that a model is built from, besides the points and cameras. */
+/** Settings that a model is built with, besides its points and cameras. */
 export interface Setup {
-  /** Parameters that differ from the defaults. */
+  /** Parameters of the method that differ from the defaults. */
   params: ParamValues;
   /** Largest number of points used; larger clouds are subsampled. Undefined: the library's default. */
   maxPoints: number | undefined;
-  /** Number of largest clusters of points to keep; all if undefined. */
+  /** Number of clusters of points to keep, the largest ones; all if undefined. */
   keepComponents: number | undefined;
   edits: Edits;
 }
 
-/** Reply about a newly built model, before its first step. */
+/**
+ * Reply to `rebuild`, and part of the reply to `load`: the parameters of the newly built model, before its first step.
+ */
 export interface Ready {
   params: ParamValues;
 }
@@ -72,15 +74,18 @@ export interface Loaded extends Ready {
   cloud: Cloud;
 }
 
-/** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
+/** A quantity computed at each vertex of the surface to colour it by; the names appear in the interface. */
 export type PointQuantity = 'mean curvature' | 'distance';
 
-/** Facts about the points and the fit, beyond the measures of the mesh. */
+/** Facts about the points and the fitted function that the page displays besides the measures of the mesh. */
 export interface Fit {
   fitness?: Fitness;
   surfaceConstraints: number;
   exteriorConstraints: number;
-  /** Edge length of an extraction cell, in the points' units; 0 until it is known. */
+  /**
+   * Edge length of the cells of the lattice on which the surface is extracted, in the points' units; 0 until it is
+   * known.
+   */
   cell: number;
   /**
    * Mean distance from a surface constraint to the nearest other one, in units of the normalised box, which is 2 long;
@@ -93,7 +98,7 @@ export interface Fit {
   warning?: string;
 }
 
-/** One measurement of the plot of solve time against number of constraints. */
+/** Duration of one solve, for the plot of solve time against number of constraints. */
 export interface Timing {
   kernel: string;
   constraints: number;
@@ -103,28 +108,31 @@ export interface Timing {
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
-   * Opens points and builds a model of them. On failure, the previous points and model stay. Removed indices out of
-   * range are ignored.
+   * Opens points and builds a model of them. On failure, the previous points and model stay in use. Indices of removed
+   * points that are out of range are ignored.
    */
   load: { body: { source: CloudSource; cameras: CameraView[]; setup: Setup }; reply: Loaded };
-  /** Builds a new model of the same points. On failure, the previous model stays. */
+  /** Builds a new model of the loaded points. On failure, the previous model stays in use. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
-  /** Replaces all edits of the live model; a run continues with them. If they are rejected, nothing changes. */
+  /**
+   * Replaces all manual point edits of the present model; a run in progress continues with them. If the model rejects
+   * them, nothing changes.
+   */
   setEdits: { body: Edits; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
   /**
-   * Samples the fitted function f on a grid around the points, `size` voxels along the longest side, as NIfTI; also
-   * replies with the level of f at which the surface is extracted.
+   * Replies with the fitted function f sampled on a grid around the points, `size` voxels along the longest side, as
+   * NIfTI, and with the level of f at which the surface is extracted.
    */
   volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };
   quantity: { body: PointQuantity | undefined; reply: undefined };
   /**
-   * Times solves with subsamples of the loaded points, without edits, of each size and with each kernel; undefined if
-   * cancelled.
+   * Times solves with subsamples of the loaded points, without edits, for each of the `sizes` (numbers of points) and
+   * `kernels`; replies with undefined if cancelled.
    */
   timing: { body: { sizes: number[]; kernels: string[] }; reply: Timing[] | undefined };
   cancelTiming: { body: undefined; reply: undefined };
@@ -132,18 +140,20 @@ export interface Requests {
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Tells the worker that the surface it sent last is on the screen; has no reply. */
+/**
+ * Tells the worker that the surface it sent last is on the screen, so that it may send another preview; has no reply.
+ */
 export interface ShownMessage {
   kind: 'shown';
 }
 export type ToWorker = RequestMessage | ShownMessage;
 
-/** Reports of the steps since the last progress event. */
+/** Event with the reports of the steps since the last progress event. */
 export interface ProgressEvent {
   event: 'progress';
   reports: StepReport[];
 }
-/** A surface: complete, or a preview of the part extracted so far. */
+/** Event with a surface to draw: the complete one or, during its extraction, a preview of the part extracted so far. */
 export interface SurfaceEvent {
   event: 'surface';
   surface: Surface;
@@ -155,7 +165,8 @@ export interface MeasuredEvent {
   fit: Fit;
 }
 /**
- * Positions of the surface constraints, which are the points in use, and of the exterior constraints; both packed xyz.
+ * Event with positions to draw: the surface constraints, which are the points in use, and the exterior constraints;
+ * both packed xyz.
  */
 export interface ConstraintsEvent {
   event: 'constraints';

@@ -2,14 +2,17 @@
 import { ImplicitSurface } from 'vesicle';
 import type { CameraView, Cloud, Requests, Setup, Timing } from './protocol';
 
-/** Solves that take at most this many milliseconds are timed twice, and the shorter time counts. */
+/**
+ * Solves that take at most this many milliseconds are timed twice, and the shorter time counts: other load on the
+ * machine only adds time.
+ */
 const RETIME_BELOW_MS = 2000;
 
 type TimingRequest = Requests['timing']['body'];
 
 /**
- * Measures the solve time for each size and kernel, and passes each result to `onTiming` when it is known. Returns all
- * results; undefined if `signal` aborts.
+ * Measures the solve time for each number of points in `sizes` and each kernel, and passes each result to `onTiming`
+ * when it is known. Returns all results; undefined if `signal` aborts.
  */
 export async function timeSolves(
   cloud: Cloud,

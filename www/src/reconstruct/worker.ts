@@ -42,13 +42,16 @@ class Session {
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
   #quantity: PointQuantity | undefined;
-  /** Reports of steps that were not sent to the page yet. */
+  /** Reports of the latest steps, which have not been sent to the page yet. */
   #reports: StepReport[] = [];
   #reportedAt = 0;
   #previewedAt = 0;
-  /** Whether the page has drawn the last surface it was sent. */
+  /** Whether the page has drawn the surface sent last; the next preview waits for it. */
   #shown = true;
-  /** Version of the complete mesh that was sent last; empty if there is none or it must be sent again. */
+  /**
+   * Version of the complete mesh sent last, so that none is sent twice; empty if none was sent or it must be sent
+   * again.
+   */
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
@@ -104,7 +107,10 @@ class Session {
     return { params: { ...model.params } };
   }
 
-  /** Discards the reports, and marks the constraints as not sent: they belong to other points or another model. */
+  /**
+   * Discards the step reports and marks the constraints as not sent, because the points, their edits or the model have
+   * changed.
+   */
   #startOver(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -199,7 +205,7 @@ class Session {
     return { ...model.params };
   }
 
-  /** Replaces the edits; a run continues with them. */
+  /** Replaces the point edits of the model; a run in progress continues with them. */
   #setEdits(edits: Edits): undefined {
     this.#current().setEdits(toPointEdits(edits));
     if (this.#setup) this.#setup = { ...this.#setup, edits };
@@ -212,7 +218,10 @@ class Session {
     if (!this.#run) this.#showSurface();
   }
 
-  /** Sends a preview of the surface if it has triangles, unless the page has not drawn the last one yet. */
+  /**
+   * Sends a preview of the surface extracted so far, if it has vertices, unless the page has not drawn the last one
+   * yet.
+   */
   #preview(): void {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
@@ -224,7 +233,7 @@ class Session {
     }
   }
 
-  /** Sends the complete surface, if there is one that the page does not have already. */
+  /** Sends the complete surface to the page, if there is one that the page does not have already. */
   #showSurface(): void {
     const model = this.#model;
     if (!model || model.mesh.vertexCount === 0) return;

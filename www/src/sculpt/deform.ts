@@ -1,19 +1,20 @@
 /**
- * Approximate deformation of a surface by its ellipsoids, the same as the first stage of a step of the model. Moves the
- * displayed surface with a dragging pointer before the model's result arrives.
+ * Approximate deformation of a surface by its control ellipsoids, the same as the first stage of a step of the model.
+ * Makes the displayed surface follow a dragged ellipsoid before the model's result arrives.
  */
 import { lengthsOf } from './ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from './protocol';
 
 /**
- * Softening term of an ellipsoid's weight, added to the squared distance in units of its shortest semi-axis: at the
- * surface of the ellipsoid the weight is eleven times that at a distance of its shortest semi-axis.
+ * Softening term of the weight of an ellipsoid at a point, 1 / (term + d²), where d is the point's distance in units of
+ * the ellipsoid's shortest semi-axis: the weight at the surface of the ellipsoid is eleven times that at d = 1.
  */
 const WEIGHT_SOFTENING = 0.1;
 
 /**
- * Moves points, packed xyz, with the ellipsoids from `before` to `after`: by the mean of the ellipsoids' affine maps,
- * weighted by proximity. Returns an array as long as `points`, with only the first `count` points set.
+ * Moves points, packed xyz, along with the ellipsoids that move from the pose `before` to the pose `after`: by the mean
+ * of the ellipsoids' affine maps, weighted by proximity. Returns an array as long as `points`, with only the first
+ * `count` points set.
  */
 export function deformPoints(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
   const maps = before.map((one, k) => mapBetween(one, after[k] ?? one));
@@ -22,15 +23,17 @@ export function deformPoints(points: Float32Array, before: Pose, after: Pose, co
   return out;
 }
 
-/** Affine map from one ellipsoid to another, with the data for its weight. */
+/**
+ * Affine map from an ellipsoid before a motion to the same ellipsoid after it, with the data for its weight at a point.
+ */
 interface EllipsoidMap {
   center: Vec3;
   /**
-   * Rows of the matrix that maps offsets from the centre of the first ellipsoid to the frame in which it is the unit
-   * ball.
+   * Rows of the matrix that maps offsets from the centre of the ellipsoid before the motion to the frame in which it is
+   * the unit ball.
    */
   toUnit: [Vec3, Vec3, Vec3];
-  /** Centre of the second ellipsoid; with its semi-axes `axes` it maps the unit ball to that ellipsoid. */
+  /** Centre of the ellipsoid after the motion; with its semi-axes `axes` it maps the unit ball to that ellipsoid. */
   newCenter: Vec3;
   axes: [Vec3, Vec3, Vec3];
   thinnest: number;

@@ -1,16 +1,16 @@
-/** Arithmetic of ellipsoids: translation, rotation, scaling, interpolation, and conversion to plain numbers. */
+/** Arithmetic of control ellipsoids: translation, rotation, scaling, interpolation, and conversion to plain numbers. */
 import type { ControlEllipsoid } from 'vesicle';
 import type { Vec3 } from '../protocol';
 
-/** Least scale factor of a semi-axis; 0 would make the ellipsoid degenerate. */
+/** Least factor by which a semi-axis is scaled; 0 would make the ellipsoid degenerate. */
 const LEAST_FACTOR = 1e-3;
 
-/** Returns a ball as an ellipsoid. */
+/** Returns a ball, given by its centre and radius, as an ellipsoid. */
 export function ball(x: number, y: number, z: number, radius: number): ControlEllipsoid {
   return upright([x, y, z], [radius, radius, radius]);
 }
 
-/** Returns an ellipsoid with its axes along x, y and z. */
+/** Returns an ellipsoid with semi-axes of the lengths a, b and c along x, y and z. */
 export function upright(center: Vec3, [a, b, c]: Vec3): ControlEllipsoid {
   return {
     center,
@@ -22,7 +22,7 @@ export function upright(center: Vec3, [a, b, c]: Vec3): ControlEllipsoid {
   };
 }
 
-/** Returns the lengths of the three semi-axes. */
+/** Returns the lengths of the three semi-axes of an ellipsoid. */
 export function lengthsOf({ axes }: ControlEllipsoid): Vec3 {
   return axes.map((axis) => Math.hypot(...axis)) as Vec3;
 }
@@ -32,7 +32,10 @@ export function moved({ center, axes }: ControlEllipsoid, by: Vec3): ControlElli
   return { center: added(center, by), axes };
 }
 
-/** Returns the ellipsoid rotated about its centre by `angle`, in radians, about a unit vector. */
+/**
+ * Returns the ellipsoid rotated by `angle`, in radians, about the axis through its centre in direction of the unit
+ * vector `about`.
+ */
 export function turned({ center, axes }: ControlEllipsoid, about: Vec3, angle: number): ControlEllipsoid {
   return { center, axes: axes.map((axis) => rotated(axis, about, angle)) as ControlEllipsoid['axes'] };
 }
@@ -56,7 +59,7 @@ export function scaled({ center, axes }: ControlEllipsoid, factors: Vec3): Contr
   return { center, axes: longer as ControlEllipsoid['axes'] };
 }
 
-/** Returns the ellipsoid with semi-axes of these lengths, in their present directions. */
+/** Returns the ellipsoid with semi-axes of the given lengths, in their present directions. */
 export function withLengths(ellipsoid: ControlEllipsoid, lengths: Vec3): ControlEllipsoid {
   const are = lengthsOf(ellipsoid);
   return scaled(ellipsoid, lengths.map((length, k) => length / (are[k] || 1)) as Vec3);
@@ -64,7 +67,7 @@ export function withLengths(ellipsoid: ControlEllipsoid, lengths: Vec3): Control
 
 /**
  * Interpolates between two ellipsoids, `t` from 0 to 1: the centre linearly, the axes by a rotation, the lengths
- * geometrically. Values of `t` outside give the nearer one.
+ * geometrically. Values of `t` outside this range give the nearer ellipsoid.
  */
 export function between(from: ControlEllipsoid, to: ControlEllipsoid, t: number): ControlEllipsoid {
   if (t <= 0) return from;
@@ -120,31 +123,37 @@ function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
   return added(sideways, times(about, along * (1 - cosine)));
 }
 
-/** Returns an ellipsoid as twelve numbers: its centre and its three semi-axes. */
+/** Returns an ellipsoid as twelve numbers, its centre and its three semi-axes, for a shareable link to the scene. */
 export function toNumbers({ center, axes }: ControlEllipsoid): number[] {
   return [...center, ...axes.flat()];
 }
 
-/** Converts twelve numbers back to an ellipsoid; undefined if they are too few, too many or not finite. */
+/**
+ * Converts the twelve numbers of {@link toNumbers} back to an ellipsoid; undefined if they are too few, too many or not
+ * finite.
+ */
 export function fromNumbers(numbers: number[]): ControlEllipsoid | undefined {
   if (numbers.length !== 12 || !numbers.every(Number.isFinite)) return undefined;
   const vector = (at: number) => numbers.slice(at, at + 3) as Vec3;
   return { center: vector(0), axes: [vector(3), vector(6), vector(9)] };
 }
 
-/** Returns the bounding box of all ellipsoids: its least and largest corner. */
+/** Returns the bounding box of all ellipsoids of a pose: its least and largest corner. */
 export function boxOf(pose: readonly ControlEllipsoid[]): { min: Vec3; max: Vec3 } {
   const corner = (sign: number, choose: (...values: number[]) => number) =>
     [0, 1, 2].map((k) => choose(...pose.map((one) => (one.center[k] ?? 0) + sign * halfWidth(one, k)))) as Vec3;
   return { min: corner(-1, Math.min), max: corner(1, Math.max) };
 }
 
-/** Returns the half width of an ellipsoid along coordinate `k`. */
+/** Returns the half width of an ellipsoid along coordinate axis `k`, 0 to 2. */
 function halfWidth({ axes }: ControlEllipsoid, k: number): number {
   return Math.hypot(...axes.map((axis) => axis[k] ?? 0));
 }
 
-/** Tests whether two poses are the same up to rounding, since the model stores ellipsoids in another form. */
+/**
+ * Tests whether two poses are equal up to rounding: the model stores ellipsoids in another form, so its poses differ
+ * slightly from those set.
+ */
 export function samePose(one: readonly ControlEllipsoid[], other: readonly ControlEllipsoid[]): boolean {
   return one.length === other.length && one.every((ellipsoid, k) => isSame(ellipsoid, other[k] ?? ellipsoid));
 }

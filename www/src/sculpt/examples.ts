@@ -6,7 +6,7 @@ import { type Film, poseAt } from './film';
 import type { Layout, ParamValues, Pose } from './protocol';
 import type { ComputedMesh } from './shapes';
 
-/** A mesh file served with the page, or a computed mesh. */
+/** Source of an example's mesh: a file served with the page, or a computed mesh. */
 export type ExampleMesh = { file: string } | { shape: ComputedMesh };
 
 /** An example of the Sculpt lab: meshes, ellipsoids that fit them, their motion, settings and credits. */
@@ -16,11 +16,16 @@ export interface SculptExample {
   detail?: ExampleMesh;
   base?: ExampleMesh;
   up: 'y' | 'z';
-  /** Ellipsoids at the start; if undefined, they are fitted to the mesh, or a unit ball without a mesh. */
+  /**
+   * Ellipsoids that the model starts with; if undefined, they are fitted to the mesh or, without a mesh, a unit ball.
+   */
   start?: Pose;
-  /** Names of the ellipsoids, in the order of `start`. */
+  /** Names of the ellipsoids, shown on the page, in the order of `start`. */
   names?: string[];
-  /** Pose that the ellipsoids move to when the example opens, unless a film plays. */
+  /**
+   * Pose that the ellipsoids move to when the example opens, unless a link gives another pose or a film; undefined to
+   * stay at `start`.
+   */
   pose?: Pose;
   film?: Film;
   params: ParamValues;
@@ -29,10 +34,10 @@ export interface SculptExample {
   credit: string;
 }
 
-/** Credits of the bust. */
+/** Credits of the bust of Nefertiti, for the examples and presets that show it. */
 export const NEFERTITI = text('sculptPresets.nefertitiCredit');
 
-/** Ellipsoids of the bust: crown, head, neck and chest. */
+/** Start pose of the ellipsoids of the Nefertiti bust: crown, head, neck and chest. */
 export const BUST: Pose = [
   {
     center: [0, 125, 0],
@@ -54,12 +59,12 @@ export const BUST_NAMES = [
 ];
 export const BUST_MESHES = { detail: { file: 'nefertiti.ply' }, base: { file: 'nefertiti-base.ply' } } as const;
 
-/** Point where head and neck of the bust meet; the head is rotated about it. */
+/** Point where head and neck of the Nefertiti bust meet; the head is rotated about it. */
 const NAPE: Vec3 = [0, -40, 20];
 
 /**
- * Returns the bust's pose with crown and head rotated together about the nape, by `angle` in radians, then moved by
- * `by`.
+ * Returns the pose of the Nefertiti bust with crown and head rotated together about the nape, by `angle` in radians,
+ * then translated by the vector `by`.
  */
 function headTurned(about: Vec3, angle: number, by: Vec3): Pose {
   const [crown, head, ...others] = BUST;
@@ -67,10 +72,10 @@ function headTurned(about: Vec3, angle: number, by: Vec3): Pose {
   return [...[crown, head].flatMap((one) => (one ? [turn(one)] : [])), ...others];
 }
 
-/** Pose of the bust with the head turned aside on a longer neck. */
+/** Pose of the Nefertiti bust with the head turned aside on a longer neck. */
 export const LOOKING_ASIDE: Pose = headTurned([0, 1, 0], 0.5, [8, 26, 0]);
 
-/** The film of the lava lamp. */
+/** The film of the lava lamp example: its computed motion, played once. */
 export const LAVA: Film = { motion: 'lava', loop: false };
 
 /** The examples of the Sculpt lab. The first one opens by default. */

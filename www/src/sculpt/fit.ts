@@ -1,21 +1,24 @@
-/** Fits ellipsoids to an arbitrary mesh: a row of them along its longest principal axis. */
+/** Fits control ellipsoids to an arbitrary mesh: a row of them along the mesh's longest principal axis. */
 import type { ControlEllipsoid, Mesh } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { added, times } from './ellipsoids';
 
-/** Largest number of ellipsoids in a row. */
+/** Largest number of ellipsoids that are fitted to a mesh. */
 const MAX_ELLIPSOIDS = 5;
 /**
- * Semi-axes of an ellipsoid as a share of the half widths of its slice. If larger, the membrane bulges where the mesh
- * is concave; if smaller, it is slack.
+ * Semi-axes of a fitted ellipsoid as a share of the half widths of its slice of the mesh. If larger, the membrane
+ * bulges where the mesh is concave; if smaller, it is slack.
  */
 const FILL = 0.9;
-/** Least semi-axis across the row, as a share of the longest extent of the mesh; shorter ones would make needles. */
+/**
+ * Least semi-axis of a fitted ellipsoid across the row, as a share of the longest extent of the mesh; shorter ones
+ * would make needles.
+ */
 const MIN_SEMI_AXIS = 0.03;
 
 /**
  * Returns a row of ellipsoids from one end of the mesh to the other along its longest principal axis; their number is
- * 1.5 times its length over its width, rounded, between 1 and `MAX_ELLIPSOIDS`.
+ * 1.5 times the mesh's length over its width, rounded, between 1 and `MAX_ELLIPSOIDS`.
  */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
@@ -37,8 +40,9 @@ export function fitted(mesh: Mesh): ControlEllipsoid[] {
 }
 
 /**
- * Returns the centre and semi-axes, in principal coordinates, of an ellipsoid for the vertices with `from` ≤ x ≤ `to`.
- * `least` is the least length of the semi-axes along y and z; `isWhole` tells that these are all vertices.
+ * Returns the centre and semi-axes of an ellipsoid for the vertices with `from` ≤ x ≤ `to`, in coordinates along the
+ * mesh's principal axes, as in `local`. `least` is the least length of the semi-axes along y and z; `isWhole` tells
+ * that these are all vertices.
  */
 function sliceEllipsoid(local: Float32Array, [from, to]: [number, number], isWhole: boolean, least: number) {
   const sums = [0, 0, 0, 0, 0];
@@ -79,8 +83,8 @@ function spanOf(local: Float32Array, k: number): [number, number] {
 }
 
 /**
- * Returns the eigenvectors of a symmetric 3 × 3 matrix, given row by row, computed by Jacobi rotations; that of the
- * largest eigenvalue first. They are right-handed.
+ * Returns the eigenvectors of a symmetric 3 × 3 matrix, given row by row, such as the second moments of a mesh: that of
+ * the largest eigenvalue first, and right-handed. Computed by Jacobi rotations.
  */
 export function principalAxes(matrix: number[]): Vec3[] {
   const a = [matrix.slice(0, 3), matrix.slice(3, 6), matrix.slice(6, 9)];

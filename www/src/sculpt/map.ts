@@ -1,12 +1,15 @@
-/** Draws the texture of the globe: seas, lands and a grid of longitudes and latitudes. Used by the worker only. */
+/**
+ * Draws the texture of the Sculpt lab's globe: seas, lands and a grid of longitudes and latitudes. Used by the worker
+ * only.
+ */
 
 const WIDTH = 1024;
 const HEIGHT = 512;
-/** Spacing of the map's grid lines, degrees. */
+/** Spacing of the longitudes and latitudes drawn on the globe's map, degrees. */
 const GRID = 15;
 
 /**
- * Lands of an invented map, on which each region can be recognised: discs by longitude, latitude and radius, in
+ * Lands of the globe's map, invented so that each region can be recognised: discs by longitude, latitude and radius, in
  * degrees.
  */
 const LANDS: [number, number, number][] = [
@@ -45,7 +48,7 @@ const LANDS: [number, number, number][] = [
   ] as [number, number, number][]),
 ];
 
-/** Returns the map as PNG: longitudes −180 to 180 from left to right, north up. */
+/** Returns the map, the texture of the globe, as PNG: longitudes −180 to 180 from left to right, north up. */
 export async function drawnMap(): Promise<Uint8Array> {
   const canvas = new OffscreenCanvas(WIDTH, HEIGHT);
   const context = canvas.getContext('2d');
@@ -75,7 +78,8 @@ const x = (longitude: number) => ((longitude + 180) / 360) * WIDTH;
 const y = (latitude: number) => ((90 - latitude) / 180) * HEIGHT;
 
 /**
- * Fills a disc given by longitude, latitude and radius in degrees; on the map it is wider the nearer it is to a pole.
+ * Fills a disc of land given by longitude, latitude and radius in degrees; on the map it is wider the nearer it is to a
+ * pole.
  */
 function paintLand(
   context: OffscreenCanvasRenderingContext2D,

@@ -1,4 +1,4 @@
-/** Opens meshes and builds models for the page's requests. Used by the worker only. */
+/** Opens meshes and builds models for the requests of the Sculpt lab's page. Used by the worker only. */
 
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
@@ -8,7 +8,10 @@ import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';
 import { computedMesh } from './shapes';
 
-/** Ellipsoid of a model that has neither a mesh nor ellipsoids: the membrane needs at least one. */
+/**
+ * Ellipsoids of a model for which neither a mesh nor ellipsoids are given: a unit ball, since the membrane needs at
+ * least one.
+ */
 const DEFAULT_ELLIPSOIDS: Pose = [
   {
     center: [0, 0, 0],
@@ -20,13 +23,13 @@ const DEFAULT_ELLIPSOIDS: Pose = [
   },
 ];
 
-/** The meshes of a scene, to be freed by its owner. */
+/** The meshes that a model is built from, detailed surface and base if given; their owner must free them. */
 export interface Scene {
   detail: Mesh | undefined;
   base: Mesh | undefined;
 }
 
-/** Reads or computes the meshes of a scene. */
+/** Reads or computes the meshes of a scene: detailed surface and base, if the source has them. */
 export async function sceneFrom({ detail, base }: SceneSource): Promise<Scene> {
   const finest = detail && (await meshFrom(detail));
   try {
@@ -48,12 +51,15 @@ export function freeScene({ detail, base }: Scene): void {
 }
 
 /**
- * Scale factors for fitted ellipsoids, tried in this order until a base can be built: the largest preserves the shape
- * best.
+ * Scale factors for ellipsoids fitted to a mesh, tried in this order until a model can be built: the largest preserves
+ * the shape best.
  */
 const FIT_SCALES = [1, 0.8, 0.6, 0.4];
 
-/** Builds the first model of a scene; also returns the ellipsoids it starts with, given or fitted. */
+/**
+ * Builds the first model of a scene; also returns the ellipsoids it starts with: those in `setup`, else fitted to the
+ * mesh or, without a mesh, a unit ball.
+ */
 export function firstModel(scene: Scene, setup: Setup): { model: MultiresolutionModel; start: Pose } {
   const mesh = scene.detail ?? scene.base;
   if (setup.start || !mesh) {
@@ -73,7 +79,7 @@ export function firstModel(scene: Scene, setup: Setup): { model: Multiresolution
   throw refusal;
 }
 
-/** Builds a model in its start pose; the caller then sets the target pose. */
+/** Builds a model of a scene's meshes with its ellipsoids in the pose `start`; the caller then sets the target pose. */
 export function buildModel({ detail, base }: Scene, start: Pose, { params }: Setup): MultiresolutionModel {
   return new MultiresolutionModel({
     ellipsoids: start,
@@ -83,7 +89,7 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
   });
 }
 
-/** Returns a copy of a mesh for the page to draw, with `values` if there is one for each vertex. */
+/** Returns a copy of a mesh for the page to draw, with the `values` to colour it by if there is one for each vertex. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
   const { uvs: _, ...surface } = copySurface(emptyArrays(), mesh);
   // Values computed for another mesh do not belong to these vertices.
@@ -101,8 +107,8 @@ export function texturedSurfaceOf(mesh: Mesh): Surface {
 }
 
 /**
- * Returns one value per vertex: the mean curvature of the result, or log₂ of the area or angle distortion of the base,
- * 0 where area or angles are preserved.
+ * Returns one value per vertex to colour the surfaces by: the mean curvature of the result, or log₂ of the area or
+ * angle distortion of the deformed base, 0 where area or angles are preserved.
  */
 export function valuesFor(model: MultiresolutionModel, quantity: SculptQuantity): Float32Array {
   if (quantity === 'mean curvature') return model.mesh.curvature('mean');

@@ -1,4 +1,7 @@
-/** Presets of the Sculpt lab: the paper's figures, on meshes that are served with the page or computed in it. */
+/**
+ * Presets of the Sculpt lab: the figures of the paper by Kobbelt, Bareuther and Seidel, on meshes that are served with
+ * the page or computed in it.
+ */
 import { text } from '../texts';
 import type { SculptViewOptions } from '../view/sculpture';
 import { ball, moved, samePose, scaled, turned, upright } from './ellipsoids';
@@ -6,7 +9,10 @@ import { BUST, BUST_MESHES, BUST_NAMES, LAVA, LOOKING_ASIDE, NEFERTITI, SCENES, 
 import { poseAt } from './film';
 import type { ParamValues, Pose, StageKind } from './protocol';
 
-/** Expected result of a variant's pose as ranges, each from least to largest; tests compute the pose and compare. */
+/**
+ * Expected result of a preset's variant once its pose is reached, as ranges, each from least to largest; tests compute
+ * the pose and compare.
+ */
 export interface SculptOutcome {
   components: [number, number];
   folded: [number, number];
@@ -14,24 +20,24 @@ export interface SculptOutcome {
   areaHigh?: [number, number];
 }
 
-/** One picture of a figure: the preset's scene with another pose or other parameters. */
+/** One picture of a figure, as a variant of the preset: the same scene with another pose or other parameters. */
 export interface SculptVariant {
   id: string;
   name: string;
   params: ParamValues;
-  /** Pose that the ellipsoids move to. */
+  /** Pose that the ellipsoids move to; if undefined, the figure's own pose. */
   pose?: Pose;
   ourResult: string;
   expected?: SculptOutcome;
 }
 
-/** A figure of the paper, as an example of the Sculpt lab. */
+/** A figure of the paper, as an example of the Sculpt lab, with a variant for each of its pictures. */
 export interface SculptPreset extends SculptExample {
   paperResult: string;
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
   view?: Partial<SculptViewOptions>;
-  /** Series of restructuring stages to display instead of the model's meshes. */
+  /** Series of restructuring stages to display instead of the model's meshes; undefined to display the model. */
   stages?: StageKind;
 }
 
@@ -45,7 +51,7 @@ const BUST_SCENE = {
   credit: NEFERTITI,
 } as const;
 
-/** Returns the bust's pose with each ellipsoid changed by a function of it and its index. */
+/** Returns the pose of the Nefertiti bust with each ellipsoid changed by a function of it and its index. */
 function bustWith(change: (ellipsoid: Pose[number], index: number) => Pose[number]): Pose {
   return BUST.map(change);
 }
@@ -59,7 +65,10 @@ const WIDE_CROWN = bustWith((one, index) => (index === 0 ? scaled(one, [1.45, 1,
 
 const BALL_SCENE = { up: 'y', color: 'plain', params: {} } as const;
 const ONE_BALL: Pose = [ball(0, 0, 0, 0.98)];
-/** Start pose of the globe in figure 10: three ellipsoids in the same place; each takes its part of the map along. */
+/**
+ * Start pose of the globe in figure 10: three ellipsoids in the same place; when they separate, each takes its part of
+ * the map along.
+ */
 const GLOBE_START: Pose = [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97), ball(0, 0, 0, 0.96)];
 const APART: Pose = [ball(-0.6, 0, 0, 0.85), ball(0.1, 0.1, 0, 0.5), ball(0.8, 0.3, 0, 0.6)];
 const LENS: Pose = [0, 1, 2].map(() => upright([0, 0, 0], [1.5, 0.55, 1.2]));
@@ -250,7 +259,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
   },
 ];
 
-/** Returns the example or preset with this id. */
+/** Returns the Sculpt lab's example or preset with this id, undefined if there is none. */
 export function sceneById(id: string): SculptExample | undefined {
   return [...SCENES, ...SCULPT_PRESETS].find((one) => one.id === id);
 }
@@ -271,8 +280,9 @@ export function posesOf(example: SculptExample | undefined): Pose[] {
 }
 
 /**
- * Returns the first variant of a figure whose pose and parameters are all in force, if there is one; parameters that it
- * does not set must have the values in `usual`, those with which the figure opens.
+ * Returns the first variant of a figure that the current pose and parameters match, to mark its button; undefined if
+ * none does. Parameters that the variant does not set must have the values in `usual`, those with which the figure
+ * opens.
  */
 export function variantInForce(
   preset: SculptPreset,

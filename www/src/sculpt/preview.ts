@@ -1,16 +1,19 @@
 import type { MultiresolutionModel, MultiresParams } from 'vesicle';
 
-/** Longest duration of a step during a drag, milliseconds; after a slower one the preview uses longer edges. */
+/**
+ * Longest duration of a step of the model during a drag, milliseconds; after a slower one the preview uses longer
+ * edges.
+ */
 const SLOW_FRAME_MS = 60;
 /** Factor by which the preview lengthens edges after a slow step of a drag: 2 means a quarter of the triangles. */
 const EDGE_FACTOR = 2;
 
 /**
  * Reduces the model's resolution during motion: the result is no finer than the base surface and, after a slow step of
- * a drag, edges are longer. Restores the set parameters at rest.
+ * a drag, edges are longer. Restores the user's parameters when the motion has ended.
  */
 export class Preview {
-  /** Parameters as set, while the preview has changed them; else undefined. */
+  /** Parameters as the user set them, while the preview has changed them in the model; else undefined. */
   #saved: MultiresParams | undefined;
   #coarse = false;
 
@@ -19,8 +22,8 @@ export class Preview {
   }
 
   /**
-   * Adjusts the model before a step. `motion`: whether the pointer drags ellipsoids or, with `path`, they move by
-   * themselves; `durationMs`: duration of the last step in milliseconds.
+   * Adjusts the model's resolution before a step. `motion`: 'drag' while the pointer drags ellipsoids, 'path' while
+   * they move by themselves, 'none' at rest; `durationMs`: duration of the last step in milliseconds.
    */
   prepare(model: MultiresolutionModel, motion: 'none' | 'path' | 'drag', durationMs: number): void {
     if (motion === 'none') this.end(model);
@@ -28,7 +31,7 @@ export class Preview {
     else if (!this.#saved && model.params.supersample > 0) this.#change(model, { supersample: 0 });
   }
 
-  /** Restores the set parameters. */
+  /** Ends the preview: restores the model's parameters as the user set them. */
   end(model: MultiresolutionModel): void {
     if (this.#saved) model.setParams(this.#saved);
     this.#saved = undefined;

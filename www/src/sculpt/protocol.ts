@@ -36,7 +36,7 @@ export type {
   Vec3,
 };
 
-/** All ellipsoids of a model, in a fixed order. */
+/** All control ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
 /** Source of a mesh: a file with its texture, if any, or a computed shape. */
@@ -48,25 +48,28 @@ export interface SceneSource {
   base?: MeshSource;
 }
 
-/** All that a model is built from, besides the meshes. */
+/** Settings that a model is built with, besides its meshes. */
 export interface Setup {
   /**
-   * The ellipsoids before the first step. If undefined, `open` fits them to the mesh (a unit ball if there is none),
-   * and `rebuild` keeps those of the previous model.
+   * The control ellipsoids before the first step. If undefined, the request `open` fits them to the mesh (a unit ball
+   * if there is none), and `rebuild` keeps those of the previous model.
    */
   start: Pose | undefined;
-  /** Parameters that differ from the defaults. */
+  /** Parameters of the method that differ from the defaults. */
   params: ParamValues;
   /** Target pose of the ellipsoids, to which they move from the start; if undefined, they stay. */
   pose: Pose | undefined;
 }
 
-/** Reply about a newly built model, before its first step. */
+/**
+ * Parameters and poses of a newly built or restored model: the reply to `rebuild` and `restore`, and part of that to
+ * `open`.
+ */
 export interface Ready {
   params: ParamValues;
-  /** The ellipsoids at the start. */
+  /** The ellipsoids with which the model was built. */
   start: Pose;
-  /** Pose that the ellipsoids move to. */
+  /** Target pose, which the ellipsoids move to. */
   pose: Pose;
 }
 
@@ -75,35 +78,35 @@ export interface OpenedScene extends Ready {
   /** Number of triangles of the detailed surface; undefined if there is none. */
   detail: number | undefined;
   bands: number;
-  /** The texture of the surface, if it has one. */
+  /** The texture of the surface; undefined if it has none. */
   texture: MeshTexture | undefined;
   /** Milliseconds spent building the model, most of them for its base. */
   buildMs: number;
 }
 
 /**
- * The meshes displayed: the result, the base, both of them, a row with all stages of figure 1, the meshes of the
- * membrane's solver from coarse to fine, or stages of restructuring.
+ * The meshes displayed: the result (the deformed surface with its detail), the deformed base, both of them, a row with
+ * all stages of figure 1, the meshes of the membrane's solver from coarse to fine, or stages of restructuring.
  */
 export type Layout = 'result' | 'base' | 'pair' | 'row' | 'levels' | 'stages';
 
 /** Series of restructuring stages to display: as a whole (figure 3), or pass by pass (figure 6). */
 export type StageKind = 'restructuring' | 'passes';
 
-/** A mesh with its caption, in a row of several. */
+/** A mesh with its caption, one of several displayed in a row. */
 export interface Stage {
   caption: string;
   surface: Surface;
 }
 
-/** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
+/** A quantity computed at each vertex of the surface to colour it by; the names appear in the interface. */
 export type SculptQuantity = 'area distortion' | 'angle distortion' | 'mean curvature';
 
-/** Data that the page requests with each frame. */
+/** Selects the data that the worker sends to the page with each {@link FrameEvent}. */
 export interface FrameContents {
   layout: Layout;
   quantity: SculptQuantity | undefined;
-  /** Whether the result is sent with texture coordinates; it then has no values. */
+  /** Whether the result is sent with texture coordinates; it then has no values of `quantity`. */
   textured: boolean;
 }
 
@@ -111,13 +114,13 @@ export interface FrameContents {
 export interface SavedPose {
   state: Uint8Array;
   iteration: number;
-  /** Frame of the film at which the model was saved. */
+  /** Frame of the film, from 0, at which the model was saved. */
   frame: number;
 }
 
 /**
- * Facts about the detail and the map T, which takes the deformed base to the undeformed one; beyond the measures of the
- * mesh.
+ * Facts that the page displays besides the measures of the mesh: about the detail and the map T, which takes the
+ * deformed base to the undeformed one.
  */
 export interface Facts {
   bands: number;
@@ -140,11 +143,11 @@ export interface Facts {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens meshes and builds a model of them. On failure, the previous model stays. */
+  /** Opens meshes and builds a model of them. On failure, the previous model stays in use. */
   open: { body: { source: SceneSource; setup: Setup }; reply: OpenedScene };
-  /** Builds a new model of the same meshes. On failure, the previous model stays. */
+  /** Builds a new model of the same meshes. On failure, the previous model stays in use. */
   rebuild: { body: Setup; reply: Ready };
-  /** Loads a film at a frame, at most its last one, without playing it. */
+  /** Loads a film and goes to one of its frames, at most the last, without playing it; undefined removes the film. */
   film: { body: { film: Film | undefined; frame: number }; reply: undefined };
   /**
    * Plays the film from its present frame, or from the start if it is at its end; without a film, runs until the model
@@ -157,14 +160,17 @@ export interface Requests {
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
   show: { body: FrameContents; reply: undefined };
-  /** Replies with the undeformed base, and the detailed surface as loaded. */
+  /** Replies with the undeformed base and, if there is one, the detailed surface as loaded. */
   originals: { body: undefined; reply: { base: Surface; detail: Surface | undefined } };
   /** Saves the present state of the model, also while it is running. */
   save: { body: undefined; reply: SavedPose };
   /** Restores a saved model of the same meshes. */
   restore: { body: SavedPose; reply: Ready };
   stages: { body: StageKind; reply: Stage[] };
-  /** Records the film from its first frame as an animated GLB with `frameSeconds` per frame; undefined if cancelled. */
+  /**
+   * Records the film from its first frame as an animated GLB with `frameSeconds` per frame; replies with undefined if
+   * cancelled.
+   */
   record: { body: { frameSeconds: number }; reply: Uint8Array | undefined };
   cancelRecord: { body: undefined; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
@@ -172,7 +178,7 @@ export interface Requests {
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Tells the worker that a frame is on the screen; has no reply. */
+/** Tells the worker that a frame is on the screen, so that it may send another; has no reply. */
 export interface ShownMessage {
   kind: 'shown';
   /** The frame's `serial`. */
@@ -182,38 +188,41 @@ export interface ShownMessage {
 export interface PoseMessage {
   kind: 'pose';
   pose: Pose;
-  /** Number of the pose; frames report the number of the last one they follow. */
+  /** Number of the pose; each {@link FrameEvent} reports the number of the last pose that it follows. */
   poseId: number;
   /** Whether the pose is part of a drag that continues. */
   dragging: boolean;
 }
 export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
 
-/** The model after a step, or after a change of the data requested with each frame. */
+/**
+ * Event with the model's surfaces and ellipsoids, sent after a step or after a change of the data requested with each
+ * frame.
+ */
 export interface FrameEvent {
   event: 'frame';
   /** Counts the frames, from 1; the page sends it back when the frame is on the screen. */
   serial: number;
   result: Surface;
-  /** The deformed base, unless the layout is only the result. */
+  /** The deformed base; omitted in the layout `result`. */
   base?: Surface;
   /**
    * The map T as a surface: the triangles of the base, with its vertices at their positions on the undeformed base.
    * Sent in the layout `row`.
    */
   link?: Surface;
-  /** The solver's meshes from coarse to fine, if the layout includes them. */
+  /** The meshes of the membrane's solver from coarse to fine; sent in the layout `levels`. */
   levels?: Stage[];
   reports: StepReport[];
-  /** Present ellipsoids; removed ones that are still shrinking follow at the end. */
+  /** The model's ellipsoids at present; removed ones that are still shrinking follow at the end. */
   ellipsoids: Pose;
-  /** Pose that the ellipsoids move to, at the end of a glide if there is one. */
+  /** Target pose of the ellipsoids; during a glide of several frames, the pose at its end. */
   pose: Pose;
-  /** Number of the last pose received before this step. */
+  /** Number (`poseId`) of the last pose that the worker received before this frame. */
   poseId: number;
   /** Present frame of the film, from 0. */
   frame: number;
-  /** Duration of the step in milliseconds. */
+  /** Duration of the model's last step in milliseconds. */
   durationMs: number;
   /**
    * Whether the frame is a preview: its detail is reduced and, after a slow step of a drag, its edges are twice as long
@@ -222,21 +231,24 @@ export interface FrameEvent {
   preview: boolean;
 }
 /**
- * Measures of the mesh, and facts about the map and the detail; sent when the model has converged or was stopped, and
- * after single steps.
+ * Event with the measures of the mesh, and facts about the map T and the detail; sent when the model has converged or
+ * was stopped, and after single steps.
  */
 export interface MeasuredEvent {
   event: 'measured';
   measures: Measures;
   facts: Facts;
 }
-/** Reports that a pose was rejected; the ellipsoids keep their previous target, `pose`. */
+/**
+ * Event that reports that the model rejected a pose sent by the page; the ellipsoids keep their previous target,
+ * `pose`.
+ */
 export interface RefusedEvent {
   event: 'refused';
   failure: Failure;
   pose: Pose;
 }
-/** Progress of a recording, 0 to 1. */
+/** Event with the progress of a recording of the film, 0 to 1. */
 export interface RecordingProgressEvent {
   event: 'recorded';
   progress: number;

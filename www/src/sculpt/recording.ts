@@ -1,16 +1,16 @@
-/** Records films as animated GLB. Used by the worker only. */
+/** Records films of the Sculpt lab as animated GLB. Used by the worker only. */
 import { animationGlb, type Mesh, type MultiresolutionModel } from 'vesicle';
 import { type Film, lastFrame, poseAt } from './film';
 
 /**
- * Largest number of steps in which the surface may reach the first pose before recording starts; motion that remains
- * then is recorded.
+ * Largest number of steps in which the surface may reach the film's first pose before recording starts; motion that
+ * remains then is recorded.
  */
 const MOST_TO_START = 60;
 
 /**
- * Records all frames of a film as one file; in a loop the last frame is left out, as it equals the first. Undefined if
- * the signal aborts. Leaves the model in the last pose.
+ * Records all frames of a film as one animated GLB file; in a loop the last frame is left out, as it equals the first.
+ * Undefined if the signal aborts. Leaves the model in the last pose.
  */
 export async function recorded(
   model: MultiresolutionModel,

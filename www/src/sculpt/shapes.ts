@@ -1,12 +1,12 @@
-/** Computed meshes. Used by the worker only. */
+/** Computes the meshes of examples that have no mesh file. Used by the worker only. */
 import { Mesh } from 'vesicle';
 import { drawnMap } from './map';
 
 export type ComputedMesh = 'globe' | 'ball';
 
-/** Number of meridians of the globe. */
+/** Number of meridians of the globe's mesh. */
 const MERIDIANS = 96;
-/** Number of circles of latitude of the globe between the poles. */
+/** Number of circles of latitude of the globe's mesh, without the poles. */
 const CIRCLES = 47;
 
 /** Returns a computed mesh, with its texture if it has one. */
@@ -15,14 +15,14 @@ export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
   return Mesh.parse(globeAsObj(), { texture: { type: 'image/png', bytes: await drawnMap() } });
 }
 
-/** Returns a computed mesh without its texture. */
+/** Returns a computed mesh without its texture; tests use it where no texture can be drawn. */
 export function plainMesh(shape: ComputedMesh): Mesh {
   return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : Mesh.parse(globeAsObj());
 }
 
 /**
- * Returns a ball of radius 1 as an OBJ file, with y up and texture coordinates by longitude and latitude: u from west
- * to east, v from the south. Only in a file can a vertex on the seam have two texture coordinates.
+ * Returns the globe, a ball of radius 1, as an OBJ file, with y up and texture coordinates by longitude and latitude: u
+ * from west to east, v from the south. Only in a file can a vertex on the seam have two texture coordinates.
  */
 function globeAsObj(): Uint8Array {
   const lines: string[] = [];

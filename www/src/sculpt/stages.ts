@@ -1,16 +1,16 @@
-/** Rows of meshes to compare: levels of the solver, and stages of restructuring. Used by the worker only. */
+/** Rows of meshes to compare: meshes of the membrane's solver, and stages of restructuring. Used by the worker only. */
 
 import { Mesh, type MultiresolutionModel } from 'vesicle';
 import { text } from '../texts';
 import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
-/** Largest number of solver levels displayed side by side. */
+/** Largest number of meshes of the membrane's solver displayed side by side. */
 const MAX_MESHES = 5;
 
 /**
- * Returns the meshes that the membrane was solved on, from coarse to fine; only the `MAX_MESHES` finest ones if there
- * are more.
+ * Returns the meshes that the membrane was solved on, with captions, from coarse to fine; only the `MAX_MESHES` finest
+ * ones if there are more.
  */
 export function levelsOf(model: MultiresolutionModel): Stage[] {
   const levels = model.levelMeshes();
@@ -27,8 +27,8 @@ function sizeOf(mesh: Mesh): string {
 }
 
 /**
- * Returns a mesh with a caption: `name`, the number of triangles, and the quality below which a share `WORST_SHARE` of
- * them lies; 1 is equilateral.
+ * Returns a mesh with a caption: `name`, the number of triangles, and the triangle quality (1 is equilateral) that is
+ * not reached by a share `WORST_SHARE` of them.
  */
 function withCaption(mesh: Mesh, name: string): Stage {
   const surface = surfaceOf(mesh);
@@ -40,7 +40,7 @@ function withCaption(mesh: Mesh, name: string): Stage {
   };
 }
 
-/** Share of the triangles whose quality lies below the one in the caption of a stage. */
+/** Share of the triangles whose quality lies below the value in the caption of a stage. */
 const WORST_SHARE = 0.05;
 
 /**
@@ -58,12 +58,18 @@ function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   });
 }
 
-/** Edge length of the ball before its deformation; its radius is 1. */
+/** Edge length of the ball of radius 1 that is deformed to show restructuring. */
 const EDGE = 0.16;
-/** Rounds of restructuring after which hardly any edge is out of bounds. */
+/**
+ * Rounds of restructuring (collapse, split and flip passes) of the deformed ball after which hardly any edge is out of
+ * bounds.
+ */
 const ROUNDS = 6;
 
-/** Returns the stages of restructuring a deformed ball: as a whole, or pass by pass. */
+/**
+ * Returns the stages of restructuring a deformed ball, each with a caption: as a whole (figure 3), or pass by pass
+ * (figure 6).
+ */
 export function stagesOf(kind: StageKind): Stage[] {
   const mesh = pulledBall();
   try {
@@ -88,7 +94,7 @@ function pulledBall(): Mesh {
   return Mesh.fromArrays(positions, indices);
 }
 
-/** Returns the stages of figure 3: deformed, refined everywhere, and restructured. */
+/** Returns the stages of figure 3: the deformed ball, the ball refined everywhere, and the ball restructured. */
 function restructured(mesh: Mesh): Stage[] {
   const [refined, good] = [mesh.clone(), mesh.clone()];
   try {

@@ -3,16 +3,15 @@ import { type Film, glide, lastFrame, poseAt } from './film';
 import type { Pose } from './protocol';
 
 /**
- * Sets the target pose of the ellipsoids for each frame: along a film while it plays, else along a glide to the last
- * pose requested.
+ * Sets the model's target pose of the ellipsoids before each step: along a film while it plays, else along a glide, a
+ * motion of several frames to the last pose requested.
  */
 export class TargetPath {
-  /** The loaded film, if any. */
   #film: Film | undefined;
   /** Present frame of the film, from 0. */
   #frame = 0;
   #playing = false;
-  /** Remaining poses of the glide to the last pose requested. */
+  /** Remaining poses of the glide to the last pose requested, one per frame. */
   #glide: Pose[] = [];
 
   get film(): Film | undefined {
@@ -28,12 +27,15 @@ export class TargetPath {
     return this.#playing || this.#glide.length > 0;
   }
 
-  /** Returns the final pose of the glide, or else the model's present target. */
+  /**
+   * Returns the pose in which the ellipsoids will arrive: the final pose of the glide, or else the model's present
+   * target.
+   */
   finalTarget(model: MultiresolutionModel): Pose {
     return this.#glide.at(-1) ?? model.targets;
   }
 
-  /** Loads a film at a frame, at most its last one, without playing it. */
+  /** Loads a film and goes to one of its frames, at most the last, without playing it; undefined removes the film. */
   setFilm(film: Film | undefined, frame: number): void {
     this.#film = film;
     this.#frame = film ? Math.min(frame, lastFrame(film)) : 0;
@@ -66,7 +68,7 @@ export class TargetPath {
     this.#playing = false;
   }
 
-  /** Sets the target pose at once, as during a drag; ends playing and gliding. */
+  /** Sets the model's target pose at once, as during a drag; ends playing and gliding. */
   jumpTo(model: MultiresolutionModel, pose: Pose): void {
     model.setEllipsoids(pose);
     this.#glide = [];
@@ -82,7 +84,7 @@ export class TargetPath {
     this.#playing = false;
   }
 
-  /** Sets the model's target to the next pose of the film or glide, if there is one. */
+  /** Sets the model's target to the next pose of the film or glide, if there is one; called before each step. */
   next(model: MultiresolutionModel): void {
     const next = this.#playing ? this.#nextOfFilm() : this.#glide.shift();
     if (next) model.setEllipsoids(next);

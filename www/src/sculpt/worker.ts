@@ -55,17 +55,17 @@ class Session {
   readonly #path = new TargetPath();
   #dragging = false;
   #poseId = 0;
-  /** Reports of steps that were not sent to the page yet. */
+  /** Reports of the latest steps, which have not been sent to the page yet. */
   #reports: StepReport[] = [];
   #last: StepReport | undefined;
   #durationMs = 0;
   /** Serial number of the last frame sent to the page. */
   #sentSerial = 0;
-  /** Serial number of the last frame that the page has drawn. */
+  /** Serial number of the last frame that the page has drawn; the next step waits until it is that of the last sent. */
   #shownSerial = 0;
   #run: Task | undefined;
   #recording: Task | undefined;
-  /** Resumes a run that waits for the page or for a new pose. */
+  /** Resumes a run that waits until the page has drawn a frame or sends a new pose. */
   #wake: () => void = () => undefined;
 
   readonly handlers: Handlers = {
@@ -99,7 +99,7 @@ class Session {
     this.#wake();
   }
 
-  /** Accepts a target pose at once, so that the next step uses the newest one; starts a run if none is active. */
+  /** Accepts a target pose at once, so that the next step uses the newest one; starts a run if none is in progress. */
   pose({ pose, poseId, dragging }: PoseMessage): void {
     if (!this.#model) return;
     try {
@@ -153,7 +153,7 @@ class Session {
     return { params: { ...model.params }, start, pose: pose ?? start };
   }
 
-  /** Discards the reports, which belong to another run, and allows the next frame to be sent. */
+  /** Discards the step reports, which belong to an earlier model or state, and allows the next frame to be sent. */
   #forget(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -199,8 +199,8 @@ class Session {
   }
 
   /**
-   * Steps the model frame by frame, each after the page has drawn the previous one; pauses while a dragging pointer is
-   * still.
+   * Steps the model frame by frame, each after the page has drawn the previous one, until it has converged; while a
+   * drag lasts, it then waits for the next pose.
    */
   async #frames(signal: AbortSignal): Promise<void> {
     while (!signal.aborted && (this.#dragging || !this.#isAtRest())) {
@@ -263,7 +263,7 @@ class Session {
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
   }
 
-  /** Ends a preview, then sets parameters; returns the values of all. */
+  /** Ends a preview, then sets parameters of the model; returns the values of all parameters. */
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     this.#preview.end(model);
@@ -312,7 +312,7 @@ class Session {
     }
   }
 
-  /** Records the film, then restores the model to its previous state. */
+  /** Records the film as an animated GLB, then restores the model to its previous state; undefined if cancelled. */
   async #record(frameSeconds: number): Promise<Requests['record']['reply']> {
     await stop(this.#run);
     await stop(this.#recording);

@@ -1,21 +1,24 @@
-/** Cells similar to confocal microscopy: a nucleus with a marked boundary, and a cell that is bright inside. */
+/**
+ * Computed volumes of cells as in confocal microscopy: a nucleus with a marked boundary, and a cell that is bright
+ * inside.
+ */
 import { distance, noise, random, type ShapeVoxels, sample } from './sampling';
 
 type Point = [number, number, number];
 
 const NUCLEUS_SIZE = 72;
-/** Lobes of the nucleus: centre and radius, voxels. */
+/** Balls that make up the nucleus: centre and radius, voxels. */
 const LOBES: { middle: Point; radius: number }[] = [
   { middle: [26, 30, 34], radius: 13 },
   { middle: [44, 28, 38], radius: 13 },
   { middle: [38, 46, 34], radius: 12 },
 ];
-/** Width of the blend between two lobes, voxels. */
+/** Width of the smooth transition between two lobes of the nucleus, voxels. */
 const BLEND = 5;
 /** Distance from the surface of the nucleus, voxels, at which the brightness of its boundary has dropped to 1/e. */
 const MARK = 2.2;
 
-/** A nucleus of three lobes with only its boundary bright, and noise. */
+/** Returns the volume of a nucleus of three lobes with only its boundary bright, and noise. */
 export function markedNucleus(): ShapeVoxels {
   const grain = noise(22, 14);
   return sample(NUCLEUS_SIZE, (i, j, k) => {
@@ -29,7 +32,9 @@ const CELL_SIZE = 80;
 const CELL_RADIUS = 24;
 const GRANULES = 7;
 
-/** A cell with intensity decreasing from its centre to an irregular border, and brighter granules. */
+/**
+ * Returns the volume of a cell with intensity decreasing from its centre to an irregular border, and brighter granules.
+ */
 export function cell(): ShapeVoxels {
   const next = random(24);
   const middle: Point = [39.5, 39.5, 39.5];

@@ -1,17 +1,17 @@
-/** Computed shapes with known topology. */
+/** Computed volumes of shapes with known topology: linked rings, a chain and Menger sponges. */
 import { type ShapeVoxels, sample } from './sampling';
 
 const RINGS_SIZE = 64;
-/** Radius of the centre line of each linked ring, voxels. */
+/** Radius of the centre line of each ring of `linkedRings`, voxels. */
 const RING_RADIUS = 15;
-/** Radius of the tube of each linked ring, voxels. */
+/** Radius of the tube of each ring of `linkedRings`, voxels. */
 const TUBE_RADIUS = 5.5;
-/** Size of the chain's volume, radius of the centre line of each ring, and radius of its tube; voxels. */
+/** Size of the volume of `chain`, radius of the centre line of each of its rings, and radius of its tube; voxels. */
 const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
-/** Width of the empty margin on each side of the sponge, voxels. */
+/** Width of the empty margin on each side of the Menger sponge, voxels. */
 const SPONGE_MARGIN = 4;
 
-/** Two linked rings: two components of genus 1. */
+/** Returns the volume of two linked rings: two components of genus 1. */
 export function linkedRings(): ShapeVoxels {
   const middle = (RINGS_SIZE - 1) / 2;
   const shift = RING_RADIUS / 2;
@@ -25,8 +25,8 @@ export function linkedRings(): ShapeVoxels {
 }
 
 /**
- * Two linked rings as a potential that decreases linearly with the distance from their centre lines: its maximum up to
- * half of the tube's radius, half at the radius, zero from one and a half radii.
+ * Returns the volume of two linked rings as a potential that decreases linearly with the distance from their centre
+ * lines: its maximum, 255, up to half of the tube's radius, half of that at the radius, zero from one and a half radii.
  */
 export function chain(): ShapeVoxels {
   const { size, ring, tube } = CHAIN;
@@ -39,7 +39,7 @@ export function chain(): ShapeVoxels {
   });
 }
 
-/** A Menger sponge of the given depth on 81³ voxels: a cube with square tunnels at every scale. */
+/** Returns the volume of a Menger sponge, a cube of 81³ voxels with square tunnels at `depth` scales. */
 export function spongeVoxels(depth: number): ShapeVoxels {
   const side = 81;
   return sample(side + 2 * SPONGE_MARGIN, (i, j, k) => {
@@ -49,7 +49,9 @@ export function spongeVoxels(depth: number): ShapeVoxels {
   });
 }
 
-/** Whether a voxel is inside a tunnel: at some scale, in the middle third along two axes or more. */
+/**
+ * Whether a voxel is inside a tunnel of the Menger sponge: at some scale, in the middle third along two axes or more.
+ */
 function isPierced(at: number[], side: number, depth: number): boolean {
   for (let level = 1; level <= depth; level++) {
     const third = side / 3 ** level;

@@ -1,11 +1,14 @@
-/** A head phantom similar to a CT: skin around soft tissue, and in it a skull with openings around a brain. */
+/**
+ * A computed volume of a head, similar to a CT: skin around soft tissue, and in it a skull with openings around a
+ * brain.
+ */
 import { noise, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 const SIZE = 112;
 const MIDDLE = (SIZE - 1) / 2;
-/** Semi-axes of the skin, voxels. */
+/** Semi-axes of the ellipsoid bounded by the head's skin, voxels. */
 const SKIN = [43, 50, 48] as const;
-/** Semi-axes of the skull's outer surface, voxels. */
+/** Semi-axes of the ellipsoid bounded by the skull's outer surface, voxels. */
 const SKULL = [35, 42, 40] as const;
 /** Thickness of the skull, voxels. */
 const THICKNESS = 9;

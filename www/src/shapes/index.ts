@@ -1,6 +1,6 @@
 /**
- * Computed volumes for examples and the paper's figures. Intensities 0..255, x fastest, cubic voxels; identical on
- * every machine.
+ * Computed volumes for examples and the figures of the deformable model's paper. Intensities 0..255, x fastest, cubic
+ * voxels; identical on every machine.
  */
 import { cell, markedNucleus } from './cells';
 import { chain, linkedRings, spongeVoxels } from './geometric';

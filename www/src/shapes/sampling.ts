@@ -8,8 +8,8 @@ export interface ShapeVoxels {
 type Point = readonly [number, number, number];
 
 /**
- * Samples a function of voxel indices on a grid of bytes, x fastest, clamped to 0..255; a single number as `size` gives
- * a cube.
+ * Samples a function of voxel indices into a volume of bytes, x fastest, clamped to 0..255; a single number as `size`
+ * gives a cube.
  */
 export function sample(
   size: number | [number, number, number],
@@ -51,7 +51,8 @@ export function distance(a: Point, b: Point): number {
 }
 
 /**
- * Linear ramp from 0 (outside) to 1 (inside), three voxels wide, ½ at the border; `depth` in voxels, positive inside.
+ * Linear ramp at the surface of a shape, from 0 (outside) to 1 (inside), three voxels wide, ½ at the border; `depth` in
+ * voxels, positive inside.
  */
 export function smoothStep(depth: number): number {
   return Math.min(1, Math.max(0, 0.5 + depth / 3));

@@ -1,4 +1,4 @@
-/** A tree of bright vessels on a dark background, similar to an angiography. */
+/** A computed volume of a tree of bright vessels on a dark background, similar to an angiography. */
 import { distance, noise, random, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 type Point = [number, number, number];
@@ -11,14 +11,14 @@ interface Segment {
 
 const SIZE = 112;
 const GENERATIONS = 6;
-/** Radius of the trunk, voxels. */
+/** Radius of the trunk of the vessel tree, voxels. */
 const TRUNK = 4;
-/** Ratio of a child's radius to its parent's, by conservation of flow (Murray's law). */
+/** Ratio of the radius of a vessel to that of its parent, by conservation of flow (Murray's law). */
 const THINNER = 0.5 ** (1 / 3);
 const SHORTER = 0.8;
-/** Mean angle between a child and its parent, radians. */
+/** Mean angle between a vessel and its parent, radians. */
 const TURN = 0.62;
-/** Vessel segments not connected to the tree. */
+/** Vessel segments that are not connected to the vessel tree. */
 const ISLANDS: Segment[] = [
   { from: [16, 88, 30], to: [24, 96, 34], radius: 1 },
   { from: [94, 20, 84], to: [97, 12, 92], radius: 1 },
@@ -33,7 +33,7 @@ export function vesselTree(): ShapeVoxels {
   return sample(SIZE, (i, j, k) => 250 * (strength[i + SIZE * (j + SIZE * k)] ?? 0) + grain());
 }
 
-/** Generates a trunk that grows upwards from the floor and bifurcates repeatedly. */
+/** Generates the segments of a vessel tree: a trunk that grows upwards from the floor and bifurcates repeatedly. */
 function tree(): Segment[] {
   const next = random(1999);
   const segments: Segment[] = [];
@@ -52,7 +52,7 @@ function tree(): Segment[] {
   return segments;
 }
 
-/** Returns the unit vector perpendicular to a unit vector, at `angle` (radians) around it. */
+/** Returns a unit vector perpendicular to the given unit vector, turned by `angle` (radians) around it. */
 function across([x, y, z]: Point, angle: number): Point {
   const other: Point = Math.abs(x) < 0.7 ? [1, 0, 0] : [0, 1, 0];
   const u = unit([y * other[2] - z * other[1], z * other[0] - x * other[2], x * other[1] - y * other[0]]);
@@ -66,8 +66,8 @@ function unit(v: Point): Point {
 }
 
 /**
- * Draws a vessel segment with round ends into the volume: each value of `strength`, 0 to 1, becomes the maximum of
- * itself and the segment's. Visits only the voxels around the segment.
+ * Draws a vessel segment with round ends into the volume: each value of `strength`, one per voxel, 0 to 1, is raised to
+ * that of the segment. Visits only the voxels around the segment.
  */
 function draw({ from, to, radius }: Segment, strength: Float32Array): void {
   const reach = radius + 2;

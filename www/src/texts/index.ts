@@ -8,18 +8,18 @@ export const LANGUAGE = 'en';
 
 type Catalogue = typeof catalogue;
 type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
-/** Key of a text, as in `extract.noVolume`. */
+/** Key of a text in the catalogue, section and name, as in `extract.noVolume`. */
 export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
-/** Key of a text with plural forms, without the suffix of the form. */
+/** Key of a text with plural forms, without the suffix of the form, such as `_one`. */
 export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;
-/** Values for the placeholders of a text, by name. */
+/** Values for the placeholders of a text of the interface, by name. */
 export type TextValues = Record<string, string | number>;
 
 const sections: Record<string, Record<string, string>> = catalogue;
 const FORMS = new Intl.PluralRules(LANGUAGE);
 const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
 
-/** Formats a number without decimals. */
+/** Formats a number without decimals, in the interface's language. */
 export function count(value: number): string {
   return COUNT.format(value);
 }
@@ -34,7 +34,7 @@ export function text(key: TextKey, values: TextValues = {}): string {
 }
 
 /**
- * Returns the form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
+ * Returns the plural form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
  * `{count}` is the number. The forms have the suffixes `_one`, `_other` and so on.
  */
 export function plural(key: PluralKey, number: number, values: TextValues = {}): string {
@@ -44,7 +44,7 @@ export function plural(key: PluralKey, number: number, values: TextValues = {}):
 }
 
 /**
- * Returns a text whose placeholders may be elements, as a list of children for an element.
+ * Returns a text of the interface whose placeholders may be elements, as a list of children for an element.
  *
  * Throws an Error if the value of a placeholder is missing.
  */

@@ -6,21 +6,21 @@ import type { Vec3 } from '../protocol';
 import { toWorld } from '../view/anatomy';
 import type { Box } from './protocol';
 
-/** A box of voxels by its first and last voxel along each axis, both inclusive. */
+/** A region of interest by its first and last voxel along each axis, both inclusive. */
 export interface VoxelBox {
   low: Vec3;
   high: Vec3;
 }
 
 /**
- * Distance by which a box extends beyond the centres of its outermost voxels, in voxels: it contains these centres, but
- * not those of their neighbours.
+ * Distance by which a region of interest extends beyond the centres of its outermost voxels, in voxels: it contains
+ * these centres, but not those of their neighbours.
  */
 const RIM = 0.25;
 
 /**
- * Returns the voxels whose centres lie in a world box, clamped to the image; at least one along each axis. `inverse`
- * maps world coordinates to voxel indices.
+ * Returns the voxels whose centres lie in a region of interest in world coordinates, clamped to the image; at least one
+ * along each axis. `inverse` maps world coordinates to voxel indices.
  */
 export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Vec3): VoxelBox {
   const corners = [toWorld(inverse, min), toWorld(inverse, max)];
@@ -32,8 +32,8 @@ export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Ve
 }
 
 /**
- * Returns the opposite corners, in world coordinates, of a box of voxels; `affine` maps voxel indices to world
- * coordinates.
+ * Returns the region of interest with the given first and last voxels as opposite corners in world coordinates, `RIM`
+ * beyond the voxels' centres; `affine` maps voxel indices to world coordinates.
  */
 export function boxOf({ low, high }: VoxelBox, affine: ArrayLike<number>): Box {
   return {

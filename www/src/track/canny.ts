@@ -1,10 +1,10 @@
 /**
- * Canny's edge detector (1986), which the paper compares its boundary with: Gaussian smoothing, gradient, non-maximum
- * suppression, hysteresis thresholding.
+ * Canny's edge detector (1986), with which the paper on tracking compares its boundary: Gaussian smoothing, gradient,
+ * non-maximum suppression, hysteresis thresholding.
  */
 
 export interface CannySettings {
-  /** Standard deviation of the Gaussian, in pixels. */
+  /** Standard deviation of the Gaussian that smooths the image, in pixels. */
   deviation: number;
   /**
    * Lower hysteresis threshold of the gradient magnitude, in intensity per pixel: local maxima from `low` on that are
@@ -18,14 +18,14 @@ export interface CannySettings {
   high: number;
 }
 
-/** A greyscale image, row by row. */
+/** A greyscale image, row by row, in which edges are detected. */
 export interface GreyImage {
   width: number;
   height: number;
   values: ArrayLike<number>;
 }
 
-/** Returns the edge map of a picture: 1 for each edge pixel, else 0. */
+/** Returns the edge map of a greyscale image: 1 for each edge pixel, else 0. */
 export function canny(picture: GreyImage, { deviation, low, high }: CannySettings): Uint8Array {
   const { width, height } = picture;
   const smooth = smoothed(picture, deviation);

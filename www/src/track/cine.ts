@@ -1,4 +1,7 @@
-/** A computed phantom: cine MR of a beating ventricle whose true volume and wall are known. */
+/**
+ * A computed phantom: cine MR of a beating ventricle whose true volume and wall are known, to measure the errors of
+ * tracking.
+ */
 import type { Vec3 } from '../protocol';
 
 export interface CineSpec {
@@ -18,18 +21,18 @@ export interface CineSpec {
 
 /** Intensity of blood before noise, 0 to 255. */
 const BLOOD = 200;
-/** Intensity of muscle before noise. */
+/** Intensity of muscle before noise, 0 to 255. */
 const MUSCLE = 90;
-/** Intensity of lung before noise. */
+/** Intensity of lung before noise, 0 to 255. */
 const LUNG = 45;
-/** Value of `size`, mm, for which the other lengths in this file hold. */
+/** Value of `size`, mm, for which the other lengths in this file hold; they scale with `size`. */
 const REFERENCE_HALF_AXIS = 42;
 /** Number of samples through the thickness of a slice, averaged for the partial volume effect. */
 const SAMPLES = 3;
 /** Edge of the cells that the true volume is integrated over, mm for a heart whose `size` is `REFERENCE_HALF_AXIS`. */
 const INTEGRATION_STEP = 1.5;
 
-/** Returns the contraction in a frame: 0 in diastole, 1 in systole. */
+/** Returns the contraction of the ventricle in a frame: 0 in diastole, 1 in systole. */
 export function contraction({ frames }: CineSpec, frame: number): number {
   const phase = (frame / frames) % 1;
   const rise = (x: number) => 0.5 - 0.5 * Math.cos(Math.PI * Math.min(1, Math.max(0, x)));
@@ -42,8 +45,8 @@ export function centreOf({ dims, spacing }: CineSpec): Vec3 {
 }
 
 /**
- * Returns approximate signed distances of a point, mm, to the wall of the cavity and to the surface of the heart;
- * negative inside.
+ * Returns approximate signed distances of a point, mm, to the wall of the cavity and to the surface of the heart, at a
+ * contraction of 0 to 1; negative inside.
  */
 function distances(spec: CineSpec, at: Vec3, contracted: number): [number, number] {
   const unit = spec.size / REFERENCE_HALF_AXIS;
@@ -77,8 +80,8 @@ function smoothMax(a: number, b: number, width: number): number {
 }
 
 /**
- * Returns the voxels of all frames, x fastest. The noise is that of magnitude images (Rician), and the same at every
- * call.
+ * Returns the voxels of all frames of the phantom, x fastest. The noise is that of magnitude images (Rician), and the
+ * same at every call.
  */
 export function cineVoxels(spec: CineSpec): Uint8Array {
   const [nx, ny, nz] = spec.dims;
@@ -115,7 +118,7 @@ function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
   return sum / SAMPLES;
 }
 
-/** Returns the true volume of the cavity in a frame, mm³. */
+/** Returns the true volume of the phantom's cavity in a frame, mm³. */
 export function trueVolume(spec: CineSpec, frame: number): number {
   const contracted = contraction(spec, frame);
   const step = (INTEGRATION_STEP * spec.size) / REFERENCE_HALF_AXIS;
@@ -133,8 +136,8 @@ export function trueVolume(spec: CineSpec, frame: number): number {
 }
 
 /**
- * Returns the distances, mm, of points, packed xyz, from the true wall of the cavity, in ascending order; a first-order
- * approximation.
+ * Returns the distances, mm, of points, packed xyz, from the true wall of the phantom's cavity, in ascending order; a
+ * first-order approximation.
  */
 export function wallDistances(spec: CineSpec, frame: number, points: Float32Array): Float64Array {
   const contracted = contraction(spec, frame);

@@ -1,23 +1,26 @@
 /**
- * The paper's boundary on one slice: 2-means clustering of windows into bright and dark, and the votes of the windows
- * (section 2.1).
+ * Finds the paper's boundary in one slice, for previews and figures: 2-means clustering of windows into bright and
+ * dark, and the votes of the windows (section 2.1).
  */
 import type { GreyImage } from './canny';
 
-/** Share of a window's pixels that each of its two clusters must exceed for a boundary. */
+/** Share of a window's pixels that each of its two clusters must exceed for the window to contain a boundary. */
 const MIN_SHARE = 0.1;
-/** Most iterations of 2-means. */
+/** Largest number of iterations of 2-means clustering. */
 const MAX_ITERATIONS = 10;
 
-/** Result of 2-means on the values of a window. */
+/** Result of 2-means clustering of the values of a window. */
 export interface Clusters {
-  /** Mean of the dark cluster, then of the bright one, in intensity units. */
+  /** Mean of the dark cluster, then of the bright one, in the unit of the values. */
   means: [number, number];
-  /** 1 for each value in the bright cluster, else 0. */
+  /** For each value, in their order, 1 if it is in the bright cluster, else 0. */
   bright: Uint8Array;
 }
 
-/** Clusters values in two by Lloyd's iteration, started from the smallest and the largest value. */
+/**
+ * Divides values into a dark and a bright cluster by Lloyd's iteration, started from the smallest and the largest
+ * value.
+ */
 export function twoMeans(values: ArrayLike<number>): Clusters {
   let means: [number, number] = [Math.min(...Array.from(values)), Math.max(...Array.from(values))];
   const bright = new Uint8Array(values.length);
@@ -42,7 +45,7 @@ export function twoMeans(values: ArrayLike<number>): Clusters {
 
 /**
  * Tests whether a window contains a boundary: each cluster has more than `MIN_SHARE` of the pixels, and their means
- * differ by more than `threshold`.
+ * differ by more than `threshold`, in the unit of the values.
  */
 export function hasBoundary({ means, bright }: Clusters, threshold: number): boolean {
   const share = bright.reduce((sum, one) => sum + one, 0) / bright.length;
@@ -50,10 +53,10 @@ export function hasBoundary({ means, bright }: Clusters, threshold: number): boo
 }
 
 /**
- * Returns the boundary votes of the windows of one slice, as in the paper's 2D version: the centre, in pixels, of each
- * face between two pixels that at least one window separates, and the fraction of the windows containing both pixels
- * that separate them. Near the image border, where fewer windows contain them, it is relative to their number
- * elsewhere.
+ * Returns the boundary votes of the windows of one slice, as in the paper's 2D version: for each face between two
+ * pixels that at least one window puts in different clusters, its centre, in pixels, and the share of such windows
+ * among those that contain both pixels. Near the image border, where these are fewer, the share is relative to their
+ * number elsewhere.
  */
 export function sliceVotes(
   { width, height, values }: GreyImage,
@@ -105,8 +108,8 @@ function voteOf(
 }
 
 /**
- * Returns the indices of the pixels in a window, row by row: up to `halfWidth` pixels from (x, y), clipped at the
- * border.
+ * Returns the indices of the pixels in the window around (x, y), row by row: up to `halfWidth` pixels to each side,
+ * clipped at the border.
  */
 export function windowAt({ width, height }: GreyImage, x: number, y: number, halfWidth: number): number[] {
   const out: number[] = [];
@@ -116,8 +119,8 @@ export function windowAt({ width, height }: GreyImage, x: number, y: number, hal
 }
 
 /**
- * Accumulates votes on pixel faces in a picture, as in the paper's figures: each pixel gets the sum of the square roots
- * of the votes on the faces to its left and above, so that slanted edges do not count twice.
+ * Returns an image of the boundary votes on pixel faces, as in the paper's figures: each pixel gets the sum of the
+ * square roots of the votes on the faces to its left and above, so that slanted edges do not count twice.
  */
 export function boundaryImage(
   { width, height }: Pick<GreyImage, 'width' | 'height'>,

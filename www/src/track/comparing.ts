@@ -1,4 +1,4 @@
-/** Repeats the whole run with another setup, for the comparison panel. */
+/** Repeats the whole tracking run with another setup, for the comparison panel of the Track lab. */
 import type { Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';

@@ -1,4 +1,4 @@
-/** Intersects a surface with a plane, and the resulting segments with a row of a picture. */
+/** Intersects a surface with a plane, and the resulting segments with a row of an image, to draw outlines on slices. */
 import type { Plane, Surface } from '../protocol';
 
 /**
@@ -35,7 +35,10 @@ export function crossSection(
   return Float32Array.from(out);
 }
 
-/** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row y = `height`. */
+/**
+ * Returns the x coordinates, sorted, at which segments in an image (x y x y each, in pixels) cross the row y =
+ * `height`.
+ */
 export function intersectionsWithRow(segments: Float32Array, height: number): number[] {
   const out: number[] = [];
   for (let i = 0; i + 3 < segments.length; i += 4) {

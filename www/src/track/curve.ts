@@ -1,21 +1,21 @@
-/** Evaluates the volume curve of a heartbeat, and warns of suspicious frames. */
+/** Evaluates the volume of a tracked ventricle over a heartbeat, and warns of suspicious frames. */
 import type { FrameStatistics } from './protocol';
 
 export interface Beat {
-  /** Number of the frame with the largest volume. */
+  /** Index, from 0, of the frame with the largest volume. */
   diastole: number;
-  /** Number of the frame with the smallest volume. */
+  /** Index, from 0, of the frame with the smallest volume. */
   systole: number;
-  /** The largest volume, in the unit of the volumes evaluated. */
+  /** Largest volume of all frames, in the unit of the given volumes. */
   largest: number;
-  /** The smallest volume, in the unit of the volumes evaluated. */
+  /** Smallest volume of all frames, in the unit of the given volumes. */
   smallest: number;
   /** Ejection fraction, 0 to 1: (largest − smallest) / largest. */
   ejection: number;
 }
 
 /**
- * Returns the largest and smallest of the volumes of all frames, their frames, and the ejection fraction. Undefined for
+ * Returns the largest and smallest of the volumes of all frames, their frames, and the ejection fraction; undefined for
  * fewer than two frames.
  */
 export function beatOf(volumes: readonly number[]): Beat | undefined {
@@ -26,13 +26,14 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
 }
 
 /**
- * Largest share of folded triangles in a frame, which face away from the sum of their three neighbours; above it a
- * warning is shown.
+ * Share of folded triangles in a frame's surface above which a warning is shown; a triangle is folded if it faces away
+ * from the sum of its three neighbours.
  */
 export const MAX_FOLDED_SHARE = 0.01;
 /**
- * Largest relative deviation of a frame's area from the expected area; above it a warning is shown. Expected is the
- * area of the frame before times the ratio of volumes to the power of 2/3, as for a body that only grows or shrinks.
+ * Relative deviation of the area of a frame's surface from the expected area above which a warning is shown. Expected
+ * is the area in the frame before times the ratio of volumes to the power of 2/3, as for a body that only grows or
+ * shrinks.
  */
 export const MAX_AREA_JUMP = 0.15;
 
@@ -45,8 +46,9 @@ export interface FrameWarning {
 type CheckedFacts = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
 
 /**
- * Returns a warning for each frame with too many folded triangles or, after the first, an unexpected area: such frames
- * are suspicious even if their volume and error are plausible.
+ * Returns a warning for each frame whose share of folded triangles exceeds `MAX_FOLDED_SHARE` or, after the first
+ * frame, whose area deviates from the expected one by more than `MAX_AREA_JUMP`: such frames are suspicious even if
+ * their volume and error are plausible.
  */
 export function warningsOf(facts: readonly CheckedFacts[]): FrameWarning[] {
   return facts.flatMap(({ folded, triangles, area, volume }, frame) => {

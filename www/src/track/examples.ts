@@ -13,21 +13,21 @@ export interface TrackExample {
   preparation: Preparation;
   box?: Box;
   at?: Vec3;
-  /** Initial position of the crosshair; by default `at`. */
+  /** Initial position of the crosshair in world coordinates; by default `at`. */
   crosshair?: Vec3;
   params: ParamValues;
   credit: string;
 }
 
-/** No preparation, for images with nearly cubic voxels. */
+/** Neither binning nor in-between slices, for images with nearly cubic voxels. */
 const PLAIN: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
 
-/** Preparation of the user's own images: in-between slices are inserted where slices are thick. */
+/** Default preparation of the user's own images: in-between slices are inserted where slices are thick. */
 export const OWN_PREPARATION: Preparation = { binning: 1, enrichment: 'flow', factor: 0 };
 
 /** A point in the blood of the left ventricle of the measured heart, world coordinates (mm). */
 const LEFT_VENTRICLE: Vec3 = [1.47, 37.05, -13.99];
-/** Returns the cube around a point, with its faces at the distance `reach`. */
+/** Returns a region of interest: the cube around a point, with its faces at the distance `reach`. */
 const around = (middle: Vec3, reach: number): Box => ({
   min: middle.map((x) => x - reach) as Vec3,
   max: middle.map((x) => x + reach) as Vec3,
@@ -35,7 +35,7 @@ const around = (middle: Vec3, reach: number): Box => ({
 
 export const HEART_CREDIT = text('trackPresets.heartCredit');
 
-/** The measured heart, with its settings; also the image of all presets. */
+/** Image and settings of the example with a measured heart, which all presets use, too. */
 export const HEART = {
   source: { file: 'heart.nii.gz' },
   unit: 'mm',

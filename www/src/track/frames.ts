@@ -1,10 +1,10 @@
-/** Collects what the page displays of a tracked frame. */
+/** Collects the data that the page displays for a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
 import { copySurface, emptyArrays } from '../worker/surface-buffers';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 
-/** Returns the surface of a frame with its facts and measures, and its error if `spec` gives the true wall. */
+/** Returns the surface of a tracked frame with its facts and measures, and its error if `spec` gives the true wall. */
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
@@ -18,7 +18,7 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
   }
 }
 
-/** Returns the mean and the 95th percentile of the distances, mm, of points from the true wall of a computed image. */
+/** Returns the mean and the 95th percentile of the distances, mm, of points from the true wall of the phantom. */
 export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);

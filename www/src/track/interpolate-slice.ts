@@ -1,6 +1,6 @@
 /**
- * Interpolates a measured slice from its two neighbours, linearly and along the optical flow, for comparison (figure
- * 5).
+ * Interpolates a measured slice from its two neighbours, linearly and along the optical flow, to compare the results
+ * with it (figure 5 of the paper).
  */
 
 import { Volume } from 'vesicle';

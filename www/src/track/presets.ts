@@ -1,21 +1,24 @@
-/** Presets of the Track lab: the paper's figures, on images that are served with the page. */
+/**
+ * Presets of the Track lab: the figures of the paper on dynamic surfaces from 4D cardiac MRI, on an image that is
+ * served with the page.
+ */
 
 import type { ParamValues } from '../protocol';
 import { text } from '../texts';
 import type { TrackViewOptions } from '../view/track';
 import { HEART, IMAGES, type TrackExample } from './examples';
 
-/** One picture of a figure: the same image with other parameters and view options. */
+/** One picture of a figure, as a variant of the preset: the same image with other parameters and view options. */
 export interface TrackVariant {
   id: string;
   name: string;
   ourResult: string;
-  /** Parameters of the picture that differ from those of the figure. */
+  /** Parameters of the method in which the picture differs from its figure. */
   params: ParamValues;
   view: Partial<TrackViewOptions>;
 }
 
-/** A figure of the paper, as an example of the Track lab. */
+/** A figure of the paper, as an example of the Track lab, with a variant for each of its pictures. */
 export interface TrackPreset extends TrackExample {
   paperResult: string;
   variants: [TrackVariant, ...TrackVariant[]];
@@ -123,12 +126,12 @@ export const TRACK_PRESETS: TrackPreset[] = [
   },
 ];
 
-/** Returns the view options that an example opens with. */
+/** Returns the view options that an example opens with; those of a preset are from its first variant. */
 export function viewOf(example: TrackExample | undefined): TrackViewOptions {
   return { ...PLAIN_VIEW, ...(isTrackPreset(example) && example.variants[0].view) };
 }
 
-/** Returns the example or preset with this id. */
+/** Returns the Track lab's example or preset with this id, undefined if there is none. */
 export function imageById(id: string): TrackExample | undefined {
   return [...IMAGES, ...TRACK_PRESETS].find((one) => one.id === id);
 }
@@ -138,8 +141,8 @@ export function isTrackPreset(example: TrackExample | undefined): example is Tra
 }
 
 /**
- * Returns the first variant of a figure whose parameters are all in force, if there is one; parameters of the figure,
- * `usual`, that it does not set must be in force, too. Other parameters are ignored.
+ * Returns the first variant of a figure that the current parameters match, to mark its button; undefined if none does.
+ * Parameters that the figure sets (`usual`) and the variant does not must match, too; all others are ignored.
  */
 export function variantInForce(preset: TrackPreset, params: ParamValues, usual: ParamValues): TrackVariant | undefined {
   return preset.variants.find((one) =>

@@ -48,7 +48,7 @@ export type ImageSource = { files: NamedBytes[] } | { cine: CineSpec };
  */
 export type Enrichment = 'none' | 'linear' | 'flow';
 
-/** Preparation of the image before tracking. */
+/** Preparation of the image before tracking: binning, and in-between slices. */
 export interface Preparation {
   /** Binning factor within slices: blocks of this many pixels along both in-plane axes are averaged. */
   binning: 1 | 2;
@@ -66,41 +66,48 @@ export interface Box {
   max: Vec3;
 }
 
-/** All that a tracker is built from, besides the image. */
+/** Settings that a tracker is built with, besides the image. */
 export interface Setup {
   preparation: Preparation;
-  /** Region of interest; the whole image if undefined. */
+  /** Region of interest, to which tracking is limited; the whole image if undefined. */
   box: Box | undefined;
   /**
-   * Point that selects the tracked surface: the component that encloses it or is nearest to it. If undefined, the
-   * largest.
+   * Point in world coordinates that selects the tracked surface: the component that encloses it or is nearest to it. If
+   * undefined, the largest component.
    */
   at: Vec3 | undefined;
   /** Parameters set by the user; the others have the tracker's defaults, some of which it derives from the image. */
   params: ParamValues;
 }
 
-/** Distances of a surface's vertices from the true surface, in world units. */
+/**
+ * Distances of a tracked surface's vertices from the true surface, which is known for computed images, in world units.
+ */
 export interface SurfaceError {
   mean: number;
   /** 95th percentile of the distances. */
   p95: number;
 }
 
-/** Reply about a newly built tracker, before its first step. */
+/** Data of a newly built or restored tracker: the reply to `rebuild` and `restore`, and part of that to `open`. */
 export interface Ready {
   params: ParamValues;
-  /** The tracker's default for the edge threshold τ, from the noise and the range of intensities. */
+  /**
+   * The tracker's default for the edge threshold τ, in intensity units, from the noise and the range of intensities.
+   */
   suggested: number;
-  /** Estimated standard deviation of the noise, in intensity units. */
+  /** Estimated standard deviation of the image's noise, in intensity units. */
   noise: number;
-  /** The image as prepared, with the voxels of all frames; undefined if unchanged, and in the reply to `restore`. */
+  /**
+   * The image as prepared, with the voxels of all frames; undefined if its preparation is unchanged, and in the reply
+   * to `restore`.
+   */
   volume: VolumeView | undefined;
 }
 
 export interface OpenedImage extends Ready {
   volume: VolumeView;
-  /** Dimensions of the image before its preparation. */
+  /** Dimensions, in voxels, of the image before its preparation. */
   dims: Vec3;
   spacing: Vec3;
   /** The true volume of the cavity in each frame, mm³, if the image is computed. */
@@ -118,9 +125,9 @@ export interface SavedTrack {
 }
 
 /**
- * Boundary votes of a frame: positions of the faces between two voxels in world coordinates, packed xyz, and for each
- * the fraction of windows that separate its two voxels. Includes the faces between a voxel and itself in the next
- * frame.
+ * Boundary votes of a frame, to be drawn: positions of the faces between two voxels in world coordinates, packed xyz,
+ * and for each the fraction of windows that separate its two voxels. Includes the faces between a voxel and the same
+ * voxel in the next frame.
  */
 export interface BoundaryVotes {
   frame: number;
@@ -128,7 +135,10 @@ export interface BoundaryVotes {
   weights: Float32Array;
 }
 
-/** A measured slice, its neighbours, and its interpolations from these; greys as in the volume's view. */
+/**
+ * A measured slice, its two neighbours, and its interpolations from these, as 8-bit greys with the volume view's
+ * contrast.
+ */
 export interface InterpolatedSlice {
   width: number;
   height: number;
@@ -141,14 +151,17 @@ export interface InterpolatedSlice {
   rmsError: { linear: number; flow: number };
 }
 
-/** The change that a comparison makes to the setup: toggles the prediction, or inserts slices by another method. */
+/** The one setting that a comparison run changes: toggles the prediction, or inserts slices by another method. */
 export type Alternative = 'prediction' | Enrichment;
 
-/** Result of a run through all frames, for comparison. */
+/** Result of a comparison run through all frames. */
 export interface ComparedTrack {
   facts: FrameStatistics[];
   closing: number | undefined;
-  /** Errors averaged over all frames, if the true surface is known. */
+  /**
+   * Mean and 95th percentile of the surface's errors, averaged over all frames; undefined if the true surface is not
+   * known.
+   */
   error: SurfaceError | undefined;
   /** Duration of the run in milliseconds, preparation of the image included. */
   duration: number;
@@ -157,28 +170,31 @@ export interface ComparedTrack {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens an image and builds a tracker of it. On failure, the previous image and tracker stay. */
+  /** Opens an image and builds a tracker of it. On failure, the previous image and tracker stay in use. */
   open: { body: { name: string; source: ImageSource; setup: Setup }; reply: OpenedImage };
-  /** Builds a new tracker of the same image. On failure, the previous one stays. */
+  /** Builds a new tracker of the same image. On failure, the previous one stays in use. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
-  /** Changes parameters, which may set the run back; replies with all parameters and the iteration it is at now. */
+  /**
+   * Changes parameters, which may set the run back; replies with all parameters and the iteration that the run is at
+   * then.
+   */
   setParams: { body: ParamValues; reply: { params: ParamValues; iteration: number } };
   votes: { body: { frame: number }; reply: BoundaryVotes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: InterpolatedSlice };
   save: { body: undefined; reply: SavedTrack };
-  /** Restores a saved run of the same image; the state event is sent only in reply to `sendState`. */
+  /** Restores a saved run of the same image, for undo. Sends no state event; the page requests one by `sendState`. */
   restore: { body: SavedTrack; reply: Ready };
-  /** Replies with the image as prepared at present, with all frames. */
+  /** Replies with the prepared image, with the voxels of all frames. */
   view: { body: undefined; reply: VolumeView };
-  /** Makes the worker send a state event, `done` or `paused`. */
+  /** Makes the worker send a state event, `done` or `paused`, to the page. */
   sendState: { body: undefined; reply: undefined };
   export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
   /** Replies with all tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
-  /** Runs the whole tracking with another setup; undefined if cancelled. */
+  /** Tracks all frames with another setup, for comparison; replies with undefined if cancelled. */
   compare: { body: { setup: Setup }; reply: ComparedTrack | undefined };
   cancelCompare: { body: undefined; reply: undefined };
 }
@@ -187,7 +203,7 @@ export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
 export type ToWorker = RequestMessage;
 
-/** The surface of a frame, with its facts and measures. */
+/** The tracked surface of a frame, with its facts and measures. */
 export interface TrackedFrame {
   surface: Surface;
   facts: FrameStatistics;
@@ -195,12 +211,15 @@ export interface TrackedFrame {
   error: SurfaceError | undefined;
 }
 
-/** Sent when a step of preparing the image begins; `what` names the step in words for the status line. */
+/** Event sent when a step of preparing the image begins; `what` names the step in words for the status line. */
 export interface PreparingEvent {
   event: 'preparing';
   what: string;
 }
-/** A step was done; `frame` is the surface of frame `index` if the step completed one. */
+/**
+ * Event sent after each step of the tracker; `frame` is the surface of the frame with number `index`, from 0, if the
+ * step completed one, else both are undefined.
+ */
 export interface StepEvent {
   event: 'step';
   report: StepReport;
@@ -208,7 +227,7 @@ export interface StepEvent {
   frame: TrackedFrame | undefined;
   closing: number | undefined;
 }
-/** Progress of a comparison: its share, 0 to 1, and its phase. */
+/** Event with the progress of a comparison run: the share that is done, 0 to 1, and the present phase in words. */
 export interface ComparisonProgressEvent {
   event: 'comparing';
   part: number;

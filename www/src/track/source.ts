@@ -13,7 +13,7 @@ import type { ImageSource, NamedBytes, Preparation, Setup } from './protocol';
 /** Seconds between frames of a computed image. */
 const CINE_SECONDS = 0.04;
 
-/** Opens a 4D image from files or computes it. */
+/** Opens a 4D image: reads it from files, or computes the phantom. */
 export async function openImage(source: ImageSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
@@ -29,8 +29,8 @@ export async function openImage(source: ImageSource): Promise<Volume> {
 }
 
 /**
- * Groups files by frame, in the order of their names: each header, or file with all in one, together with the data
- * files of its name. A single header takes all data files.
+ * Groups files by frame, in the order of their names: each header, or file that needs none, together with the data
+ * files of the same name. A single header takes all data files.
  */
 export function framesOf(files: NamedBytes[]): NamedBytes[][] {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
@@ -58,7 +58,7 @@ function fromParts(parts: NamedBytes[][]): Volume {
 
 /**
  * Bins an image and inserts slices, as set in `preparation`; returns a new volume, or `image` itself if there is
- * nothing to do. `onStage` receives each step in words.
+ * nothing to do. `onStage` receives each step in words, for the status line.
  */
 export function prepare(image: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
@@ -85,7 +85,7 @@ export function prepare(image: Volume, preparation: Preparation, onStage: (what:
 }
 
 /**
- * Returns the binning factors along the voxel axes, 1 across slices. Slices lie across the axis with the largest
+ * Returns the binning factors along the three voxel axes, 1 across slices. Slices lie across the axis with the largest
  * spacing, or the last of several such axes.
  */
 function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
@@ -93,7 +93,10 @@ function factorsOf({ spacing }: Volume, binning: number): [number, number, numbe
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
 }
 
-/** Builds a tracker; also returns its own default for the edge threshold τ. */
+/**
+ * Builds a tracker of a prepared image; also returns the tracker's default for the edge threshold τ, which the setup
+ * may override.
+ */
 export function buildTracker(
   volume: Volume,
   { box, at, params }: Setup,

@@ -32,8 +32,8 @@ type Handlers = {
 };
 
 /**
- * Parameters that the boundary depends on. After a change of others, only the surfaces are computed again, if the state
- * with the boundary of all frames was saved.
+ * Parameters that the boundary depends on. If only others change, the boundary found in all frames is kept, provided
+ * that its state was saved, and only the surfaces are computed again.
  */
 const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
@@ -41,7 +41,7 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
 }
 
-/** An image as opened, and as prepared. */
+/** A 4D image as opened, and as prepared for tracking. */
 interface LoadedImage {
   name: string;
   original: Volume;
@@ -57,11 +57,11 @@ class Session {
   #suggested = 0;
   #iteration = 0;
   #done = false;
-  /** Number of frames whose surfaces were sent to the page. */
+  /** Number of frames whose surfaces have been sent to the page. */
   #sent = 0;
   /**
-   * State of the tracker saved when the boundary of all frames was found, before the first surface; undefined until
-   * then.
+   * State of the tracker saved when the boundary of all frames was found, before the first surface, to return to after
+   * a change of parameters; undefined until then.
    */
   #boundaryState: { state: Uint8Array; iteration: number } | undefined;
   #run: Task | undefined;
@@ -235,8 +235,8 @@ class Session {
   }
 
   /**
-   * Changes parameters; the results that depend on them are discarded, for all frames, and computed again by later
-   * steps.
+   * Changes parameters of the tracker; results that depend on them are discarded, for all frames, and computed again by
+   * later steps.
    */
   async #setParams(values: ParamValues): Promise<Requests['setParams']['reply']> {
     await this.#pause();

@@ -8,8 +8,8 @@ const PLACE = text('extractPanels.attractorPlace');
 const STRONGEST = 1000;
 
 /**
- * Keys, in the catalogue of texts, for the strength and the radius of an attractor: short label, full label, and name
- * of a change.
+ * Keys, in the catalogue of texts, for the fields of an attractor: visible label, label for screen readers, and name of
+ * a change for undo.
  */
 const FIELDS = {
   strength: {
@@ -26,15 +26,15 @@ const FIELDS = {
 
 export interface AttractorEvents {
   /**
-   * Called with the whole list after a change; `what` names it. With `tuning`, repeated changes in quick succession are
-   * merged into one undo step.
+   * Called with all attractors after a change; `what` names the change, for undo. With `tuning`, repeated changes in
+   * quick succession are merged into one undo step.
    */
   onChange: (attractors: Attractor[], what: string, tuning: boolean) => void;
   /** Called when placing attractors by clicks in the views is switched on or off. */
   onPlacing: (placing: boolean) => void;
-  /** Called to show a position in the slices. */
+  /** Called to move the slices to a position in world coordinates. */
   onGoTo: (point: Vec3) => void;
-  /** Returns the point where the slices intersect. */
+  /** Returns the point in world coordinates where the slices intersect, at which a new attractor may be placed. */
   crosshair: () => Vec3;
 }
 
@@ -77,7 +77,7 @@ export class AttractorControls {
     );
   }
 
-  /** Radius of the next attractor, world units. */
+  /** Radius of the next attractor that is added, world units. */
   set radius(radius: number) {
     this.#radius = Number(radius.toPrecision(2));
   }

@@ -22,7 +22,7 @@ export const CLOUD_COLORS: { value: SurfaceColor; label: string }[] = [
   { value: 'distance', label: text('pointPanels.colorDistance') },
 ];
 
-/** View options of the Reconstruct lab. */
+/** Controls for the view options of the Reconstruct lab: which objects are shown, and the surface's colouring. */
 export class CloudOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<Switch, HTMLInputElement>();
@@ -61,7 +61,7 @@ export class CloudOptionControls {
     return this.#value;
   }
 
-  /** Changes options and reports them; an unknown colouring counts as plain. */
+  /** Changes view options and reports all of them to the lab; an unknown colouring counts as plain. */
   set(changed: Partial<CloudViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!CLOUD_COLORS.some(({ value }) => value === this.#value.color)) this.#value.color = 'plain';
@@ -71,7 +71,7 @@ export class CloudOptionControls {
     this.#onChange({ ...this.#value });
   }
 
-  /** Whether there are cameras to show; if not, the checkbox is hidden and cleared. */
+  /** Whether there are cameras to show; if not, the checkbox that shows them is hidden and cleared. */
   set hasCameras(has: boolean) {
     const box = this.#boxes.get('cameras');
     const label = box?.closest('label');

@@ -5,7 +5,7 @@ const DEFAULT_MAX_POINTS = 20_000;
 
 /**
  * Settings of the Reconstruct lab's model besides its parameters: the largest number of points used, and the number of
- * clusters kept; undefined stands for the default number of points, and for all clusters.
+ * clusters of points kept; undefined stands for the default number of points, and for all clusters.
  */
 export interface CloudChoice {
   maxPoints: number | undefined;
@@ -18,7 +18,7 @@ interface Field {
   error: HTMLElement;
 }
 
-/** Fields for the largest number of points used and the number of clusters kept. */
+/** Fields of the Reconstruct lab for the largest number of points used and the number of clusters of points kept. */
 export class CloudSetup {
   readonly element: HTMLElement;
   readonly #maxPoints: Field;

@@ -13,7 +13,10 @@ export interface CompareEvents {
   onCancel: () => void;
 }
 
-/** Compares the same extraction on the volume itself and coarse to fine, as in the paper's tables 1 and 2. */
+/**
+ * Panel that has the same extraction run twice, directly on the volume and coarse to fine, and compares the two runs,
+ * as in tables 1 and 2 of Lachaud and Montanvert.
+ */
 export class ComparePanel {
   readonly element: HTMLElement;
   readonly #start: HTMLButtonElement;
@@ -46,7 +49,7 @@ export class ComparePanel {
     );
   }
 
-  /** Whether there is a volume to compare on. */
+  /** Whether there is a volume, so that a comparison can be started. */
   set enabled(enabled: boolean) {
     this.#start.disabled = !enabled;
   }
@@ -68,7 +71,7 @@ export class ComparePanel {
     this.#status.textContent = text('controls.comparing');
   }
 
-  /** Shows the progress, without announcing it to screen readers. */
+  /** Shows the progress of a comparison, without announcing it to screen readers. */
   showProgress({ run, report }: ComparisonProgressEvent): void {
     this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
     this.#cancel.textContent = text('extractPanels.compareCancel', {
@@ -139,9 +142,9 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 }
 
 /**
- * Creates the table of durations in seconds, for both runs: rows T (topology), N (normals) and F (forces and motion) as
- * in the paper, the sum of all parts, and the number of iterations; a column per pyramid level and one for the whole
- * run.
+ * Creates the table of durations in seconds, for both runs of a comparison: rows T (topology), N (normals) and F
+ * (forces and motion) as in the paper, the sum of all parts, and the number of iterations; a column per pyramid level
+ * and one for the whole run.
  */
 function timeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);

@@ -3,7 +3,10 @@ import { plural, text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
 
-/** Largest number of uncovered regions listed and marked; the sentence above them counts all. */
+/**
+ * Largest number of uncovered regions listed in the panel and marked in the views; the sentence above the list counts
+ * all.
+ */
 const MOST_PARTS = 20;
 
 const KINDS: Record<UncoveredRegion['kind'], string> = {
@@ -15,16 +18,19 @@ export interface CoverageEvents {
   onStart: () => void;
   onCancel: () => void;
   onSeed: () => void;
-  /** Called to show a position in the slices and to centre the 3D view on it. */
+  /** Called to show a position, in world coordinates, in the slices and to centre the 3D view on it. */
   onGoTo: (point: Vec3) => void;
-  /** Called with the regions to mark in the views. */
+  /** Called with the uncovered regions to mark in the views. */
   onMark: (parts: readonly UncoveredRegion[]) => void;
 }
 
-/** Panel that measures which part of the iso-surface the surface covers, and lists the regions it does not cover. */
+/**
+ * Panel that shows which share of the volume's iso-surface the extracted surface covers, and lists the regions it does
+ * not cover.
+ */
 export class CoveragePanel {
   readonly element: HTMLElement;
-  /** Unit of length in the volume's world space. */
+  /** Unit of length in the volume's world space, for areas; empty if unknown. */
   unit = '';
   readonly #events: CoverageEvents;
   readonly #start: HTMLButtonElement;
@@ -40,7 +46,7 @@ export class CoveragePanel {
   readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
   readonly #list = h('ol', { class: 'uncovered', 'aria-label': text('extractPanels.uncoveredList') });
 
-  /** `guide` is the address of the explanation in the documentation. */
+  /** `guide` is the address of the documentation that explains coverage. */
   constructor(guide: string, events: CoverageEvents) {
     this.#events = events;
     this.#start = h(
@@ -71,13 +77,13 @@ export class CoveragePanel {
     );
   }
 
-  /** Whether there is a surface to measure. */
+  /** Whether there is a surface whose coverage can be measured. */
   set enabled(enabled: boolean) {
     this.#start.disabled = !enabled;
     this.#seed.disabled = !enabled;
   }
 
-  /** Removes the results of the last measurement. */
+  /** Removes the results of the last coverage measurement. */
   clear(): void {
     this.#show(undefined);
     this.#end('');
@@ -98,7 +104,7 @@ export class CoveragePanel {
     this.#progress.value = share;
   }
 
-  /** Shows a message beside the buttons, and keeps the results. */
+  /** Shows a message beside the buttons and ends a measurement; results shown before are kept. */
   say(message: string): void {
     this.#end(message);
   }
@@ -159,7 +165,7 @@ export class CoveragePanel {
   }
 }
 
-/** Formats a fraction in percent, rounded down to a tenth, so that 100 % means complete coverage. */
+/** Formats a coverage, 0 to 1, in percent, rounded down to a tenth, so that 100 % means complete coverage. */
 function percent(share: number): string {
   return text('controls.percent', { value: (Math.floor(share * 1000) / 10).toFixed(1) });
 }

@@ -2,7 +2,7 @@ type Listeners = { [K in keyof HTMLElementEventMap as `on${K}`]?: (event: HTMLEl
 type Attributes = Listeners & { [name: string]: unknown };
 
 /**
- * Creates an element with attributes, listeners (`on…`) and children. Attributes that are false or undefined are
+ * Creates an HTML element with attributes, listeners (`on…`) and children. Attributes that are false or undefined are
  * omitted.
  */
 export function h<K extends keyof HTMLElementTagNameMap>(
@@ -23,8 +23,9 @@ function setAttribute(element: HTMLElement, name: string, value: unknown): void 
 }
 
 /**
- * Returns a 2D context that draws on the CPU, for small images. With an accelerated context, after a few images, the
- * browser would wait until the GPU has completed all rendering of the 3D view: up to half a second without a GPU.
+ * Returns a canvas's 2D context that draws on the CPU, for small images. With an accelerated context, after a few
+ * images, the browser would wait until the GPU has completed all rendering of the 3D view: up to half a second without
+ * a GPU.
  */
 export function context2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
   return canvas.getContext('2d', { willReadFrequently: true });
@@ -36,15 +37,15 @@ export function section(title: string, ...children: (Node | string)[]): HTMLElem
 }
 
 /**
- * Creates an element for a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the part
- * after an underscore.
+ * Creates an element that shows a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the
+ * part after an underscore.
  */
 export function symbol(text: string): HTMLElement {
   const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? /^(\w)_(\w+)$/.exec(text) ?? [];
   return h('span', { class: 'symbol' }, base, ...(index ? [h('sub', {}, index)] : []));
 }
 
-/** Creates an icon from a path on a 24 by 24 grid; decorative only, hidden from screen readers. */
+/** Creates an icon from an SVG path on a 24 by 24 grid; decorative only, hidden from screen readers. */
 export function icon(path: string): SVGSVGElement {
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');
@@ -61,18 +62,21 @@ export function token(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Calls back when the user's preference for a light or dark scheme changes. */
+/**
+ * Calls `callback` whenever the user's preference for a light or dark scheme changes, to redraw what does not follow
+ * the style sheet.
+ */
 export function onSchemeChange(callback: () => void): void {
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', callback);
 }
 
-/** Whether the user prefers reduced motion. */
+/** Returns whether the user prefers reduced motion, as set in the system or browser. */
 export function prefersReducedMotion(): boolean {
   return matchMedia('(prefers-reduced-motion: reduce)').matches;
 }
 
 let ids = 0;
-/** Returns an element id that is unique on the page. */
+/** Returns an element id that is unique on the page and begins with `prefix`. */
 export function uniqueId(prefix: string): string {
   return `${prefix}-${++ids}`;
 }

@@ -4,14 +4,14 @@ import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
- * Multiple of the noise's standard deviation; an edge threshold τ below it lets noise alone be detected as boundary,
- * and a warning is shown.
+ * Multiple of the noise's standard deviation; a warning is shown for an edge threshold τ below it, at which noise alone
+ * is detected as boundary.
  */
 const NOISE_FACTOR = 2.5;
 
 /**
- * Control for the edge threshold τ, with the estimated noise level, a suggested value, and a warning if the threshold
- * is below {@link NOISE_FACTOR} times the noise.
+ * Control of the Track lab for the edge threshold τ, with the estimated noise level, a suggested value, and a warning
+ * if the threshold is below {@link NOISE_FACTOR} times the noise.
  */
 export class EdgeThreshold {
   readonly element: HTMLElement;
@@ -24,8 +24,8 @@ export class EdgeThreshold {
   #suggested = 0;
 
   /**
-   * `onTry` is called with the value while the slider is dragged, and with undefined when it is released; `onChange`
-   * with each value that is to take effect: released, entered or suggested.
+   * `onTry` is called with the threshold while the slider is dragged, and with undefined when it is released;
+   * `onChange` with each threshold that is to take effect: released, entered or suggested.
    */
   constructor(
     { label, symbol: letter, help }: ParamSpec,
@@ -79,8 +79,8 @@ export class EdgeThreshold {
 
   /**
    * Shows the threshold, the noise's standard deviation and the suggested threshold, all in intensity units. `largest`:
-   * the largest possible difference of intensities; the slider ends at half of it, or at the threshold if that is
-   * larger.
+   * the largest possible difference of intensities, in the same units; the slider ends at half of it, or at the
+   * threshold if that is larger.
    */
   show(threshold: number, noise: number, suggested: number, largest: number): void {
     this.#suggested = suggested;

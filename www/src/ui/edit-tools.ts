@@ -1,7 +1,10 @@
 import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
 
-/** Effect of a click in the view on the points. */
+/**
+ * Effect of a click in the Reconstruct lab's 3D view: none, or a point is added, removed, or added as an exterior
+ * constraint.
+ */
 export type EditTool = 'none' | 'add' | 'remove' | 'outside';
 
 const TOOLS: { tool: EditTool; label: string; help: string }[] = [
@@ -24,12 +27,14 @@ const TOOLS: { tool: EditTool; label: string; help: string }[] = [
 ];
 
 /**
- * Default distance of a new point from the surface, and default radius of removal, in percent of the size of the point
- * set.
+ * Default of the distance of a new point from the surface and of the radius of removal, in percent of the diagonal of
+ * the box that contains most points.
  */
 const DISTANCE = 5;
 
-/** Tools that edit the points by clicking in the 3D view. */
+/**
+ * Controls of the Reconstruct lab to select what a click in the 3D view does to the points, and to discard all edits.
+ */
 export class EditTools {
   readonly element: HTMLElement;
   readonly #help = h('p', { class: 'help' });
@@ -93,14 +98,14 @@ export class EditTools {
   }
 
   /**
-   * Distance of a new point from the surface, or radius of removal, as a fraction of the size of the point set; the
-   * default if the input is invalid.
+   * Distance of a new point from the surface, or radius of removal, as a fraction of the diagonal of the box that
+   * contains most points; the default if the input is invalid.
    */
   get distance(): number {
     return (this.#distance.checkValidity() ? this.#distance.valueAsNumber : DISTANCE) / 100;
   }
 
-  /** Deselects the tool: clicks have no effect. */
+  /** Deselects the tool, so that clicks in the 3D view do not edit the points. */
   deselect(): void {
     const [first] = this.#radios;
     if (first) first.checked = true;

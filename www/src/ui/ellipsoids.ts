@@ -34,13 +34,13 @@ const DIRECTIONS: Vec3[] = [
 export interface EllipsoidEvents {
   onChoose: (index: number | undefined) => void;
   onMode: (mode: HandleMode) => void;
-  /** Called with the changed ellipsoid; `what` names the change. */
+  /** Called with the selected ellipsoid after a change; `what` names the change, for undo. */
   onChange: (ellipsoid: ControlEllipsoid, what: string) => void;
   onAdd: () => void;
   onRemove: () => void;
 }
 
-/** List of the control ellipsoids, and fields for the selected one. */
+/** Controls of the Sculpt lab: a list of the control ellipsoids, and fields for the selected one. */
 export class EllipsoidControls {
   readonly element: HTMLElement;
   readonly #events: EllipsoidEvents;
@@ -127,8 +127,8 @@ export class EllipsoidControls {
   }
 
   /**
-   * Focuses the button of the selected ellipsoid, or of the first if none is selected: the focused one may have been
-   * removed.
+   * Focuses the button of the selected ellipsoid, or of the first if none is selected; called when the focused button
+   * may have been removed.
    */
   focus(): void {
     const button = this.#list.children[this.#chosen ?? 0];
@@ -136,8 +136,7 @@ export class EllipsoidControls {
   }
 
   /**
-   * Shows a button for each ellipsoid; while the names are unchanged, the existing buttons are kept, so that the focus
-   * stays.
+   * Shows a button for each ellipsoid; while the names are unchanged, the existing buttons stay, and so does the focus.
    */
   #showNames(names: string[]): void {
     if (names.length === this.#names.length && names.every((name, k) => name === this.#names[k])) return;
@@ -267,7 +266,7 @@ export class EllipsoidControls {
   }
 }
 
-/** Formats a number with four significant digits; dragging is no more precise. */
+/** Formats a coordinate or length with four significant digits; dragging is no more precise. */
 function short(value: number): string {
   return String(Number(value.toPrecision(4)));
 }

@@ -3,14 +3,14 @@ import { h } from './dom';
 
 export interface Exercise {
   title: string;
-  /** Id of the example or figure that the exercise starts from. */
+  /** Id of the example or preset that the exercise starts from. */
   example: string;
   steps: string[];
   look: string;
   handIn: string;
 }
 
-/** Exercises of the Extract lab. */
+/** Exercises for a course with the Extract lab. */
 export const EXTRACT_EXERCISES: Exercise[] = [
   {
     title: text('exercises.rigidityTitle'),
@@ -28,7 +28,7 @@ export const EXTRACT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Exercises of the Reconstruct lab. */
+/** Exercises for a course with the Reconstruct lab. */
 export const RECONSTRUCT_EXERCISES: Exercise[] = [
   {
     title: text('exercises.smoothingTitle'),
@@ -44,7 +44,7 @@ export const RECONSTRUCT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Exercises of the Sculpt lab. */
+/** Exercises for a course with the Sculpt lab. */
 export const SCULPT_EXERCISES: Exercise[] = [
   {
     title: text('exercises.deformationTitle'),
@@ -60,7 +60,7 @@ export const SCULPT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Exercises of the Track lab. */
+/** Exercises for a course with the Track lab. */
 export const TRACK_EXERCISES: Exercise[] = [
   {
     title: text('exercises.ejectionTitle'),
@@ -76,7 +76,7 @@ export const TRACK_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Creates the list of exercises for a lab course, each with a button that opens its example. */
+/** Creates the list of exercises shown on a lab's page, each with a button that opens its example. */
 export function exercises(list: Exercise[], onOpen: (example: string) => void): HTMLElement {
   return h('div', { class: 'exercises' }, ...list.map((exercise) => exerciseOf(exercise, onOpen)));
 }

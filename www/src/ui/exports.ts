@@ -15,7 +15,7 @@ const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   { format: 'mz3', help: text('controls.exportMz3'), type: 'application/octet-stream' },
 ];
 
-/** Buttons that save the current surface in each file format. */
+/** Buttons that save the current surface, one for each mesh file format. */
 export class ExportButtons {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[];

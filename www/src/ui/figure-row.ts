@@ -16,8 +16,8 @@ import type { ContentBelow } from '../view/track';
 import { h, uniqueId } from './dom';
 
 /**
- * Default settings of Canny's detector for greys of 0 to 255; for its image, the paper used a deviation of 1.5, and
- * thresholds of 10 and 20.
+ * Default settings of Canny's edge detector for greys of 0 to 255; for its image, the paper used a deviation of 1.5,
+ * and thresholds of 10 and 20.
  */
 const CANNY: CannySettings = { deviation: 1, low: 6, high: 14 };
 const CANNY_FIELDS = [
@@ -26,25 +26,31 @@ const CANNY_FIELDS = [
   { name: 'high', label: text('trackPanels.cannyHigh'), min: 0 },
 ] as const;
 
-/** Data for the paper's figures in the Track lab; undefined while it is not available. */
+/**
+ * Data from which the Track lab draws images like the paper's figures; votes and interpolated slices are undefined
+ * until the worker has sent them.
+ */
 export interface FigureData {
   subject: Subject;
-  /** Half width k of the window, in voxels. */
+  /** Half width k of the clustering windows, in voxels. */
   window: number;
   /** Edge threshold τ, in intensity units. */
   threshold: number;
   votes: BoundaryVotes | undefined;
   between: InterpolatedSlice | undefined;
-  /** The index of the slice that `between` replaces, from 0, and the number of slices of the image as measured. */
+  /**
+   * The index, from 0, of the measured slice that is interpolated in `between`, and the number of slices of the image
+   * before its preparation.
+   */
   pair: [number, number];
   /**
-   * Returns for each frame the surface's outline in the slice at the crosshair, undefined without a surface; called
-   * only while the figure over time is shown.
+   * Returns for each tracked frame the surface's outline in the slice at the crosshair, as segments in pixels; called
+   * only while the image over time is shown.
    */
   outlines: () => readonly (Float32Array | undefined)[];
 }
 
-/** One of the paper's rows of figures, shown in place of the slices. */
+/** Row of images like one of the paper's figures, shown below the Track lab's 3D view in place of the slices. */
 export class FigureRow {
   readonly element: HTMLElement;
   readonly #rows: Record<Exclude<ContentBelow, 'slices'>, HTMLElement>;
@@ -63,7 +69,10 @@ export class FigureRow {
   #below: ContentBelow = 'slices';
   #data: FigureData | undefined;
 
-  /** `onVoxel` and `onFrame` are called with the voxel or frame that was clicked. */
+  /**
+   * `onVoxel` is called with the voxel that was clicked in the image of the clustered window, `onFrame` with the frame
+   * that was clicked in the image over time.
+   */
   constructor(onVoxel: (voxel: Vec3) => void, onFrame: (frame: number) => void) {
     this.#rows = {
       boundary: h(

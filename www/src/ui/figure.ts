@@ -3,15 +3,14 @@ import { h } from './dom';
 
 /** One of the images of a paper's figure, with its own settings. */
 interface FigureVariant {
-  /** Label of the image's button. */
   name: string;
-  /** Describes the result of the lab for comparison with the paper. */
+  /** Describes the lab's result, for comparison with the paper's. */
   ourResult: string;
 }
 
-/** A figure of a paper. */
+/** The part of a lab's preset that the panel shows: a figure of the paper whose method the lab runs. */
 interface PaperFigure<One extends FigureVariant> {
-  /** Describes the result in the paper. */
+  /** Describes the paper's result. */
   paperResult: string;
   variants: [One, ...One[]];
   /** Hint at further details to observe. */
@@ -19,8 +18,8 @@ interface PaperFigure<One extends FigureVariant> {
 }
 
 /**
- * Panel that describes the paper's figure that is open: the paper's result, the lab's result, and a button for each
- * image of the figure.
+ * Panel that describes the figure of a paper that is open as a preset: the paper's result, the lab's result, and a
+ * button for each image of the figure.
  */
 export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
@@ -34,8 +33,8 @@ export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigu
   }
 
   /**
-   * Shows a figure and marks the variant in force; without one, the text says that the settings were changed. Without a
-   * figure, the panel is hidden.
+   * Shows a figure and marks the button of the variant that the present settings match; without a variant, the text
+   * says that the settings were changed. Without a figure, the panel is hidden.
    */
   show(preset: Preset | undefined, variant?: Variant): void {
     this.element.hidden = preset === undefined;

@@ -4,7 +4,7 @@ import { h, uniqueId } from './dom';
 
 const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
 
-/** Creates a file chooser for one file, or several that belong together. */
+/** Creates a button that chooses one file, or several that belong together; by default files of volumes. */
 export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): HTMLElement {
   const id = uniqueId('file');
   const input = h('input', { type: 'file', id, multiple: true, accept, class: 'visually-hidden' });
@@ -17,7 +17,10 @@ export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): 
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, text('controls.openFile')));
 }
 
-/** Accepts files dropped anywhere on the page, until `signal` is aborted, and shows an overlay during the drag. */
+/**
+ * Accepts files dropped anywhere on the page, until `signal` is aborted, and shows `overlay` while files are dragged
+ * over the page.
+ */
 export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void, signal: AbortSignal): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   window.addEventListener(
@@ -48,7 +51,7 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
   );
 }
 
-/** Returns a name for one or several files that belong together, for display. */
+/** Returns a name for one or several files that were opened together, for display. */
 export function nameOf(files: File[]): string {
   const [first, second] = files.map(({ name }) => name);
   if (files.length === 2) return text('controls.twoFiles', { first: first ?? '', second: second ?? '' });

@@ -2,19 +2,19 @@ import { type Film, lastFrame } from '../sculpt/film';
 import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
 
-/** Default number of frames from one keyframe to the next. */
+/** Default number of frames from one keyframe of a film to the next. */
 export const FRAMES_BETWEEN = 24;
-/** Largest number of frames from one keyframe to the next. */
+/** Largest number of frames from one keyframe of a film to the next. */
 const MOST_BETWEEN = 600;
 
 export interface FilmEvents {
-  /** Called to add the current pose as a keyframe. */
+  /** Called to add the current pose of the ellipsoids as a keyframe. */
   onAddKey: () => void;
-  /** Called to remove the keyframe with this index. */
+  /** Called to remove the keyframe with this index, from 0. */
   onRemoveKey: (index: number) => void;
   onBetween: (frames: number) => void;
   onLoop: (loop: boolean) => void;
-  /** Called to seek to a frame without playing. */
+  /** Called to go to a frame of the film without playing it. */
   onSeek: (frame: number) => void;
   onRecord: () => void;
   onCancelRecord: () => void;
@@ -107,7 +107,7 @@ export class FilmControls {
     this.#showKeys(film);
   }
 
-  /** Shows the progress of a recording, 0 to 1; undefined if there is none. */
+  /** Shows the progress of a recording of the film, 0 to 1; undefined if none is in progress. */
   showRecording(part: number | undefined): void {
     const recording = part !== undefined;
     this.#progress.hidden = !recording;

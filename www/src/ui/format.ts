@@ -19,7 +19,7 @@ export function milliseconds(value: number): string {
     : text('controls.seconds', { value: (value / 1000).toFixed(2) });
 }
 
-/** Returns the paper's symbol of the image on a pyramid level: I₀ is the volume itself. */
+/** Returns Lachaud and Montanvert's symbol for the image on a level of the pyramid: I₀ is the volume itself. */
 export function levelSymbol(level: number): string {
   return `I${[...String(level)].map((digit) => '₀₁₂₃₄₅₆₇₈₉'[Number(digit)]).join('')}`;
 }

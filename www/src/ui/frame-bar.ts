@@ -18,7 +18,10 @@ export class FrameBar {
   readonly #text = h('span');
   readonly #buttons: HTMLButtonElement[];
   readonly #slider: HTMLInputElement;
-  /** Number of the frame shown; not announced, because the slider announces its value already. */
+  /**
+   * Shows the number of the current frame; not announced by screen readers, because the slider announces its value
+   * already.
+   */
   readonly #at = h('output', { 'aria-live': 'off', 'data-frames': '' });
   #frame = 0;
   #count = 1;
@@ -26,7 +29,7 @@ export class FrameBar {
   #pending = 0;
   #since = 0;
 
-  /** `onFrame` is called when another frame is to be shown. */
+  /** `onFrame` is called with the frame to show, when the user or playback selects another one. */
   constructor(onFrame: (frame: number) => void) {
     this.#onFrame = onFrame;
     const id = uniqueId('frame');
@@ -61,8 +64,7 @@ export class FrameBar {
   }
 
   /**
-   * Shows the index of the current frame and the number of frames; `done` is the number of frames that have a surface
-   * and can be played.
+   * Shows the current `frame`, an index from 0, of `frames`; the first `done` frames have a surface and can be played.
    */
   show(frame: number, frames: number, done: number): void {
     this.#frame = Math.min(frame, frames - 1);

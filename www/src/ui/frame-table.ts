@@ -4,7 +4,6 @@ import type { FrameStatistics, SurfaceError } from '../track/protocol';
 import { h } from './dom';
 import { count, figure } from './format';
 
-/** A column of the table of frames. */
 interface Column {
   head: string;
   help: string;

@@ -4,8 +4,8 @@ import { context2d, h, onSchemeChange, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
- * Histogram of the intensities, with counts on a logarithmic scale, and the iso value as a line. The line is the thumb
- * of a range input over the image, so it can be dragged and moved by arrow keys.
+ * Histogram of the volume's intensities, with counts on a logarithmic scale, and the iso value as a line. The line is
+ * the thumb of a range input over the image, so it can be dragged and moved by arrow keys.
  */
 export class Histogram {
   readonly element: HTMLElement;
@@ -119,10 +119,7 @@ function describeHistogram(
   });
 }
 
-/**
- * Returns the step of the slider for the iso value: 1 for integer ends at least 50 apart, else a thousandth of the
- * range.
- */
+/** Returns the step of the iso value's slider: 1 for integer ends at least 50 apart, else a thousandth of the range. */
 function stepOf(low: number, high: number): number {
   const span = high - low;
   return Number.isInteger(low) && Number.isInteger(high) && span >= 50 ? 1 : span / 1000;

@@ -14,17 +14,17 @@ export interface Change {
 /** A position in the history of a run, to return to by undo. */
 export interface HistoryMark {
   reports: readonly StepReport[];
-  /** Iteration of the last report included. */
+  /** Iteration of the last report that belongs to the marked part of the history. */
   iteration: number;
 }
 
-/** Record of a run: all reports, phase changes and topology changes. */
+/** Record of a run, for plots, logs and undo: all step reports, phase changes and topology changes. */
 export class History {
   #reports: StepReport[] = [];
-  /** First iteration of each phase ('level 2', 'level 1' ...). */
+  /** First iteration of each phase; phases are named as in the reports ('level 2', 'level 1' ...). */
   readonly phases: { iteration: number; phase: string }[] = [];
   readonly changes: Change[] = [];
-  /** Accumulated milliseconds of all steps, by phase and part. */
+  /** Accumulated milliseconds of all steps, by phase and by part of a step. */
   readonly times = new Map<string, Map<string, number>>();
 
   get reports(): readonly StepReport[] {
@@ -35,13 +35,19 @@ export class History {
     this.rewind({ reports: [], iteration: 0 });
   }
 
-  /** Returns a function that creates a mark in the current run, for an iteration that becomes known only later. */
+  /**
+   * Returns a function that creates a mark in the current run, to return to by undo, for an iteration that becomes
+   * known only later.
+   */
   marker(): (iteration: number) => HistoryMark {
     const reports = this.#reports;
     return (iteration) => ({ reports, iteration });
   }
 
-  /** Restores the state at a mark. Builds a new list of reports, since later marks still refer to the old one. */
+  /**
+   * Restores the history as it was at a mark, for undo. Builds a new list of reports, since later marks still refer to
+   * the old one.
+   */
   rewind({ reports, iteration }: HistoryMark): void {
     this.#reports = [];
     this.phases.length = 0;
@@ -50,7 +56,7 @@ export class History {
     this.add(reports.filter((report) => report.iteration <= iteration));
   }
 
-  /** Appends reports, oldest first; returns whether there were any. */
+  /** Appends reports of steps, oldest first; returns whether the list contains any. */
   add(reports: readonly StepReport[]): boolean {
     for (const report of reports) this.#addOne(report);
     return reports.length > 0;
@@ -70,7 +76,7 @@ export class History {
   }
 }
 
-/** Describes the progress of a run for the status line. */
+/** Describes the progress of a run in words for the status line. */
 export function underWay({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return text('measures.running');

@@ -6,11 +6,14 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 132;
-/** Number of sampled distances r, from 0 to 2, the side of the model's box. */
+/** Number of distances r at which the kernel is sampled, from 0 to 2, the side of the normalised box. */
 const SAMPLES = 201;
 const FARTHEST = 2;
 
-/** Plots the current kernel φ(r), divided by its largest magnitude, because only its shape matters. */
+/**
+ * Plots the Reconstruct lab's current radial basis function φ(r), divided by its largest magnitude, because only its
+ * shape matters.
+ */
 export class KernelPlot {
   readonly element: HTMLElement;
   readonly #plot: uPlot;

@@ -4,12 +4,14 @@ import { figure } from './format';
 
 const STEPS = 64;
 
-/** Title of a colour scale, and labels of its lower and upper end. */
+/** Texts of a colour legend: title of the scale, and labels of its lower and upper end. */
 export interface LegendText {
   title: string;
   below: string;
   above: string;
-  /** Whether the scale starts at 0 and uses only the upper half of the colours. */
+  /**
+   * Whether the scale starts at 0, instead of being symmetric about it, and uses only the upper half of the colours.
+   */
   positive?: boolean;
 }
 
@@ -29,7 +31,7 @@ export class Legend {
     h('span', { class: 'ends' }, ...this.#words),
   );
 
-  /** `color` maps −1 to 1 to sRGB, 0..255. */
+  /** `color` maps a position on the symmetric scale, −1 to 1, to sRGB, 0..255. */
   constructor(color: (t: number) => [number, number, number]) {
     this.#color = color;
   }

@@ -3,10 +3,10 @@ import { h } from './dom';
 import { count } from './format';
 import type { Change, History } from './history';
 
-/** Largest number of entries listed; the totals above the list count all topology changes. */
+/** Largest number of entries of the event log; the totals above the list count all topology changes. */
 const MOST_ENTRIES = 300;
 
-/** Log of events, newest first: level changes, joins, cuts, components that vanished or were seeded. */
+/** Log of the events of a run, newest first: level changes, joins, cuts, components that vanished or were seeded. */
 export class EventLog {
   readonly element: HTMLElement;
   readonly #summary = h('p', { class: 'help' });
@@ -26,7 +26,7 @@ export class EventLog {
     this.#summary.textContent = text('measures.noEvents');
   }
 
-  /** Adds the new entries of the history at the top. */
+  /** Adds entries for the events that the history has gained since the last call, at the top. */
   update(history: History): void {
     const fresh = [
       ...history.phases
@@ -64,7 +64,7 @@ export function describe({ axial, annular, vanished, seeds }: Change): string {
   return parts.join(', ');
 }
 
-/** Describes the totals of all topology changes. */
+/** Describes in words the totals of all topology changes of a run. */
 export function totals(changes: Change[]): string {
   const sum = (of: (change: Change) => number) => changes.reduce((total, change) => total + of(change), 0);
   const values = {

@@ -5,8 +5,8 @@ import { h } from './dom';
 import { count, figure } from './format';
 
 /**
- * Measures of every surface, also available to other programs as JSON in the element's `data-measures`. `crossings` is
- * the number of crossing pairs of triangles.
+ * Measures shown for every surface, also available to other programs as JSON in the element's `data-measures`.
+ * `crossings` is the number of crossing pairs of triangles.
  */
 export interface MeasureValues {
   vertices: number;
@@ -47,7 +47,7 @@ const ROWS: { name: Name; label: string; help: string }[] = [
   },
 ];
 
-/** A measure that only one lab has. */
+/** A measure that only one lab has, with the texts of its row in the table. */
 export interface ExtraMeasure {
   name: string;
   label: string;
@@ -90,7 +90,7 @@ export class MeasurePanel {
     this.#publish();
   }
 
-  /** Resets all values to unknown. */
+  /** Resets all measures to unknown, shown as dashes. */
   clear(): void {
     this.#show({});
     this.showExtra({});
@@ -100,14 +100,14 @@ export class MeasurePanel {
     this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#extraValues });
   }
 
-  /** Unit of length, for volume and area. */
+  /** Unit of length, by which volume and area are formatted. */
   set unit(unit: Unit) {
     this.#unit = unit;
     this.#show(this.#values);
   }
 
   /**
-   * Shows the values that every step reports; area and volume stay as last measured. Results of checks are reset,
+   * Shows the values that every step reports; area and volume stay as last measured. Results of mesh checks are reset,
    * because they do not hold once the surface has moved.
    */
   showReport({ vertices, triangles, components, euler }: StepReport): void {

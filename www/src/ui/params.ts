@@ -8,14 +8,14 @@ import { figure } from './format';
  * no step.
  */
 const LOG_STEPS = 200;
-/** Upper bound from which a range counts as unbounded and has no slider. */
+/** Upper bound of a parameter's range from which it counts as unbounded, so that there is no slider. */
 const ENDLESS = 1e9;
 /**
- * If a real number's range begins at 0 and its default is below this fraction of the upper bound, the slider is scaled
- * by a power law with the exponent {@link SMALL_POWER}, so that most of it is for small values.
+ * Fraction of a range's upper bound: if a real parameter's range begins at 0 and its default is below this fraction,
+ * the slider is scaled by a power law with the exponent {@link SMALL_POWER}, so that most of it is for small values.
  */
 const SMALL_SHARE = 0.01;
-/** Exponent of the power law that scales a slider for small values. */
+/** Exponent of the power law that scales the slider of a parameter whose usual values are small. */
 const SMALL_POWER = 4;
 /** Value of the extra option in the list of a parameter that accepts a number as well as its named choices. */
 const NUMBER = 'number';
@@ -32,7 +32,7 @@ export class ParamControls {
   readonly #controls = new Map<string, Control>();
   readonly #specs: ParamSpec[];
 
-  /** `skip` are parameters that have controls elsewhere. */
+  /** `skip` are the names of parameters that have controls elsewhere on the page. */
   constructor(specs: ParamSpec[], skip: string[], onChange: (name: string, value: unknown) => void) {
     this.#specs = specs;
     for (const spec of specs) {
@@ -45,12 +45,14 @@ export class ParamControls {
     this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map((control) => control.element));
   }
 
-  /** Returns a parameter's label on the page, in lower case. */
+  /**
+   * Returns a parameter's label on the page, in lower case, for use in messages; undefined for an unknown parameter.
+   */
   labelOf(name: string): string | undefined {
     return this.#specs.find((spec) => spec.name === name)?.label.toLowerCase();
   }
 
-  /** Shows the current values and clears error messages. */
+  /** Shows the current values of the parameters and clears error messages. */
   show(values: ParamValues): void {
     for (const [name, control] of this.#controls) {
       if (name in values) control.show(values[name]);
@@ -58,7 +60,7 @@ export class ParamControls {
     }
   }
 
-  /** Hides or shows controls by name; used to hide parameters that currently have no effect. */
+  /** Hides or shows controls by parameter name; used to hide parameters that currently have no effect. */
   hide(names: Record<string, boolean>): void {
     for (const [name, hidden] of Object.entries(names)) {
       const control = this.#controls.get(name);
@@ -66,7 +68,7 @@ export class ParamControls {
     }
   }
 
-  /** Shows beside a control why its value was rejected. */
+  /** Shows, beside the control of the parameter `name`, why its value was rejected. */
   showError(name: string, message: string): void {
     this.#controls.get(name)?.showError(message);
   }
@@ -134,7 +136,10 @@ function choice(spec: ParamSpec, id: string, onChange: (value: unknown) => void)
   return spec.min === undefined ? { main, extra: [], show } : withNumber({ main, extra: [], show }, spec, onChange);
 }
 
-/** Adds a numeric option to a list of choices, with a number field that is shown while it is selected. */
+/**
+ * Adds a numeric option to a list of choices, for a parameter that accepts a number, too, with a number field that is
+ * shown while this option is selected.
+ */
 function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: unknown) => void): Input {
   const { label, min, max, unit } = spec;
   const name = [label, unit].filter(Boolean).join(', ');
@@ -155,7 +160,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
   return { main, extra: [row], show: showEither };
 }
 
-/** Creates a number field, with a slider beside it if the range is bounded. */
+/** Creates a number field for a parameter, with a slider beside it if the parameter's range is bounded. */
 function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
   const { min, max } = spec;
   const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
@@ -180,8 +185,8 @@ function typed(value: number): string {
 }
 
 /**
- * A slider with a linear or logarithmic scale, or one that favours small values. The number field beside it carries the
- * label.
+ * A parameter's slider with a linear or logarithmic scale, or one that favours small values. The number field beside it
+ * carries the label.
  */
 class Slider {
   readonly element: HTMLInputElement;

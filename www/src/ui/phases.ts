@@ -4,7 +4,7 @@ import { h } from './dom';
 import { milliseconds } from './format';
 import type { History } from './history';
 
-/** The stages of the implicit surface method, in order. */
+/** The phases of the implicit surface method, in order, by their names in step reports. */
 const PHASES = [
   { name: 'subsample', text: text('pointPanels.phaseSubsample') },
   { name: 'constraints', text: text('pointPanels.phaseConstraints') },
@@ -13,12 +13,12 @@ const PHASES = [
   { name: 'colour', text: text('pointPanels.phaseColour') },
 ] as const;
 
-/** Returns the name of a stage for messages. */
+/** Returns the name of a phase of the implicit surface method for messages; an unknown phase is returned as it is. */
 export function phaseName(phase: string): string {
   return PHASES.find(({ name }) => name === phase)?.text ?? phase;
 }
 
-/** List of the stages, each with its progress and duration. */
+/** List of the phases of the implicit surface method, each with its progress and duration. */
 export class PhaseList {
   readonly element = h('ol', { class: 'phases' });
   readonly #rows: { item: HTMLElement; bar: HTMLProgressElement; time: HTMLElement }[];
@@ -33,7 +33,7 @@ export class PhaseList {
     this.element.append(...this.#rows.map(({ item }) => item));
   }
 
-  /** Updates the list after new reports. `going`: whether the run is in progress. */
+  /** Updates the list of phases after new step reports. `going`: whether the run is in progress. */
   update(history: History, going: boolean): void {
     const last = history.reports.at(-1);
     const at = last ? PHASES.findIndex(({ name }) => name === last.phase) : -1;
@@ -53,7 +53,8 @@ export class PhaseList {
 }
 
 /**
- * Shows progress, 0 to 1; unknown progress (NaN) is animated while the run is in progress, and else shown as one half.
+ * Shows progress of a phase, 0 to 1; unknown progress (NaN) is animated while the run is in progress, and else shown as
+ * one half.
  */
 function showBar(bar: HTMLProgressElement, part: number, going: boolean): void {
   if (Number.isFinite(part)) bar.value = part;
@@ -61,7 +62,10 @@ function showBar(bar: HTMLProgressElement, part: number, going: boolean): void {
   else bar.value = 0.5;
 }
 
-/** Returns the progress of the whole run, 0 to 1, with each stage weighted by its usual fraction of the time. */
+/**
+ * Returns the progress of a whole run of the implicit surface method, 0 to 1, with each phase weighted by its usual
+ * fraction of the time.
+ */
 export function overallProgress({ phase, progress, done }: StepReport): number {
   if (done) return 1;
   const shares = [0.05, 0.1, 0.45, 0.35, 0.05];

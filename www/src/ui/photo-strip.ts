@@ -4,10 +4,13 @@ import { context2d, h } from './dom';
 
 const THUMBNAIL = 72;
 
-/** Photographs as thumbnails to choose from; the selected one is shown large beside the view from the same camera. */
+/**
+ * Photographs of the Reconstruct lab as thumbnails to choose from; the selected one is shown large beside the view from
+ * the same camera.
+ */
 export class PhotoStrip {
   readonly element = h('div', { class: 'photos', hidden: true });
-  /** The selected photograph, placed beside the view. */
+  /** Element with the selected photograph, which the page places beside the 3D view. */
   readonly large: HTMLElement;
   readonly #canvas = h('canvas', { role: 'img' });
   readonly #caption = h('figcaption');
@@ -55,7 +58,9 @@ export class PhotoStrip {
     return this.#chosen;
   }
 
-  /** Shows a photograph beside the view, or none. */
+  /**
+   * Selects the photograph with the index `index`, from 0, which is then shown beside the 3D view; none if undefined.
+   */
   choose(index: number | undefined): void {
     const photograph = index === undefined ? undefined : this.#photographs[index];
     const changed = index !== this.#chosen;
@@ -77,7 +82,7 @@ export class PhotoStrip {
     if (changed) this.#onChoose(this.#chosen);
   }
 
-  /** Makes one button the tab stop; arrow keys move between them. */
+  /** Makes one thumbnail the strip's only tab stop; arrow keys move between thumbnails. */
   #makeStop(index: number): void {
     for (const [i, button] of this.#buttons.entries()) button.tabIndex = i === index ? 0 : -1;
   }

@@ -4,7 +4,7 @@ import { h } from './dom';
 import { count, figure } from './format';
 import type { Curve } from './plots';
 
-/** Largest number of iterations listed: few enough to be read, or listened to. */
+/** Largest number of iterations listed in the table: few enough to be read, or listened to. */
 const ROWS = 12;
 
 /**
@@ -40,7 +40,7 @@ export class PlotTable {
     if (this.element.open) this.#fill();
   }
 
-  /** Refills the existing cells, so that screen readers keep their position. */
+  /** Fills the table again with its existing cells, so that screen readers keep their position. */
   #fill(): void {
     const chosen = spread(this.#reports);
     for (const [i, cells] of this.#cells.entries()) {

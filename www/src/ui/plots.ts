@@ -9,9 +9,9 @@ import { totals } from './log';
 import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
-/** Space above a plot for the names of the levels, pixels. */
+/** Space above a plot for the names of the levels, CSS pixels. */
 const MARK_HEIGHT = 16;
-/** Height of the tick marks of one kind of event, pixels. */
+/** Height of the tick marks of one type of topology event, CSS pixels. */
 const MARK_LANE = 6;
 
 export interface Curve {
@@ -55,7 +55,7 @@ export const ENERGY_PLOTS: PlotKind[] = [
   },
 ];
 
-/** Live plots over the iterations, with level changes and topology events marked. */
+/** Live plots of a run over its iterations, with level changes and topology events marked. */
 export class Plots {
   readonly element: HTMLElement;
   readonly #plots: Plot[];
@@ -90,7 +90,7 @@ export class Plots {
     );
   }
 
-  /** Redraws in the next animation frames, one plot in each: all at once would delay other rendering. */
+  /** Redraws the plots in the next animation frames, one plot in each: all at once would delay other rendering. */
   update(): void {
     for (const plot of this.#plots) this.#stale.add(plot);
     this.#pending ||= requestAnimationFrame(() => this.#redrawOne());
@@ -117,7 +117,7 @@ class Plot {
   readonly #kind: PlotKind;
   readonly #plot: uPlot;
   readonly #caption = h('figcaption');
-  /** Iterations, followed by the values of each curve, for the reports of the current run so far. */
+  /** Plotted data: iterations, followed by the values of each curve, for the reports of the current run so far. */
   #columns: (number | null)[][] = [];
   #run: readonly StepReport[] | undefined;
 
@@ -139,7 +139,7 @@ class Plot {
     this.#caption.textContent = reports.length > 0 ? this.#kind.describe(history) : text('measures.noSteps');
   }
 
-  /** Appends only new reports: runs have thousands of steps. */
+  /** Appends the data of new reports only: runs have thousands of steps. */
   #extend(reports: readonly StepReport[]): void {
     const { curves, log } = this.#kind;
     if (reports !== this.#run) this.#columns = [[], ...curves.map(() => [])];
@@ -156,9 +156,7 @@ function emptyData(kind: PlotKind): uPlot.AlignedData {
   return [[], ...kind.curves.map(() => [])] as uPlot.AlignedData;
 }
 
-/**
- * Returns null for values that cannot be drawn: those that are not finite and, on a logarithmic axis, zero and below.
- */
+/** Returns a value to plot, or null if it cannot be drawn: not finite or, on a logarithmic axis, zero or below. */
 function plottable(value: number, log: boolean): number | null {
   return Number.isFinite(value) && (!log || value > 0) ? value : null;
 }
@@ -209,13 +207,19 @@ function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Ra
   return [low - margin, high + margin];
 }
 
-/** Rounds a range outwards to whole powers of ten; 10⁻⁷ to 1 without data. */
+/**
+ * Returns the range of a logarithmic axis: that of the data, rounded outwards to whole powers of ten; 10⁻⁷ to 1 without
+ * data.
+ */
 function logRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (!low || !high) return [1e-7, 1];
   return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
 }
 
-/** Returns ticks at every power of ten, or at every n-th one where more than five would result. */
+/**
+ * Returns the tick positions of a logarithmic axis: every power of ten, or every n-th one where more than five would
+ * result.
+ */
 function decades(_: uPlot, __: number, low: number, high: number): number[] {
   const [first, last] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
   const step = Math.max(1, Math.ceil((last - first) / 4));
@@ -286,7 +290,7 @@ function describeEnergy({ reports }: History): string {
   });
 }
 
-/** Describes where each level began, and all topology changes. */
+/** Describes in words where each level began, and all topology changes, for screen readers. */
 function describeEvents({ phases, changes, reports }: History): string {
   if (reports.length === 0) return '';
   const levels = phases
@@ -295,7 +299,7 @@ function describeEvents({ phases, changes, reports }: History): string {
   return `${levels[0]?.toUpperCase()}${levels.slice(1)}. ${totals(changes)}`;
 }
 
-/** Describes the number of vertices at the end of each level. */
+/** Describes in words the number of vertices at the end of each level, for screen readers. */
 function describeByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
     const last = lastBefore(reports, iteration);

@@ -7,10 +7,10 @@ const KINDS: { value: Enrichment; label: string }[] = [
   { value: 'linear', label: text('trackPanels.enrichLinear') },
   { value: 'flow', label: text('trackPanels.enrichFlow') },
 ];
-/** Largest factor for in-between slices that the library supports. */
+/** Largest factor, supported by the library, by which in-between slices may divide the distance between slices. */
 const MAX_FACTOR = 16;
 
-/** Controls for the preprocessing of the image before tracking: binning and in-between slices. */
+/** Controls of the Track lab for the preprocessing of the image before tracking: binning and in-between slices. */
 export class PreparationControls {
   readonly element: HTMLElement;
   readonly #binning: HTMLSelectElement;

@@ -5,7 +5,10 @@ import { levelSymbol } from './format';
 
 const VOLUME = text('extractPanels.levelVolume');
 
-/** The levels of the image pyramid as thumbnails of the current slice, with the level of the model marked. */
+/**
+ * Panel with the levels of the image pyramid as thumbnails of the current slice; the level that the model is fitted to
+ * is marked.
+ */
 export class PyramidPanel {
   readonly #list = h('div', { class: 'pyramid', role: 'group', 'aria-label': text('extractPanels.pyramidLevels') });
   readonly #follow = h('input', { type: 'checkbox', 'data-pyramid': 'follow' });
@@ -20,13 +23,16 @@ export class PyramidPanel {
   readonly #picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined;
   #buttons: HTMLButtonElement[] = [];
   #dims: string[] = [];
-  /** Coarser levels, finest first. */
+  /** Levels of the pyramid without the volume itself, finest first. */
   #levels: LevelView[] = [];
   #inUse: number | undefined;
   #shown = 0;
   #pending = 0;
 
-  /** `picture` renders the current slice of a level; `onShow` shows a level in the slices. */
+  /**
+   * `picture` renders the current slice of a level for its thumbnail, `onShow` shows a level in the slices; both are
+   * called with undefined for the volume itself.
+   */
   constructor(
     picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined,
     onShow: (level: LevelView | undefined) => void,
@@ -37,8 +43,8 @@ export class PyramidPanel {
   }
 
   /**
-   * Shows the levels of a volume: `volume` are the dimensions of the volume itself, `levels` its coarser levels, finest
-   * first, and `inUse` is the level of the model.
+   * Shows the pyramid of a volume: `volume` are the dimensions of the volume itself, `levels` its coarser levels,
+   * finest first, and `inUse` is the number of the level that the model is fitted to.
    */
   setLevels(volume: readonly number[], levels: LevelView[], inUse: number): void {
     this.#levels = levels;
@@ -54,7 +60,7 @@ export class PyramidPanel {
     this.redraw();
   }
 
-  /** Marks the level that the model is on; shows it in the slices if they are to follow the model. */
+  /** Marks the level that the model is fitted to; shows it in the slices if the user wants them to follow the model. */
   setInUse(level: number): void {
     if (level === this.#inUse) return;
     this.#inUse = level;
@@ -62,7 +68,7 @@ export class PyramidPanel {
     if (this.#follow.checked) this.#choose(level);
   }
 
-  /** Redraws the thumbnails at the next animation frame, after the slice has moved. */
+  /** Redraws the thumbnails of all levels at the next animation frame, after the current slice has changed. */
   redraw(): void {
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;

@@ -10,7 +10,10 @@ export interface RegionEvents {
   onComponent: (which: 'here' | 'largest') => void;
 }
 
-/** Controls of the Track lab for the region of interest, in slices, and for the component to track. */
+/**
+ * Controls of the Track lab for the region of interest, by its first and last slice along each axis, and for the
+ * component to track.
+ */
 export class RegionControls {
   readonly element: HTMLElement;
   readonly #inputs: HTMLInputElement[] = [];
@@ -44,8 +47,9 @@ export class RegionControls {
   }
 
   /**
-   * Shows the region of interest, and whether it is the `whole` image. The component tracked is the one nearest to the
-   * world point `nearest`, or the largest if undefined. `names`: names of the slices across each voxel axis.
+   * Shows the region of interest, and whether it is the `whole` image of dimensions `dims`. The component tracked is
+   * the one nearest to the world point `nearest`, or the largest if undefined. `names`: names of the slices across each
+   * voxel axis.
    */
   show(
     region: VoxelBox,

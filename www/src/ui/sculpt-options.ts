@@ -28,7 +28,9 @@ export const SCULPT_COLORS: { value: SurfaceColor; label: string }[] = [
   { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
 ];
 
-/** View options of the Sculpt lab. */
+/**
+ * Controls for the view options of the Sculpt lab: which meshes and ellipsoids are shown, and the surfaces' colouring.
+ */
 export class SculptOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<string, HTMLInputElement>();
@@ -65,20 +67,23 @@ export class SculptOptionControls {
     return this.#value;
   }
 
-  /** Whether there are stages of restructuring to show. */
+  /** Whether there are stages of restructuring to show; if not, that layout is not offered. */
   set staged(staged: boolean) {
     const option = [...this.#layout.options].find(({ value }) => value === 'stages');
     if (option) option.hidden = !staged;
   }
 
-  /** Whether there is a texture to show. */
+  /** Whether the surface has a texture to show; if not, it is not offered, and a textured surface becomes plain. */
   set textured(textured: boolean) {
     const option = [...this.#color.options].find(({ value }) => value === 'texture');
     if (option) option.disabled = !textured;
     if (!textured && this.#value.color === 'texture') this.set({ color: 'plain' });
   }
 
-  /** Changes options and reports them; an unknown colouring or layout is replaced by the first. */
+  /**
+   * Changes view options and reports all of them to the lab; an unknown colouring or layout is replaced by the first
+   * choice.
+   */
   set(changed: Partial<SculptViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!SCULPT_COLORS.some(({ value }) => value === this.#value.color)) this.#value.color = 'plain';

@@ -20,8 +20,8 @@ const VIEW_KEYS: [string, string][] = [
 ];
 
 /**
- * Returns the shortcuts of every lab: those for the run, which `toggleText` describes for the space key, then `own` ones of
- * the lab, then undo and redo.
+ * Returns the keyboard shortcuts of a lab: those for its run, where `toggleText` describes the space key, then the
+ * lab's `own` ones, then undo and redo.
  */
 export function labShortcuts(
   { onToggle, onStep, onReset, onUndo, onRedo }: TransportEvents,
@@ -41,8 +41,8 @@ export function labShortcuts(
 }
 
 /**
- * Installs keyboard shortcuts and a dialog that lists them, opened by `?` or by a button, with links to further help;
- * removed when `signal` is aborted.
+ * Installs the keyboard shortcuts of a lab and a dialog that lists them, opened by `?` or by the button `opener`, with
+ * links to further help; both are removed when `signal` is aborted.
  */
 export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide: string, signal: AbortSignal): void {
   const list: Shortcut = { key: '?', shown: '?', text: text('controls.keyList'), act: () => dialog.showModal() };
@@ -51,7 +51,7 @@ export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide
   listenForShortcuts([...shortcuts, list], signal);
 }
 
-/** Handles keys anywhere on the page, until `signal` is aborted, unless the focused element uses the key. */
+/** Handles shortcuts anywhere on the page, until `signal` is aborted, unless the focused element uses the key. */
 function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
   const typing = new Typing(signal);
   const onKey = (event: KeyboardEvent) => {
@@ -66,7 +66,9 @@ function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
   window.addEventListener('keydown', onKey, { signal });
 }
 
-/** Tracks the field with uncommitted typing: there Ctrl+Z undoes the typing. */
+/**
+ * Tracks which field contains typing that is not committed yet: there Ctrl+Z undoes the typing, not a step of the lab.
+ */
 class Typing {
   #field: EventTarget | null = null;
 
@@ -91,8 +93,8 @@ class Typing {
 const UNTYPED = ['range', 'checkbox', 'radio'];
 
 /**
- * Whether the focused element uses the key itself: space presses buttons, letters are typed into fields and select in
- * lists.
+ * Returns whether the focused element uses the pressed key itself, so that it is no shortcut: space presses buttons,
+ * letters are typed into fields and select in lists, and dialogs use all keys.
  */
 function isTakenBy({ target, key }: KeyboardEvent): boolean {
   if (!(target instanceof HTMLElement)) return false;
@@ -102,7 +104,10 @@ function isTakenBy({ target, key }: KeyboardEvent): boolean {
   return key === ' ' && target.closest('button, summary, a, label.button') !== null;
 }
 
-/** Creates the dialog that lists the shortcuts, opened by a button or by `?`; removed when `signal` is aborted. */
+/**
+ * Creates the dialog that lists the keyboard shortcuts, opened by the button `opener`; removed when `signal` is
+ * aborted.
+ */
 function shortcutDialog(
   shortcuts: Shortcut[],
   opener: HTMLElement,
@@ -130,7 +135,8 @@ function shortcutDialog(
 }
 
 /**
- * Creates the list of links to the documentation and other pages; they open in new tabs, so that the model stays open.
+ * Creates the list of links to the documentation and other pages; they open in new tabs, so that the lab keeps its
+ * model.
  */
 function furtherHelp(guide: string): HTMLElement {
   const link = (href: string, text: string) => h('li', {}, h('a', { class: 'link', href, target: '_blank' }, text));

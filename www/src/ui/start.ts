@@ -36,12 +36,13 @@ export interface StartChoice {
   kind: Kind;
   bubbles: number;
   levels: number;
-  /** Mean edge length in world units; undefined lets the model choose. */
+  /** Mean edge length of the surface in world units; undefined lets the model choose. */
   edge: number | undefined;
 }
 
 /**
- * Controls for the initial surface. A change restarts the model; if it is rejected, the previous values are restored.
+ * Controls of the Extract lab for the initial surface. A change restarts the model; if it is rejected, the previous
+ * values are restored.
  */
 export class StartControls {
   readonly element: HTMLElement;
@@ -65,7 +66,7 @@ export class StartControls {
     text('extractPanels.meanEdgeLengthError'),
   );
   readonly #fields = [this.#shape, this.#bubbles, this.#levels, this.#edge];
-  /** The field changed last, which shows the error if the model cannot be created. */
+  /** The field that was changed last, which shows the error if no model can be created. */
   #changed: Field = this.#shape;
   #inForce: StartChoice;
 
@@ -87,14 +88,16 @@ export class StartControls {
   }
 
   /**
-   * The initial surface of the current model; while another one is being tried, {@link value} is that other one
-   * already.
+   * Choice of the initial surface with which the current model was created. During the attempt to create a model with a
+   * new choice, {@link value} is the new one already.
    */
   get inForce(): StartChoice {
     return this.#inForce;
   }
 
-  /** Shows the initial surface of the current model and clears error messages, without reporting a change. */
+  /**
+   * Shows the choice with which the current model was created and clears error messages, without reporting a change.
+   */
   show(choice: StartChoice): void {
     this.#inForce = choice;
     this.#shape.control.value = choice.kind;
@@ -105,7 +108,10 @@ export class StartControls {
     this.#explain();
   }
 
-  /** Shows an error beside the field changed last, and restores the values in force. */
+  /**
+   * Shows why a change was rejected beside the field changed last, and restores the values of the current model in all
+   * fields.
+   */
   reject(message: string): void {
     this.show(this.#inForce);
     this.#changed.showError(message);
@@ -126,7 +132,7 @@ export class StartControls {
   }
 }
 
-/** A control with its label, help text and error message. */
+/** A form control with its label, help text and error message. */
 class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElement | HTMLSelectElement> {
   readonly element: HTMLElement;
   readonly control: Control;

@@ -2,14 +2,14 @@ import { text } from '../texts';
 import { h } from './dom';
 
 /**
- * Smallest number of milliseconds between the last message and a progress report: rarely enough for screen readers, and
- * for the rest of the page.
+ * Least milliseconds between the last message of the status line and a progress report: rarely enough for screen
+ * readers, and for the rest of the page.
  */
 const REPORT_EVERY = 10_000;
 
 /**
- * Status line of a lab, announced politely by screen readers. Set when the state changes, and occasionally during a
- * run.
+ * Status line of a lab, announced politely by screen readers. Its text is set when the state of the lab changes, and
+ * occasionally during a run.
  */
 export class StatusLine {
   readonly element = h('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
@@ -20,13 +20,13 @@ export class StatusLine {
     if (this.element.textContent !== text) this.element.textContent = text;
   }
 
-  /** Reports progress. May be called at any rate; `text` is evaluated only when a report is due. */
+  /** Reports the progress of a run. May be called at any rate; `text` is evaluated only when a report is due. */
   report(text: () => string): void {
     if (performance.now() - this.#saidAt >= REPORT_EVERY) this.say(text());
   }
 }
 
-/** Error message over the view, in plain words. The previous result stays visible below it. */
+/** Banner over the view with an error message in plain words. The previous result stays visible below it. */
 export class ErrorBanner {
   readonly element: HTMLElement;
   readonly #title = h('strong');

@@ -3,8 +3,8 @@ import { h } from './dom';
 import type { History } from './history';
 
 /**
- * Rows of the paper's tables 1 and 2: the paper's letter, the name on the page, and the parts of a step that are
- * summed.
+ * Rows of tables of times, as in tables 1 and 2 of Lachaud and Montanvert: their letter, the name on the page, and the
+ * parts of a step that are summed.
  */
 export const TIME_ROWS = [
   { letter: 'T', name: text('extractPanels.timeTopology'), parts: ['topology', 'embedding'] },
@@ -19,10 +19,10 @@ const DETAILS = [
 ];
 export const TIME_NOTE = text('extractPanels.timeNote');
 
-/** Milliseconds by part of a step. */
+/** Milliseconds by part of a step ('topology', 'forces' ...), the keys as in step reports. */
 export type PartTimes = ReadonlyMap<string, number>;
 
-/** Returns the sum of some parts, or of all, in milliseconds. */
+/** Returns the sum of the times of some parts of a step, or of all, in milliseconds. */
 export function timeOf(times: PartTimes, parts?: readonly string[]): number {
   return [...times].reduce((sum, [part, ms]) => sum + (!parts || parts.includes(part) ? ms : 0), 0);
 }
@@ -37,7 +37,10 @@ export function seconds(ms: number): string {
   return (ms / 1000).toFixed(ms < 9950 ? 2 : 1);
 }
 
-/** Table of the time spent by part and level, in seconds, in the layout of the paper's tables 1 and 2. */
+/**
+ * Table of the time that an extraction spent by part of a step and level, in seconds, in the layout of tables 1 and 2
+ * of Lachaud and Montanvert.
+ */
 export class TimeTable {
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });

@@ -11,7 +11,8 @@ const COLORS = { 'multi-order': '--curve', 'thin-plate': '--cut' } as const;
 const HEIGHT = 160;
 
 /**
- * Plots the duration of the solve against the number of constraints, measured on this machine (figure 4d of the paper).
+ * Panel that measures the duration of the Reconstruct lab's solve on this machine and plots it against the number of
+ * constraints (figure 4d of the paper).
  */
 export class TimingPanel {
   readonly element: HTMLElement;
@@ -136,7 +137,7 @@ export class TimingPanel {
   }
 }
 
-/** Describes how the duration grows from the smallest to the largest number of constraints. */
+/** Describes in words how the solve's duration grows from the smallest to the largest number of constraints. */
 function describeGrowth(timings: Timing[]): string {
   const parts = KERNELS.map((kernel) => {
     const [first, ...rest] = timings.filter((one) => one.kernel === kernel);

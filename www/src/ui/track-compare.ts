@@ -11,13 +11,13 @@ const ALTERNATIVES: { value: Alternative; label: string }[] = [
   { value: 'flow', label: text('trackPanels.otherFlow') },
 ];
 
-/** One of the two tracking runs of a comparison. */
+/** One of the two tracking runs of a comparison, in the form that the panel shows. */
 export interface TrackingRun {
   name: string;
   facts: readonly FrameStatistics[];
   closing: number | undefined;
   error: SurfaceError | undefined;
-  /** Duration in milliseconds, if known. */
+  /** Duration of the run in milliseconds, if known. */
   duration: number | undefined;
 }
 
@@ -26,7 +26,10 @@ export interface TrackCompareEvents {
   onCancel: () => void;
 }
 
-/** Tracks the same image again with one alternative setting, and compares the volume curves and measures. */
+/**
+ * Panel that starts a second tracking run of the same image with one alternative setting, and compares the volume
+ * curves and measures of both runs.
+ */
 export class TrackComparePanel {
   readonly element: HTMLElement;
   readonly #select: HTMLSelectElement;
@@ -75,12 +78,12 @@ export class TrackComparePanel {
     );
   }
 
-  /** Whether the current run is finished, so that it can be compared. */
+  /** Whether the current tracking run is finished, so that it can be compared with another. */
   set enabled(enabled: boolean) {
     this.#start.disabled = !enabled;
   }
 
-  /** Updates the alternatives; the current setting is not offered. */
+  /** Updates the choice of alternative settings for the second run; the current setting is not offered. */
   show(prediction: boolean, { enrichment }: Preparation): void {
     for (const option of this.#select.options) {
       if (option.value === 'prediction')
@@ -106,7 +109,7 @@ export class TrackComparePanel {
     this.#status.textContent = text('controls.comparing');
   }
 
-  /** Shows the progress, without announcing it to screen readers. */
+  /** Shows the progress of the second run, 0 to 1, and its phase, without announcing them to screen readers. */
   showProgress(part: number, phase: string): void {
     this.#progress.value = Number.isFinite(part) ? part : 0;
     this.#cancel.textContent = text('trackPanels.cancelPhase', { phase });
@@ -133,7 +136,10 @@ export class TrackComparePanel {
   }
 }
 
-/** Returns the numbers in a run's column of the table, also published as JSON in the element's `data-comparison`. */
+/**
+ * Returns the numbers in a run's column of the comparison table, also published as JSON in the element's
+ * `data-comparison`.
+ */
 function summary({ name, facts, closing, error, duration }: TrackingRun) {
   const mean = (of: (one: FrameStatistics) => number) =>
     facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
@@ -211,7 +217,7 @@ function tableOf(runs: [TrackingRun, TrackingRun]): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** Returns a run that was tracked for the comparison in the form that the panel shows, with its name. */
+/** Converts the result of the comparison's second run to the form that the panel shows, under the name `name`. */
 export function comparedRun(name: string, { facts, closing, error, duration }: ComparedTrack): TrackingRun {
   return { name, facts, closing, error, duration };
 }

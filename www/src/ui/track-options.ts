@@ -22,7 +22,7 @@ const BELOW: { value: ContentBelow; label: string }[] = [
   { value: 'between', label: text('trackPanels.belowBetween') },
 ];
 
-/** View options of the Track lab, and the content below the view. */
+/** Controls for the view options of the Track lab, including what is shown below the 3D view. */
 export class TrackOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<string, HTMLInputElement>();
@@ -67,7 +67,7 @@ export class TrackOptionControls {
     return this.#value;
   }
 
-  /** Changes options and reports them; an unknown value is replaced by the first. */
+  /** Changes view options and reports all of them to the lab; an unknown value is replaced by the first choice. */
   set(changed: Partial<TrackViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!BELOW.some(({ value }) => value === this.#value.below)) this.#value.below = 'slices';

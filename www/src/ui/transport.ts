@@ -20,7 +20,7 @@ export interface TransportEvents {
   onRedo: () => void;
 }
 
-/** Controls of a run (play, pause, step, reset, undo, redo), and its progress. */
+/** Buttons that control a run (play, pause, step, reset, undo, redo), and its progress. */
 export class Transport {
   readonly element: HTMLElement;
   readonly #play: HTMLButtonElement;
@@ -72,7 +72,10 @@ export class Transport {
     this.showUndo(undefined, undefined);
   }
 
-  /** Shows on the buttons which change undo and redo would affect; a button without one is disabled. */
+  /**
+   * Sets the names of the changes that undo and redo would affect, which the buttons show; undefined disables the
+   * button.
+   */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
     for (const [button, verb, what] of [
       [this.#undo, text('controls.undo'), undoable],
@@ -87,8 +90,8 @@ export class Transport {
   }
 
   /**
-   * Shows the state: enables the buttons that apply, and labels the play button. `ready`: whether there is a model to
-   * run.
+   * Shows the state of the lab: enables the buttons that apply, and labels the play button. `ready`: whether there is a
+   * model to run.
    */
   showState(state: LabState, ready: boolean): void {
     const running = state === 'running';
@@ -117,7 +120,7 @@ export class Transport {
   }
 }
 
-/** Creates a label that is hidden where space is limited. */
+/** Creates the text of a button with an icon; it is hidden where space is limited. */
 function word(text: string): HTMLElement {
   return h('span', { class: 'word' }, text);
 }

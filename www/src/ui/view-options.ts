@@ -2,10 +2,12 @@ import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
-/** Placement of the slices in the 3D view: on the walls behind the surface, in place, or hidden. */
+/**
+ * Placement of the slices in the 3D view: on the walls behind the surface, at their positions in the volume, or hidden.
+ */
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
-/** Colouring of the surface: plain, by connected component, or by a quantity at the vertices. */
+/** Colouring of the Extract lab's surface: plain, by connected component, or by a quantity at the vertices. */
 export type ColorMode = 'plain' | 'component' | VertexQuantity;
 
 export interface ViewOptions {
@@ -33,7 +35,7 @@ export const COLOR_MODES: { value: ColorMode; label: string }[] = [
   { value: 'gaussian curvature', label: text('controls.colorGaussianCurvature') },
 ];
 
-/** View options of the Extract lab. */
+/** Controls for the view options of the Extract lab: what is shown, and the surface's colouring. */
 export class ViewOptionControls {
   readonly element: HTMLElement;
   readonly #color: HTMLSelectElement;
@@ -68,7 +70,7 @@ export class ViewOptionControls {
     return this.#value;
   }
 
-  /** Sets the colouring; an unknown name counts as plain. */
+  /** Sets the colouring of the surface and reports it to the lab; an unknown name counts as plain. */
   set color(color: ColorMode) {
     const known = COLOR_MODES.some(({ value }) => value === color) ? color : 'plain';
     this.#color.value = known;
@@ -80,7 +82,7 @@ export class ViewOptionControls {
   }
 }
 
-/** Creates a labelled selection list. */
+/** Creates a labelled selection list for a view option. */
 export function choice<Value extends string>(
   label: string,
   name: string,

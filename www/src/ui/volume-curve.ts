@@ -6,16 +6,16 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 190;
-/** Space above the plot for the names of end-diastole and end-systole, pixels. */
+/** Space above the plot for the names of end-diastole and end-systole, CSS pixels. */
 const MARK_HEIGHT = 18;
 
 export interface VolumeCurves {
   volumes: number[];
-  /** True volume of each frame, if the image is synthetic. */
+  /** True volume of each frame, in cubic units of length, if the image is synthetic. */
   truth: number[] | undefined;
-  /** Volume of each frame in the run tracked for comparison, and its name. */
+  /** Volume of each frame in the run tracked for comparison, and the name of that run. */
   other: { volumes: number[]; name: string } | undefined;
-  /** The frame shown in the view. */
+  /** Index, from 0, of the frame shown in the view. */
   frame: number;
   frames: number;
   unit: string;
@@ -24,8 +24,8 @@ export interface VolumeCurves {
 const EMPTY: VolumeCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
 
 /**
- * Plot of the enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click shows
- * the frame.
+ * Plot of the enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click
+ * selects the frame to show in the view.
  */
 export class VolumeCurve {
   readonly element: HTMLElement;
@@ -121,7 +121,7 @@ export class VolumeCurve {
   }
 }
 
-/** Describes the curve in words, for screen readers. */
+/** Describes the volume curve in words, for screen readers. */
 function describeBeat(beat: Beat, { truth, other, unit }: VolumeCurves): string {
   const size = (volume: number) =>
     unit === 'mm' ? text('controls.millilitres', { value: (volume / 1000).toFixed(1) }) : figure(volume);

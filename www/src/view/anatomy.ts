@@ -14,20 +14,20 @@ export interface ImageAxis {
 }
 
 /**
- * Display of the slices across one voxel axis in radiological convention: the patient's right on the left, head or face
- * up.
+ * How slices across one voxel axis are displayed, in radiological convention: the patient's right on the left, head or
+ * face up.
  */
 export interface SliceOrientation {
   axis: Axis;
   name: 'Sagittal' | 'Coronal' | 'Axial';
-  /** The side that runs from left to right. */
+  /** The side of the slice image that runs from left to right. */
   horizontal: ImageAxis;
-  /** The side that runs from top to bottom. */
+  /** The side of the slice image that runs from top to bottom. */
   vertical: ImageAxis;
   labels: { left: string; right: string; top: string; bottom: string };
 }
 
-/** The two ends of each anatomical axis of RAS space, positive end first. */
+/** Letters of the two ends of each anatomical axis of RAS space, positive end first. */
 const ENDS = [
   ['R', 'L'],
   ['A', 'P'],
@@ -59,8 +59,8 @@ export function anatomicalSigns(space: 'RAS' | 'LPS'): Vec3 {
 }
 
 /**
- * Assigns each voxel axis the anatomical axis it is most nearly parallel to, each of them once. `positive`: whether the
- * voxel index increases towards the right, front or head.
+ * Returns for each voxel axis the anatomical axis (0 to 2: left-right, back-front, foot-head) that it is most nearly
+ * parallel to, each of them once. `positive`: whether the voxel index increases towards the right, front or head.
  */
 export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[] {
   const signs = anatomicalSigns(grid.space);
@@ -72,7 +72,7 @@ export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[]
   return best.map((anatomical, voxel) => ({ anatomical, positive: along(voxel, anatomical) >= 0 }));
 }
 
-/** Returns the display of slices for each of the three voxel axes of a volume. */
+/** Returns for each of the three voxel axes of a volume how slices across it are displayed. */
 export function sliceOrientations(grid: Grid): SliceOrientation[] {
   const anatomy = anatomyOf(grid);
   const at = (axis: Axis) => anatomy[axis] ?? { anatomical: axis, positive: true };
@@ -104,7 +104,7 @@ export function toWorld(affine: ArrayLike<number>, index: Vec3): Vec3 {
   return [row(0), row(1), row(2)];
 }
 
-/** Inverts an affine map, column-major like the map itself. */
+/** Returns the inverse of a 4 × 4 affine map; both are column-major. */
 export function invert(affine: ArrayLike<number>): Float64Array {
   const a = (column: number, row: number) => affine[4 * column + row] ?? 0;
   const cofactor = (c: number, r: number) => {
@@ -125,7 +125,10 @@ export function invert(affine: ArrayLike<number>): Float64Array {
   return inverse;
 }
 
-/** Returns the world plane of the slice with the given index across a voxel axis. */
+/**
+ * Returns the plane, in world space, of the slice with the given index across a voxel axis, for cross-sections of the
+ * surface. `affine` maps voxel indices to world space; `inverse` is its inverse.
+ */
 export function slicePlane(affine: ArrayLike<number>, inverse: ArrayLike<number>, axis: Axis, index: number): Plane {
   const at: Vec3 = [0, 0, 0];
   at[axis] = index;

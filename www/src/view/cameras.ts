@@ -20,7 +20,7 @@ export class CameraMarks {
     this.#chosen.object.material.color.set(chosen);
   }
 
-  /** Replaces the cameras shown, none of them chosen, by pyramids of height `depth`, world units. */
+  /** Replaces the cameras shown, none of them highlighted, by pyramids of height `depth`, world units. */
   show(cameras: readonly PinholeCamera[], depth: number): void {
     this.#cameras = cameras;
     this.#depth = depth;
@@ -39,7 +39,7 @@ export class CameraMarks {
     this.#chosen.show(new Float32Array(camera && this.#visible ? pyramid(camera, this.#depth) : []));
   }
 
-  /** Camera centres in world space. */
+  /** Camera centres in world space, to fit the view to. */
   get centres(): Vector3[] {
     return this.#cameras.map((camera) => poseOf(camera).centre);
   }
@@ -50,7 +50,7 @@ export class CameraMarks {
   }
 }
 
-/** Returns the edges of a camera's pyramid as pairs of points, packed. */
+/** Returns the edges of a camera's pyramid of height `depth`, as pairs of world points, packed xyz. */
 function pyramid(camera: PinholeCamera, depth: number): number[] {
   const { centre, right, down, forward, focal, principalPoint } = poseOf(camera);
   const at = (x: number, y: number) =>

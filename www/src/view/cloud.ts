@@ -16,7 +16,10 @@ export class PointCloud {
     this.#paint();
   }
 
-  /** Diameter of the discs in world units, exact for a field of view of 90°; a narrower view shows smaller discs. */
+  /**
+   * Diameter of the points' discs in world units, exact for a field of view of 90°; a narrower view shows smaller
+   * discs.
+   */
   set size(size: number) {
     this.#material.size = size;
   }

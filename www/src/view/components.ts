@@ -1,4 +1,7 @@
-/** Colours that are distinguishable with the common kinds of colour blindness (Okabe and Ito 2008), as linear rgb. */
+/**
+ * Colours of connected components, distinguishable with the common kinds of colour blindness (Okabe and Ito 2008), as
+ * linear rgb.
+ */
 const PALETTE: [number, number, number][] = [
   [0.902, 0.624, 0],
   [0.337, 0.706, 0.914],
@@ -10,8 +13,8 @@ const PALETTE: [number, number, number][] = [
 ].map((rgb) => rgb.map((c) => c ** 2.2) as [number, number, number]);
 
 /**
- * Returns for each vertex the smallest vertex index of its connected component. The first `length` of the indices are
- * used.
+ * Returns for each of the `vertices` vertices of a mesh the smallest vertex index of its connected component. Triangles
+ * are given by the first `length` entries of `indices`, three each.
  */
 export function componentRoots(indices: Uint32Array, length: number, vertices: number): Uint32Array {
   const parent = Uint32Array.from({ length: vertices }, (_, i) => i);
@@ -37,7 +40,7 @@ export function componentRoots(indices: Uint32Array, length: number, vertices: n
 /**
  * Writes a colour per vertex, linear rgb, into `out`: the same for all vertices of a connected component. Components
  * are ranked by number of vertices, so that the largest keeps its colour as it grows; after the seventh, the colours
- * repeat.
+ * repeat. Triangles are given by the first `length` entries of `indices`.
  */
 export function componentColors(indices: Uint32Array, length: number, vertices: number, out: Float32Array): void {
   const roots = componentRoots(indices, length, vertices);

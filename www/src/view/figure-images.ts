@@ -10,10 +10,10 @@ import { greysOf, slicePicture } from './slicing';
 import { voxelsOfFrame } from './track';
 import { votesIn } from './votes';
 
-/** Size of an image's longer side in pixels; sharp on high-resolution screens, too. */
+/** Length of an image's longer side in canvas pixels; sharp on high-resolution screens, too. */
 const IMAGE_SIZE = 560;
 
-/** An image with a caption. */
+/** An image with a caption, as one of the pictures of a figure. */
 export class FigureImage {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement;
@@ -29,8 +29,8 @@ export class FigureImage {
   }
 
   /**
-   * Returns the position of a mouse event as fractions of the image's width and height, 0 to 1; the image may not fill
-   * its canvas.
+   * Returns the position of a mouse event as fractions, 0 to 1, of the image's width and height; margins of the canvas
+   * around the image are taken into account.
    */
   fractionsAt({ offsetX, offsetY }: MouseEvent): [number, number] {
     const { width, height, clientWidth, clientHeight } = this.canvas;
@@ -41,9 +41,9 @@ export class FigureImage {
   }
 
   /**
-   * Draws `small` magnified, to the scale at which its longer side is {@link IMAGE_SIZE}; `wide` × `high` is the shape
-   * of its pixels. `over` draws on top: a position in pixels of `small`, times the scales, is the position on the
-   * canvas.
+   * Draws the canvas `small` magnified, so that its longer side becomes {@link IMAGE_SIZE}; its pixels have the
+   * proportions `wide` : `high`. `over` draws on top: a position in pixels of `small`, times the scales, is the
+   * position on the canvas.
    */
   paint(
     small: HTMLCanvasElement,
@@ -61,25 +61,26 @@ export class FigureImage {
   }
 }
 
-/** The voxel and frame that the figures show. */
+/** The subject of the figures: the frame and the voxel at the crosshair. */
 export interface Subject {
   volume: VolumeView;
   frame: number;
   voxel: Vec3;
 }
 
-/** Voxel axis perpendicular to the slices: the third, as acquired by the scanner. */
+/** Voxel axis perpendicular to the slices that the figures show: the third, as acquired by the scanner. */
 const ACROSS = 2;
 /**
- * Width and height of the section of a slice that is shown around the crosshair, pixels; less if the slice is smaller.
+ * Width and height, in pixels, of the section of a slice that is shown around the crosshair; less if the slice is
+ * smaller.
  */
 const SECTION_SIZE = 28;
 
 /**
- * Paints a section of the slice around the crosshair and, in the window at the crosshair, outlines the voxels
- * classified as bright in green and those classified as dark in red, as in figure 4 a. Returns whether the window
- * contains a boundary: both clusters are large enough, and their means differ by more than the threshold (in intensity
- * units).
+ * Paints a section of the slice at the crosshair, `voxel`, and outlines the pixels of the window of half width
+ * `halfWidth` (pixels) around it: green if classified as bright, red if dark, as in figure 4 a of the paper. Returns
+ * whether the window contains a boundary: both clusters are large enough, and their means differ by more than the
+ * threshold (in intensity units).
  */
 export function paintWindow(
   picture: FigureImage,
@@ -115,7 +116,10 @@ export function paintWindow(
   return split;
 }
 
-/** Paints the boundary votes in the slice at the crosshair, summed per pixel by {@link boundaryImage}: figure 4 b. */
+/**
+ * Paints the boundary votes in the slice at the crosshair, summed per pixel by {@link boundaryImage}: figure 4 b of the
+ * paper.
+ */
 export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, votes: BoundaryVotes): void {
   const side = sliceSide(volume);
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
@@ -133,7 +137,7 @@ export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, 
   );
 }
 
-/** Paints the edges that Canny's detector finds in the slice at the crosshair: figure 4 c. */
+/** Paints the edges that Canny's detector finds in the slice at the crosshair: figure 4 c of the paper. */
 export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subject, settings: CannySettings): void {
   const side = sliceSide(volume);
   const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
@@ -147,7 +151,8 @@ export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subje
 
 /**
  * Paints the row of pixels through the crosshair in all frames, one column per frame, and marks the frame shown and the
- * intersections of the row with the outlines of the surface; `outlines` by frame. Returns the number of intersections.
+ * intersections of the row with the outlines of the surface, given by frame as `outlines`. Returns the number of
+ * intersections.
  */
 export function paintTime(
   picture: FigureImage,
@@ -181,8 +186,8 @@ export function paintTime(
 }
 
 /**
- * Paints figure 5: the slice before, the slice interpolated by optical flow, the measured slice, the slice interpolated
- * linearly, and the slice after.
+ * Paints figure 5 of the paper, one image each: the slice before a measured one, the slice interpolated by optical
+ * flow, the measured slice, the slice interpolated linearly, and the slice after.
  */
 export function paintBetween(
   pictures: readonly FigureImage[],
@@ -195,7 +200,10 @@ export function paintBetween(
     pictures[i]?.paint(slicePicture({ dims: [width, height, 1], voxels }, side, 0), pixel);
 }
 
-/** Returns the voxel at a position in the section of the slice, given as fractions from 0 to 1 across and down. */
+/**
+ * Returns the voxel at a position in the section of a slice that {@link paintWindow} shows around `voxel`; `across` and
+ * `down` are fractions from 0 to 1. Used for clicks.
+ */
 export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: number): Vec3 {
   const side = sliceSide(volume);
   const out: Vec3 = [...voxel];
@@ -212,8 +220,8 @@ export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: n
 }
 
 /**
- * Returns the upper left corner, in pixels of the slice, of the section centred on the crosshair; the section is moved
- * to lie within the slice.
+ * Returns the upper left corner, in pixels of the slice, of the section of {@link SECTION_SIZE} centred on the
+ * crosshair, `voxel`; the section is moved to lie within the slice.
  */
 function cornerOf({ dims }: VolumeView, { horizontal, vertical }: Side, voxel: Vec3): [number, number] {
   const from = (side: Side['horizontal']) =>

@@ -15,7 +15,7 @@ import {
 import type { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { ControlEllipsoid } from '../sculpt/protocol';
 
-/** The transformation that dragging a handle applies. */
+/** The transformation of an ellipsoid that dragging a handle applies. */
 export type HandleMode = 'move' | 'turn' | 'size';
 
 const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
@@ -25,7 +25,7 @@ const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
 const ELLIPSOID_OPACITY = 0.05;
 /** Opacity of the surface of the selected ellipsoid. */
 const SELECTED_OPACITY = 0.16;
-/** Opacity of the wireframes of all ellipsoids. */
+/** Opacity of the ellipsoids' wireframes. */
 const WIRE_OPACITY = 0.13;
 
 /**
@@ -34,7 +34,7 @@ const WIRE_OPACITY = 0.13;
  */
 export class EllipsoidHandles {
   readonly object = new Group();
-  /** Called while a handle is dragged, and once more when it is released. */
+  /** Called with the selected ellipsoid's new pose while a handle is dragged, and once more when it is released. */
   onDrag: (ellipsoid: ControlEllipsoid, dragging: boolean) => void = () => undefined;
   /** Called when a handle is pressed, before it is moved. */
   onDragStart: () => void = () => undefined;
@@ -78,7 +78,7 @@ export class EllipsoidHandles {
     return this.#handles.dragging;
   }
 
-  /** Whether the pointer is over a handle: a click there selects nothing. */
+  /** Whether the pointer is over a handle, so that a click does not select the ellipsoid behind it. */
   get hovered(): boolean {
     return this.#handles.axis !== null;
   }
@@ -88,7 +88,7 @@ export class EllipsoidHandles {
     this.#placeHandles();
   }
 
-  /** Shows the ellipsoids; the handles are attached to the selected one. */
+  /** Shows the ellipsoids; the handles are attached to the one with the index `chosen`. */
   show(ellipsoids: ControlEllipsoid[], chosen: number | undefined): void {
     this.#ellipsoids = ellipsoids;
     this.#chosen = chosen !== undefined && chosen < ellipsoids.length ? chosen : undefined;

@@ -1,6 +1,6 @@
 import { BufferAttribute, BufferGeometry, type ColorRepresentation, LineBasicMaterial, LineSegments } from 'three';
 
-/** Line segments that change every frame, in a GPU buffer with spare capacity. */
+/** Line segments in the 3D view that change every frame, in a GPU buffer with spare capacity. */
 export class Lines {
   readonly object: LineSegments<BufferGeometry, LineBasicMaterial>;
 

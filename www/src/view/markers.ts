@@ -32,8 +32,8 @@ export class UncoveredMarks {
   }
 
   /**
-   * Shows a mark for each region, with half the radius of a disc of the region's area, within {@link MARK_RADII} times
-   * `side`, the volume's smallest side.
+   * Shows a mark for each uncovered region: half as large as a disc of the region's area, within {@link MARK_RADII}
+   * times `side`, the volume's smallest side.
    */
   show(parts: readonly UncoveredRegion[], side: number): void {
     this.object.clear();

@@ -4,43 +4,46 @@ import { context2d, h, token, uniqueId } from '../ui/dom';
 import { SLICE_NAMES, type SliceOrientation } from './anatomy';
 import { ballSection, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
-/** Style tokens of the colours of the three slice directions, by voxel axis. */
+/** Names of the style tokens (CSS variables) with the colours of the slices across the three voxel axes. */
 export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
 
 export interface PanelEvents {
-  /** Called when the slider moves to another slice. */
+  /** Called with the index of the slice that the slider moves to. */
   onIndex: (index: number) => void;
   /**
-   * Called when the image is clicked or dragged on, with the voxel index. `pressed`: whether the pointer was just
-   * pressed.
+   * Called when the slice image is clicked or dragged on, with the index of the voxel there. `pressed`: whether the
+   * pointer was just pressed.
    */
   onPoint: (index: Vec3, pressed: boolean) => void;
   /**
-   * Called when the image is pressed, with the position of the pointer and the tolerance for grabbing, in voxels. A
-   * returned grip follows the pointer until it is released, and `onPoint` is not called.
+   * Called when the slice image is pressed, with the position of the pointer and the tolerance for grabbing an object
+   * there, both in voxels. A returned grip follows the pointer until it is released, and `onPoint` is not called.
    */
   grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
 }
 
-/** An object on a slice that is being dragged; positions in voxels, also between and outside them. */
+/** Handle of an object on a slice while it is dragged; positions are in voxels, also between and outside them. */
 export interface Grip {
   move: (index: Vec3) => void;
   drop: () => void;
 }
 
-/** Draws over a slice image: a position in pixels of the image, times the scales, is the position on the canvas. */
+/**
+ * Function that draws over a slice image: a position in pixels of the image, times the scales, is the position on the
+ * canvas.
+ */
 export type Overlay = (context: CanvasRenderingContext2D, scaleX: number, scaleY: number) => void;
 
-/** Distance within which a side of the region can be grabbed, CSS pixels. */
+/** Distance within which the pointer can grab a side of the region of interest, CSS pixels. */
 const SLACK = 7;
 
 /** A slice as an image with the surface's outline over it, its crosshair, and a slider. */
 export class SlicePanel {
   readonly element: HTMLElement;
-  /** The slice image alone, one pixel a voxel; also the texture of the plane in the 3D view. */
+  /** The slice image alone, one pixel a voxel; also the texture of the slice in the 3D view. */
   readonly picture = document.createElement('canvas');
   readonly orientation: SliceOrientation;
-  /** Draws additional content over the slice. */
+  /** Draws additional content over the slice image, such as the region of interest. */
   overlay: Overlay = () => undefined;
   readonly #volume: VolumeView;
   readonly #inverse: Float64Array;
@@ -52,7 +55,7 @@ export class SlicePanel {
   #outline: Float32Array = new Float32Array(0);
   #attractors: Attractor[] = [];
   #uncovered: readonly UncoveredRegion[] = [];
-  /** The coarser level that is shown instead of the volume. */
+  /** Voxels shown instead of the volume's: those of a coarser pyramid level, or of one frame. */
   #level: LevelView | undefined;
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
@@ -93,7 +96,10 @@ export class SlicePanel {
     this.#describe();
   }
 
-  /** Shows a coarser level voxel by voxel, or the volume itself. */
+  /**
+   * Shows the voxels of a coarser pyramid level or of one frame in place of the volume's; undefined returns to the
+   * volume.
+   */
   setLevel(level: LevelView | undefined): void {
     this.#level = level;
     this.#paint(this.#crosshair[this.orientation.axis]);
@@ -111,8 +117,8 @@ export class SlicePanel {
   }
 
   /**
-   * Draws the image, the crosshair, the outline and all overlays on the visible canvas, at the resolution of the
-   * screen, but at most two pixels per CSS pixel.
+   * Draws the slice image, the crosshair, the surface's outline and all overlays on the visible canvas, at the
+   * resolution of the screen, but at most two pixels per CSS pixel.
    */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
@@ -184,8 +190,8 @@ export class SlicePanel {
   }
 
   /**
-   * Returns the position of the image in the canvas and the voxel size, in CSS pixels; voxels have their true
-   * proportions.
+   * Returns the position of the slice image in the canvas and the voxel size there, in CSS pixels; voxels have their
+   * true proportions.
    */
   #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
     const { width, height } = this.picture;
@@ -297,7 +303,9 @@ export class SlicePanel {
       });
   }
 
-  /** Returns the tolerance for grabbing, in voxels along the two sides of the image; 0 across it. */
+  /**
+   * Returns the tolerance for grabbing an object on the slice, in voxels along the two sides of the image; 0 across it.
+   */
   #slack(): Vec3 {
     const { scaleX, scaleY } = this.#placement();
     const slack: Vec3 = [0, 0, 0];
@@ -307,8 +315,8 @@ export class SlicePanel {
   }
 
   /**
-   * Converts a canvas position, also outside the image, to voxel coordinates, not rounded; the centre of the first
-   * voxel is at 0.
+   * Converts a position on the canvas in CSS pixels, also outside the slice image, to voxel coordinates, not rounded;
+   * the centre of the first voxel is at 0.
    */
   #placeAt(canvasX: number, canvasY: number): Vec3 {
     const { x, y, scaleX, scaleY } = this.#placement();
@@ -321,7 +329,7 @@ export class SlicePanel {
     return place;
   }
 
-  /** Returns the voxel of the image nearest to a canvas position. */
+  /** Returns the index of the voxel in the slice image nearest to a position on the canvas in CSS pixels. */
   #voxelAt(canvasX: number, canvasY: number): Vec3 {
     const place = this.#placeAt(canvasX, canvasY);
     return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
@@ -329,8 +337,8 @@ export class SlicePanel {
 }
 
 /**
- * Describes width and height of the surface's cross-section in voxels, for screen readers. Points as returned by
- * {@link projectSegments}.
+ * Describes width and height of the surface's cross-section with a slice, in voxels, for screen readers. `points` are
+ * as returned by {@link projectSegments}, `width` and `height` those of the slice.
  */
 function describeOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
   if (points.length === 0) return text('view.noOutline');

@@ -1,7 +1,7 @@
 import { RepeatWrapping, SRGBColorSpace, Texture } from 'three';
 import type { MeshTexture } from '../sculpt/protocol';
 
-/** Decodes the texture of a mesh for three.js; v points downwards, as in glTF. */
+/** Decodes the texture of a mesh for three.js; v points downwards in the texture coordinates, as in glTF. */
 export async function pictureOf({ type, bytes }: MeshTexture): Promise<Texture> {
   const blob = new Blob([bytes as Uint8Array<ArrayBuffer>], { type });
   const texture = new Texture(await createImageBitmap(blob));

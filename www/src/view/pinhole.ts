@@ -2,9 +2,12 @@
 import { Matrix4, type PerspectiveCamera, Vector3 } from 'three';
 import type { Vec3 } from '../protocol';
 
-/** A pinhole camera: a 3 × 4 projection matrix and the size of its image. */
+/** A pinhole camera: a 3 × 4 projection matrix, and width and height of its image in pixels. */
 export interface PinholeCamera {
-  /** World to pixel, row-major; x to the right, y down, the centre of the first pixel at (0, 0). */
+  /**
+   * 3 × 4 matrix from world to pixel coordinates, row-major; x to the right, y down, the centre of the first pixel at
+   * (0, 0).
+   */
   projection: ArrayLike<number>;
   width: number;
   height: number;
@@ -55,8 +58,9 @@ function centreOf(p: ArrayLike<number>): Vector3 {
 }
 
 /**
- * Gives `target` the pose and projection of `camera`. If the view has another aspect ratio than the camera's image, it
- * shows more at the left and right, or at the top and bottom. `world` maps the camera's world space to the scene.
+ * Gives `target`, a camera of three.js, the pose and projection of `camera`. If the view's `aspect` differs from that
+ * of the camera's image, the view shows more at the left and right, or at the top and bottom. `world` maps the camera's
+ * world space to the scene.
  */
 export function applyPinhole(
   target: PerspectiveCamera,

@@ -64,7 +64,7 @@ export class SlicePlane {
     this.object.add(rectangle, new LineLoop(this.#outline, this.#line), this.#section.object);
   }
 
-  /** Moves the rectangle to the slice with the given index, and uploads the image, which the caller has repainted. */
+  /** Moves the rectangle to the slice with the given index, and uploads its texture, which the caller has repainted. */
   moveTo(index: number): void {
     this.#index = index;
     const position = this.#geometry.getAttribute('position') as BufferAttribute;
@@ -81,12 +81,12 @@ export class SlicePlane {
     this.#texture.needsUpdate = true;
   }
 
-  /** Shows the cross-section of the surface with this slice, pairs of world points. */
+  /** Shows the cross-section of the surface with this slice, given as pairs of world points, packed xyz. */
   showSection(segments: Float32Array): void {
     this.#section.show(segments);
   }
 
-  /** Places the slice at its position in the volume, or on the wall of the volume farther from the viewer. */
+  /** Places the slice at its position in the volume, or on the wall of the volume's box farther from the viewer. */
   stand(place: 'in place' | 'walls', viewer: Vector3): void {
     this.object.position.set(0, 0, 0);
     if (place === 'in place') return;
@@ -107,7 +107,10 @@ export class SlicePlane {
     this.#line.dispose();
   }
 
-  /** Returns the world position of a corner of the image: u, v = 0 or 1 from its left and top. */
+  /**
+   * Returns the world position of a corner of the slice with the given index: u = 0 at its left, 1 at its right; v = 0
+   * at its top, 1 at its bottom.
+   */
   #corner(index: number, u: 0 | 1, v: 0 | 1): Vec3 {
     const at: Vec3 = [0, 0, 0];
     at[this.#frame.axis] = index;

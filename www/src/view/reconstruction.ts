@@ -12,11 +12,11 @@ import { Viewport } from './viewport';
 /** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
 const OUTLIER_FRACTION = 0.02;
 /**
- * Diameter of a point's disc, as a fraction of the diagonal of the points' box: two to three pixels. Smaller ones are
- * hard to see, larger ones hide the surface.
+ * Diameter of a point's disc, as a fraction of the diagonal of the points' bounding box: two to three pixels. Smaller
+ * discs are hard to see, larger ones hide the surface.
  */
 const DISC = 0.014;
-/** Number of points above which the discs are smaller, so that they do not cover everything. */
+/** Number of points above which their discs are drawn smaller, so that they do not cover everything. */
 const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
 
@@ -29,10 +29,10 @@ export interface CloudViewOptions {
   color: SurfaceColor;
 }
 
-/** Points to show, their cameras, and the orientation of the view. */
+/** Points to show in the Reconstruct lab's 3D view, their cameras, and the orientation of the view. */
 export interface ShownCloud {
   points: Float32Array;
-  /** sRGB of each point, 0..1. */
+  /** Colours of the points, packed sRGB, 0..1; missing if there are none. */
   colors?: Float32Array | undefined;
   cameras: readonly PinholeCamera[];
   up: 'y' | 'z';
@@ -40,10 +40,10 @@ export interface ShownCloud {
   front: 1 | -1;
 }
 
-/** Result of a click in the view. */
+/** Position of a click in the Reconstruct lab's 3D view, in world space, for editing points. */
 export interface Hit {
   point: Vec3;
-  /** Outward normal, if the point is on the surface. */
+  /** Outward normal of the surface at the point; missing if the click missed the surface. */
   normal?: Vec3;
 }
 
@@ -58,7 +58,7 @@ export class ReconstructionView {
   readonly #outsideByHand = new PointCloud();
   readonly #cameras = new CameraMarks();
   readonly legend = new Legend(diverging);
-  /** Called with the point that was clicked. */
+  /** Called with the position of a click on the surface or beside it; undefined if clicks have no effect. */
   onPick: ((hit: Hit) => void) | undefined;
   #options: CloudViewOptions;
   #box = new Box3();
@@ -78,7 +78,7 @@ export class ReconstructionView {
     onSchemeChange(() => this.#recolor());
   }
 
-  /** Called when the view leaves the pose of a photograph. */
+  /** Callback for when the view leaves the pose of a photograph's camera. */
   set onLeave(callback: () => void) {
     this.#viewport.onLeave = callback;
   }
@@ -106,7 +106,7 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Shows manual edits, emphasised: points added, and points marked as outside. */
+  /** Shows the user's edits of the points, emphasised: points added, and points marked as outside, both packed xyz. */
   showByHand(added: Float32Array, outside: Float32Array): void {
     this.#addedByHand.show(added);
     this.#outsideByHand.show(outside);
@@ -148,7 +148,10 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Sets the view to the pose of a camera and highlights the pyramid with this index, or returns to free rotation. */
+  /**
+   * Sets the view to the pose of a camera and highlights the pyramid of the camera with this index; undefined returns
+   * to free rotation.
+   */
   lookThrough(camera: PinholeCamera | undefined, index: number | undefined): void {
     this.#cameras.choose(index);
     // Photographs contain shading already: next to one, colours are shown unlit.
@@ -157,7 +160,7 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Diagonal of the box that contains most points, world units. */
+  /** Diagonal of the bounding box of the points without outliers, in world units. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
@@ -178,8 +181,8 @@ export class ReconstructionView {
   }
 
   /**
-   * Reports the intersection of a ray with the surface, or else with the plane through the centre of the points' box,
-   * perpendicular to the ray.
+   * Reports the point at which a ray intersects the surface or else the plane perpendicular to the ray through the
+   * centre of the points' bounding box.
    */
   #pick(ray: Raycaster): void {
     if (!this.onPick) return;

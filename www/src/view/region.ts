@@ -7,7 +7,9 @@ import { token } from '../ui/dom';
 import { type Axis, type SliceOrientation, toWorld } from './anatomy';
 import type { Grip } from './panel';
 
-/** Smallest size of the region along an axis, voxels; a smaller one contains no window with a boundary. */
+/**
+ * Smallest size of the region of interest along an axis, voxels; a smaller region contains no window with a boundary.
+ */
 const MIN_VOXELS = 4;
 
 export class RegionGrips {
@@ -21,8 +23,9 @@ export class RegionGrips {
   }
 
   /**
-   * Returns a grip on the sides of the box that are within `slack` of the position `place` (both in voxels), on a slice
-   * across the axis `across`; undefined if there are none.
+   * Returns a grip by which those sides of the region can be dragged that are within `slack` of the position `place`
+   * (both in voxels), on a slice across the axis `across`; undefined if there are none. `dims` are the volume's
+   * dimensions.
    */
   grab(place: Vec3, slack: Vec3, across: Axis, dims: Vec3): Grip | undefined {
     const start = this.region;
@@ -53,7 +56,7 @@ export class RegionGrips {
     };
   }
 
-  /** Draws the box's outline on a slice image; the scales are the voxel size on the canvas. */
+  /** Draws the region's outline on a slice image; the scales are the voxel size on the canvas. */
   draw(
     context: CanvasRenderingContext2D,
     orientation: SliceOrientation,
@@ -84,7 +87,10 @@ function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims
   return ends;
 }
 
-/** Returns the twelve edges of the box around the voxels, as pairs of world points. */
+/**
+ * Returns the twelve edges of a box of voxels, `low` to `high`, as pairs of world points, packed xyz; `affine` maps
+ * voxel indices to world space.
+ */
 export function regionEdges({ low, high }: VoxelBox, affine: ArrayLike<number>): Float32Array {
   const corner = (i: number) =>
     toWorld(affine, low.map((from, k) => ((i >> k) & 1 ? (high[k] ?? 0) + 0.5 : from - 0.5)) as Vec3);

@@ -5,16 +5,16 @@ import { h } from '../ui/dom';
 const NONE = text('view.noWebGl');
 const LOST = text('view.contextLost');
 
-/** WebGL 2 rendering on a canvas; handles a missing context, and one that is lost and restored. */
+/** WebGL 2 rendering on a canvas; handles a missing graphics context, and one that is lost and restored. */
 export class WebGlRendering {
   readonly #canvas: HTMLCanvasElement;
   readonly #renderer: WebGLRenderer | undefined;
-  /** Message shown in place of the rendering. */
+  /** Message shown in place of the rendering if there is no graphics context. */
   readonly #note = h('p', { class: 'view-note', role: 'alert' });
   #inSoftware: boolean | undefined;
   #disposed = false;
 
-  /** `onBack` is called when the context has been restored and the scene must be rendered again. */
+  /** `onBack` is called when a lost graphics context has been restored and the scene must be rendered again. */
   constructor(canvas: HTMLCanvasElement, onBack: () => void) {
     this.#canvas = canvas;
     this.#renderer = rendererFor(canvas);
@@ -35,14 +35,17 @@ export class WebGlRendering {
     else this.#showNote(NONE);
   }
 
-  /** Whether rendering is done without a GPU. Queried on first use only, because it blocks the page. */
+  /**
+   * Whether WebGL renders without a GPU, so that rendering is slow. Queried on first use only, because it blocks the
+   * page.
+   */
   get inSoftware(): boolean {
     if (!this.#renderer) return false;
     this.#inSoftware ??= isSoftware(this.#renderer.getContext());
     return this.#inSoftware;
   }
 
-  /** Frees the GPU memory; browsers limit the number of contexts of a page. */
+  /** Releases the graphics context and its GPU memory; browsers limit the number of contexts of a page. */
   dispose(): void {
     this.#disposed = true;
     this.#renderer?.dispose();
@@ -57,8 +60,8 @@ export class WebGlRendering {
 }
 
 /**
- * Creates the renderer, or returns undefined without WebGL 2. The context is requested here because three.js logs an
- * error if there is none.
+ * Creates the renderer of three.js, or returns undefined without WebGL 2. The graphics context is requested here
+ * because three.js logs an error if there is none.
  */
 function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
   const context = canvas.getContext('webgl2', { alpha: true, antialias: true, depth: true, stencil: false });
@@ -69,7 +72,10 @@ function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
   return renderer;
 }
 
-/** Whether the context renders without a GPU: with SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+/**
+ * Returns whether a graphics context renders without a GPU: with SwiftShader in Chromium, llvmpipe in Mesa, WARP in
+ * Windows.
+ */
 function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
   const info = context.getExtension('WEBGL_debug_renderer_info');
   const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);

@@ -10,10 +10,11 @@ import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
-/** Distance between the centres of adjacent meshes in a row, relative to their width. */
+/** Distance between the centres of adjacent meshes shown in a row, relative to their width. */
 const ROW_SPACING = 1.25;
 /**
- * Tangent of the angle by which the initial view is rotated to the side, so that a face is seen almost from the front.
+ * Tangent of the angle by which the initial view is rotated to the side; small, so that a face is seen almost from the
+ * front.
  */
 const VIEW_ANGLE = 0.35;
 
@@ -25,13 +26,13 @@ export interface SculptViewOptions {
 }
 
 /**
- * Names of the meshes that can be shown: as in the paper, with `dash` for the prime of the deformed ones, and A to E
- * for up to five stages of a computation.
+ * Names of the meshes that the Sculpt lab's view can show: as in the paper, with `dash` for the prime of the deformed
+ * ones, and A to E for up to five stages of a computation.
  */
 const MESHES = ['S1', 'S0', 'T', 'S0dash', 'S1dash', 'A', 'B', 'C', 'D', 'E'] as const;
 type MeshName = (typeof MESHES)[number];
 
-/** Meshes of the stages, from left to right. */
+/** Names of the meshes that show the stages of a computation, from left to right. */
 const STAGES: readonly MeshName[] = ['A', 'B', 'C', 'D', 'E'];
 const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = {
   result: ['S1dash'],
@@ -40,7 +41,7 @@ const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = 
   row: ['S1', 'S0', 'T', 'S0dash', 'S1dash'],
 };
 
-/** Captions of the meshes; those of the stages A to E come with the stages. */
+/** Captions of the meshes shown in a row; those of the stages A to E come with the stages. */
 const CAPTIONS: Partial<Record<MeshName, string>> = {
   S1: text('view.meshOriginal'),
   S0: text('view.meshBase'),
@@ -55,7 +56,7 @@ const CAPTIONS: Partial<Record<MeshName, string>> = {
 export class SculptureView {
   readonly legend = new Legend(diverging);
   readonly handles: EllipsoidHandles;
-  /** Called with the index of the ellipsoid that was clicked, or with undefined. */
+  /** Called when the view is clicked, with the index of the ellipsoid there, or undefined if there is none. */
   onPick: (index: number | undefined) => void = () => undefined;
   /**
    * Called whenever the captions of the meshes in the row may have changed; with an empty list if a single mesh is
@@ -65,9 +66,9 @@ export class SculptureView {
   readonly #viewport: Viewport;
   readonly #meshes = new Map<MeshName, { holder: Group; surface: SurfaceObject; has: boolean }>();
   #options: SculptViewOptions;
-  /** Captions of the stages shown, from left to right. */
+  /** Captions of the stages of a computation that are shown, from left to right. */
   #stages: string[] = [];
-  /** Whether y points upwards. */
+  /** Whether the scene's upward axis is y, not z. */
   #upright = false;
   #box = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
 
@@ -92,7 +93,10 @@ export class SculptureView {
     onSchemeChange(() => this.#recolor());
   }
 
-  /** Handler called first for key events, with the directions to the right, upwards and towards the viewer. */
+  /**
+   * Handler called first for key events, with the directions in the scene to the right, upwards and towards the viewer;
+   * returns whether it has handled the key, which the view then ignores.
+   */
   set takesKey(takes: (event: KeyboardEvent, directions: Vec3[]) => boolean) {
     this.#viewport.takesKey = (event) =>
       takes(
@@ -102,8 +106,8 @@ export class SculptureView {
   }
 
   /**
-   * Opens another scene and discards everything of the previous one. The view is fitted to the surface in the pose
-   * `start`, whose bounding box is `box`, and in all `poses`.
+   * Opens another scene and discards everything of the previous one. `box` is the bounding box of the surface in the
+   * pose `start` of the ellipsoids; the view is fitted to the surface in this pose and in all `poses`.
    */
   setScene(box: { min: Vec3; max: Vec3 }, up: 'y' | 'z', start: Pose, poses: Pose[]): void {
     this.#box = boxOfAllPoses(box, start, poses);
@@ -131,13 +135,13 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
-  /** Moves the vertices of a surface that is shown to other positions. */
+  /** Moves the vertices of a surface that is shown to other positions, packed xyz, until the next surface is shown. */
   move(name: MeshName, positions: Float32Array): void {
     this.#meshes.get(name)?.surface.move(positions);
     this.#viewport.invalidate();
   }
 
-  /** Shows stages of a computation in a row, with their captions. */
+  /** Shows stages of a computation as meshes in a row, with their captions. */
   showStages(stages: { caption: string; surface: Surface }[]): void {
     const refit = stages.length !== this.#stages.length;
     this.#stages = stages.map(({ caption }) => caption);
@@ -150,12 +154,12 @@ export class SculptureView {
     if (refit) this.#fitView();
   }
 
-  /** Calls `change` at the next animation frame, which then shows its effect. */
+  /** Calls `change` at the next animation frame, and renders the scene in the same frame. */
   change(change: () => void): void {
     this.#viewport.changeAndDraw(change);
   }
 
-  /** Texture of all meshes that have texture coordinates; null for none. */
+  /** Texture of all meshes shown that have texture coordinates; null for none. */
   set texture(texture: Texture | null) {
     for (const { surface } of this.#meshes.values()) surface.texture = texture;
     this.#viewport.invalidate();
@@ -178,12 +182,12 @@ export class SculptureView {
     if (refit) this.#fitView();
   }
 
-  /** Diagonal of the bounding box of the surface in all poses with which the scene was opened. */
+  /** Diagonal of the estimated bounding box of the surface in all poses with which the scene was opened. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
 
-  /** Centre of the bounding box of the surface in all poses with which the scene was opened. */
+  /** Centre of the estimated bounding box of the surface in all poses with which the scene was opened. */
   get middle(): Vec3 {
     return this.#box.getCenter(new Vector3()).toArray();
   }
@@ -212,7 +216,10 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
-  /** Places the meshes of the row along the view's horizontal direction. */
+  /**
+   * Places the meshes of the row side by side along the view's horizontal direction, and the handles at the mesh they
+   * deform.
+   */
   #placeInRow(): void {
     const row = this.#row;
     const [right] = this.#viewport.directions();
@@ -272,8 +279,8 @@ export class SculptureView {
 }
 
 /**
- * Returns an estimated bounding box of the surface in all poses: the margin around the ellipsoids is that of the start
- * pose.
+ * Returns an estimated bounding box of the surface in the pose `start` of the ellipsoids, where it is `box`, and in all
+ * `poses`, with the same margin around the ellipsoids as in the start pose; the view is fitted to it.
  */
 function boxOfAllPoses(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
   const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));

@@ -2,12 +2,12 @@
 import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 
-/** Values at the vertices that can be shown as colours. */
+/** Quantities with a value at each vertex that can be shown as colours. */
 export type ShownQuantity = VertexQuantity | 'distance' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
-/** Colours at −1, −½, 0, ½ and 1, sRGB 0..255. */
+/** Colours of the colour map at −1, −½, 0, ½ and 1, sRGB 0..255. */
 const STOPS: readonly Rgb[] = [
   [33, 102, 172],
   [103, 169, 207],
@@ -17,15 +17,16 @@ const STOPS: readonly Rgb[] = [
 ];
 
 /**
- * Quantile of the magnitudes that bounds the range shown, so that a few extreme vertices do not make all others pale.
+ * Quantile of the magnitudes of the values that bounds the range of the colour scale, so that a few extreme vertices do
+ * not make all others pale.
  */
 const WITHIN = 0.98;
 /** Number of values sampled to find the range of the colour scale; up to twice as many if they do not divide evenly. */
 const SAMPLES = 4096;
-/** Number of steps of the colour table. */
+/** Number of steps of the table of colours from −1 to 1. */
 const TABLE = 256;
 
-/** Title, labels and smallest range of the legend for each kind of value. */
+/** Title, labels and smallest range of the legend for each quantity shown as colours. */
 export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
   speed: { title: text('view.speed'), below: text('view.inwards'), above: text('view.outwards'), least: 1e-4 },
   'mean curvature': {
@@ -68,23 +69,24 @@ export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
 interface QuantityText {
   title: string;
   /**
-   * Unit of the values, as a power of inverse length: −1 for lengths, 2 for inverse areas; undefined if none is shown.
+   * Unit of the quantity's values, as a power of inverse length: −1 for lengths, 2 for inverse areas; undefined if none
+   * is shown.
    */
   power?: 1 | 2 | -1;
   below: string;
   above: string;
-  /** Smallest magnitude at the ends of the colour scale. */
+  /** Smallest magnitude that the ends of the colour scale can have. */
   least: number;
-  /** Whether values are never negative: only the upper half of the colours is used. */
+  /** Whether values are never negative, so that only the upper half of the colours is used. */
   positive?: boolean;
 }
 
-/** Whether a colouring represents values. */
+/** Returns whether a colouring of the surface represents values of a quantity, which need a legend. */
 export function isQuantity(color: string): color is ShownQuantity {
   return color in QUANTITIES;
 }
 
-/** Returns the legend's title with the unit, for lengths in `unit`. */
+/** Returns the title of a quantity's legend with the unit of its values, where lengths have the unit `unit`. */
 export function quantityTitle(quantity: ShownQuantity, unit: string): string {
   const { title, power } = QUANTITIES[quantity];
   if (!power) return title;
@@ -92,7 +94,7 @@ export function quantityTitle(quantity: ShownQuantity, unit: string): string {
   return text(power === 2 ? 'view.perUnitSquared' : 'view.perUnit', { title, unit: unit || text('view.unknownUnit') });
 }
 
-/** Returns the colour for t, clamped to −1..1, as sRGB 0..255. */
+/** Returns the colour of the diverging colour map for t, clamped to −1..1, as sRGB 0..255. */
 export function diverging(t: number): [number, number, number] {
   const at = (Math.min(1, Math.max(-1, t)) + 1) * 2;
   const i = Math.min(STOPS.length - 2, Math.floor(at));
@@ -106,8 +108,8 @@ const LINEAR = Float32Array.from({ length: 3 * (TABLE + 1) }, (_, i) => {
 });
 
 /**
- * Returns the magnitude at the ends of the colour scale: one that bounds nearly all values and is at least `least`,
- * rounded up to 1, 2 or 5 times a power of ten.
+ * Returns the magnitude at the ends of the colour scale for values at vertices: it bounds nearly all of them and is at
+ * least `least`, rounded up to 1, 2 or 5 times a power of ten.
  */
 export function robustRange(values: Float32Array, least: number): number {
   const stride = Math.max(1, Math.floor(values.length / SAMPLES));
@@ -127,8 +129,8 @@ function roundUp(value: number): number {
 }
 
 /**
- * Writes the colour of each value into `out`, linear rgb, three numbers each; ±`range` are the ends of the colour
- * scale.
+ * Writes the colour of each vertex's value into `out`, linear rgb, packed; ±`range` are the values at the ends of the
+ * colour scale.
  */
 export function shadeColors(values: Float32Array, range: number, out: Float32Array): void {
   for (let vertex = 0; vertex < values.length; vertex++) {
@@ -141,7 +143,7 @@ export function shadeColors(values: Float32Array, range: number, out: Float32Arr
   }
 }
 
-/** Converts sRGB colours, 0..1, to linear rgb in `out`. */
+/** Converts packed sRGB colours, 0..1, to linear rgb in `out`. */
 export function linearColors(colors: Float32Array, out: Float32Array): void {
   for (let i = 0; i < colors.length; i++) out[i] = Math.max(0, colors[i] ?? 0) ** 2.2;
 }

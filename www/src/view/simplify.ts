@@ -3,14 +3,15 @@
  * (Rossignac and Borrel 1993).
  */
 
-/** Number of edges sampled for the mean edge length; up to twice as many if they do not divide evenly. */
+/** Number of edges sampled to estimate the mean edge length; up to twice as many if they do not divide evenly. */
 const SAMPLES = 1000;
 /**
- * The cells for clustering are chosen so that the area of a cell's side is this factor times the squared mean edge
- * length, times the ratio of the present number of triangles to the target; about the target then remains.
+ * Sets the size of the grid cells in which vertices are merged: the area of a cell's side is this factor times the
+ * squared mean edge length, times the ratio of the present number of triangles to the target; about the target then
+ * remains.
  */
 const TRIANGLES_PER_CELL = 1.5;
-/** Ratio of triangles to the target above which larger cells are tried. */
+/** Ratio of the remaining number of triangles to the target above which larger cells are tried. */
 const MOST_EXCESS = 1.5;
 
 export interface FineMesh {
@@ -18,13 +19,14 @@ export interface FineMesh {
   normals: Float32Array;
   indices: Uint32Array;
   vertices: number;
-  /** Number of `indices` in use. */
+  /** Number of `indices` in use, three per triangle. */
   corners: number;
 }
 
 /**
- * Returns the corners of about `triangles` triangles. The vertices in a grid cell are merged into one of them,
- * separately for the six main directions of their normals, so that the two sides of a thin sheet stay apart.
+ * Returns a simplified mesh of about `triangles` triangles as vertex indices, three per triangle. The vertices in a
+ * grid cell are merged into one of them, separately for the six main directions of their normals, so that the two sides
+ * of a thin sheet stay apart.
  */
 export function simplifiedIndices(fine: FineMesh, triangles: number): Uint32Array {
   const cell = meanEdge(fine) * Math.sqrt((TRIANGLES_PER_CELL * fine.corners) / 3 / triangles);
@@ -63,7 +65,10 @@ function meanEdge({ positions, indices, corners }: FineMesh): number {
   return sum / Math.max(1, count) || 1;
 }
 
-/** Returns for each vertex the first vertex in its cell whose normal has the same main direction. */
+/**
+ * Returns for each vertex the one it is merged into: the first vertex in its grid cell whose normal has the same main
+ * direction. `cell` is the side of a cell, in mesh units.
+ */
 function clusterRepresentatives({ positions, normals, vertices }: FineMesh, cell: number): Uint32Array {
   const [low, wide] = extent(positions, vertices);
   const side = Math.floor(wide / cell) + 1;
@@ -80,7 +85,7 @@ function clusterRepresentatives({ positions, normals, vertices }: FineMesh, cell
   return representatives;
 }
 
-/** Returns the lowest corner of the bounding box of the points, and its longest side. */
+/** Returns the lowest corner and the longest side of the bounding box of the first `vertices` points, packed xyz. */
 function extent(positions: Float32Array, vertices: number): [number[], number] {
   const [low, high] = [Array(3).fill(Number.POSITIVE_INFINITY), Array(3).fill(Number.NEGATIVE_INFINITY)];
   for (let i = 0; i < 3 * vertices; i++) {
@@ -91,7 +96,10 @@ function extent(positions: Float32Array, vertices: number): [number[], number] {
   return [low, Math.max(0, ...low.map((value, axis) => high[axis] - value))];
 }
 
-/** Returns the face of a cube around the origin that the normal intersects: 0 to 5 for −x, x, −y, y, −z, z. */
+/**
+ * Returns the main direction of the normal at index `i` of `normals`, the face of a cube around the origin that it
+ * intersects: 0 to 5 for −x, x, −y, y, −z, z.
+ */
 function dominantFace(normals: Float32Array, i: number): number {
   const [x, y, z] = [normals[i] ?? 0, normals[i + 1] ?? 0, normals[i + 2] ?? 0];
   const [ax, ay, az] = [Math.abs(x), Math.abs(y), Math.abs(z)];

@@ -4,14 +4,14 @@ import type { SliceOrientation } from './anatomy';
 
 type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
 
-/** Returns the size of slice images in this direction, voxels. */
+/** Returns the size, in voxels, of slice images of a volume in an orientation. */
 export function pictureSize(volume: Voxels, orientation: SliceOrientation): { width: number; height: number } {
   return { width: volume.dims[orientation.horizontal.axis], height: volume.dims[orientation.vertical.axis] };
 }
 
 /**
- * Paints a slice as grey RGBA pixels, row by row, oriented as specified by `orientation`. `out` holds 4 × width ×
- * height bytes.
+ * Paints the slice with the given index as grey RGBA pixels, row by row, oriented as specified by `orientation`. `out`
+ * holds 4 × width × height bytes.
  */
 export function paintSlice(volume: Voxels, orientation: SliceOrientation, index: number, out: Uint8ClampedArray): void {
   const { width, height } = pictureSize(volume, orientation);
@@ -33,7 +33,10 @@ export function paintSlice(volume: Voxels, orientation: SliceOrientation, index:
   }
 }
 
-/** Returns the grey values of a slice, 0..255, row by row, oriented as specified by `orientation`. */
+/**
+ * Returns the grey values, 0..255, of the slice with the given index, row by row, oriented as specified by
+ * `orientation`.
+ */
 export function greysOf(volume: Voxels, orientation: SliceOrientation, index: number): Uint8Array {
   const { width, height } = pictureSize(volume, orientation);
   const rgba = new Uint8ClampedArray(4 * width * height);
@@ -41,15 +44,18 @@ export function greysOf(volume: Voxels, orientation: SliceOrientation, index: nu
   return Uint8Array.from({ length: width * height }, (_, i) => rgba[4 * i] ?? 0);
 }
 
-/** Returns the index of the slice of a coarser pyramid level at the position of the volume's slice `index`. */
+/**
+ * Returns the index of that slice of a coarser pyramid level, `level`, which is at the position of the volume's slice
+ * `index`.
+ */
 export function levelIndex(volume: Voxels, level: LevelView, orientation: SliceOrientation, index: number): number {
   const last = level.dims[orientation.axis] - 1;
   return Math.min(last, Math.floor(((index + 0.5) * level.dims[orientation.axis]) / volume.dims[orientation.axis]));
 }
 
 /**
- * Paints the slice of a coarser pyramid level at the position of the volume's slice `index`, stretched to the size of
- * the volume's slices so that its voxels are visible.
+ * Paints that slice of a coarser pyramid level, `level`, which is at the position of the volume's slice `index`,
+ * stretched to the size of the volume's slices so that its voxels are visible.
  */
 export function paintLevel(
   volume: Voxels,
@@ -65,7 +71,7 @@ export function paintLevel(
   context.drawImage(small, 0, 0, picture.width, picture.height);
 }
 
-/** Renders a slice as an image on a new canvas. */
+/** Returns a new canvas with the slice with the given index as a grey image, one pixel a voxel. */
 export function slicePicture(volume: Voxels, orientation: SliceOrientation, index: number): HTMLCanvasElement {
   const { width, height } = pictureSize(volume, orientation);
   const canvas = document.createElement('canvas');
@@ -78,9 +84,9 @@ export function slicePicture(volume: Voxels, orientation: SliceOrientation, inde
 }
 
 /**
- * Returns the ellipse in which an attractor's ball of influence intersects a slice, in the coordinates of
- * {@link projectSegments}, or undefined if there is none. `near`: the attractor itself lies within half a voxel of the
- * slice.
+ * Returns the ellipse in which the ball of radius `radius` (world units) around an attractor's `point` intersects a
+ * slice, in the image coordinates of {@link projectSegments}, or undefined if it does not. `near`: the point lies
+ * within half a voxel of the slice. `inverse` maps world space to voxel indices.
  */
 export function ballSection(
   { point, radius }: Pick<Attractor, 'point' | 'radius'>,
@@ -102,8 +108,9 @@ export function ballSection(
 }
 
 /**
- * Projects world segments (pairs of points) onto a slice: image coordinates in voxels, x y x y per segment; (0, 0) is
- * the image's top left corner, so that the first voxel's centre is at (½, ½).
+ * Projects segments in world space (pairs of points, packed xyz) onto a slice image, to draw the surface's outline:
+ * returns image coordinates in voxels, x y x y per segment; (0, 0) is the image's top left corner, so that the first
+ * voxel's centre is at (½, ½).
  */
 export function projectSegments(
   segments: Float32Array,

@@ -21,20 +21,23 @@ export class Stage {
   readonly #uncoveredMarks = new UncoveredMarks();
   /** Legend of the surface's colours. */
   readonly legend = new Legend(diverging);
-  /** If set, receives the point clicked in a slice or on the surface; used for placing attractors. */
+  /** If set, receives the world point clicked in a slice or on the surface; used for placing attractors. */
   onPlace: ((point: Vec3) => void) | undefined;
   /** Unit of length in the volume's world space, for the legend. */
   unit = '';
-  /** Called whenever the slices have moved. */
+  /** Called whenever the crosshair, and with it the slices, may have moved. */
   onMoved: () => void = () => undefined;
   readonly #onPlanes: (planes: Plane[]) => void;
   #options: ViewOptions;
   #scene: VolumeScene | undefined;
   #attractors: Attractor[] = [];
-  /** Voxel index where the three slices intersect. */
+  /** Index of the voxel in which the three slices intersect. */
   #crosshair: Vec3 = [0, 0, 0];
 
-  /** `onPlanes` is called with the planes of the slices whenever they move. */
+  /**
+   * `onPlanes` is called with the planes of the three slices whenever they move, so that the surface's cross-sections
+   * can be computed.
+   */
   constructor(
     canvas: HTMLCanvasElement,
     slices: HTMLElement,
@@ -75,7 +78,7 @@ export class Stage {
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
 
-  /** Shows a surface; its arrays are used without a copy until the next one is shown. */
+  /** Shows another surface; its arrays are used without a copy until the next one is shown. */
   showSurface(surface: Surface): void {
     this.#surface.show(surface);
     this.#showLegend();
@@ -121,14 +124,17 @@ export class Stage {
     this.#viewport.setPivot(point);
   }
 
-  /** Shows a coarser pyramid level in the slices, or the volume itself. */
+  /** Shows a coarser pyramid level in the slices, or with undefined the volume itself. */
   showLevel(level: LevelView | undefined): void {
     for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
     for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
     this.#viewport.invalidate();
   }
 
-  /** Renders the axial slice through the crosshair as a small image, of the volume or of a coarser level. */
+  /**
+   * Returns the axial slice through the crosshair as a small image, of a coarser pyramid level or, with undefined, of
+   * the volume; undefined if there is no volume.
+   */
   thumbnail(level: LevelView | undefined): HTMLCanvasElement | undefined {
     const scene = this.#scene;
     const frame = scene?.panels.find((panel) => panel.orientation.name === 'Axial')?.orientation;
@@ -138,7 +144,7 @@ export class Stage {
     return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index));
   }
 
-  /** Moves the crosshair to a world point, clamped to the volume. */
+  /** Moves the crosshair to the voxel nearest to a world point, and with it the slices. */
   goTo(point: Vec3): void {
     const scene = this.#scene;
     if (!scene) return;
@@ -148,7 +154,7 @@ export class Stage {
     );
   }
 
-  /** The crosshair in world space. */
+  /** World position of the crosshair, the voxel in which the three slices intersect. */
   get crosshair(): Vec3 {
     return this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : [0, 0, 0];
   }
@@ -179,8 +185,8 @@ export class Stage {
   }
 
   /**
-   * Moves the crosshair to the voxel under the pointer; while attractors are being placed, only a press counts, and
-   * places one.
+   * Handles the pointer on the voxel `index` of a slice: moves the crosshair there; while attractors are being placed,
+   * only a press counts, and also places one.
    */
   #point(index: Vec3, pressed: boolean): void {
     if (this.onPlace && !pressed) return;

@@ -49,20 +49,20 @@ export class SurfaceObject {
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
-  /** Shows vertex colours unlit. */
+  /** Material that shows vertex colours unlit. */
   readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
   #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
   /**
-   * The surface's geometry. It has normals from the start: a shader compiled for a surface without them would always
-   * draw flat triangles.
+   * Geometry of the surface in full. It has normals from the start: a shader compiled for a surface without them would
+   * always draw flat triangles.
    */
   #fine = emptyGeometry();
-  /** Simplified geometry, drawn in place of the fine one while it exists. */
+  /** Simplified geometry, drawn in place of the full one while it exists. */
   #coarse: BufferGeometry | undefined;
   readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
-  /** Number of vertices in use in the buffers. */
+  /** Number of vertices in use in the buffers, which may be longer. */
   #vertices = 0;
   /** Number of triangle corners in use in the buffers: three times the triangles. */
   #corners = 0;
@@ -74,7 +74,7 @@ export class SurfaceObject {
   #values: Float32Array = new Float32Array(0);
   /** The surface's own colours, sRGB of each vertex, 0..1; empty if it has none. */
   #colors: Float32Array = new Float32Array(0);
-  /** The magnitude at the ends of the colour scale; 0 if no values are shown. */
+  /** Magnitude of the values at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
 
   constructor() {
@@ -85,7 +85,7 @@ export class SurfaceObject {
     this.object.add(this.#mesh, this.#edges);
   }
 
-  /** Shows a surface; its arrays are used without a copy until the next one is shown. */
+  /** Shows another surface; its arrays are used without a copy until the next one is shown. */
   show(surface: Surface): void {
     this.#dropCoarse();
     this.#vertices = surface.vertices;
@@ -100,8 +100,8 @@ export class SurfaceObject {
   }
 
   /**
-   * Moves the vertices to other positions, in an array of the same length. Normals stay unchanged: this is only for a
-   * short time.
+   * Moves the vertices to other positions, packed xyz, in an array of the same length. Normals stay unchanged, since
+   * this is only a preview until the next surface is shown.
    */
   move(positions: Float32Array): void {
     refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
@@ -116,12 +116,12 @@ export class SurfaceObject {
     else if (this.#corners > 3 * SMOOTH && !this.#coarse) this.#makeCoarse();
   }
 
-  /** The magnitude at the ends of the colour scale; 0 if the colours represent no values. */
+  /** Magnitude of the values at the ends of the colour scale, for the legend; 0 if the colours represent no values. */
   get range(): number {
     return this.#range;
   }
 
-  /** The mesh, to test for intersections with a ray; reading it ends the simplified drawing. */
+  /** The full mesh, to test for intersections with a ray; reading this ends the drawing of a simplified one. */
   get target(): Mesh {
     this.#dropCoarse();
     return this.#mesh;
@@ -136,13 +136,13 @@ export class SurfaceObject {
     this.#edgeMaterial.color.set(color);
   }
 
-  /** The texture of the surface; owned and disposed of by the caller. */
+  /** Image that the colouring 'texture' shows on the surface; null for none. Owned and disposed of by the caller. */
   set texture(texture: Texture | null) {
     this.#texture = texture;
     this.#fillColors();
   }
 
-  /** Whether the surface's own colours are lit; colours from photographs already contain shading. */
+  /** Whether the surface's own colours are drawn with lighting; colours from photographs already contain shading. */
   set lit(lit: boolean) {
     this.#lit = lit;
     this.#fillColors();
@@ -169,8 +169,8 @@ export class SurfaceObject {
   }
 
   /**
-   * Uploads the surface's arrays. GPU buffers cannot grow: if the capacities differ from those before, new ones are
-   * created.
+   * Takes over the surface's arrays for the GPU. GPU buffers cannot grow: if the arrays' capacities differ from those
+   * before, new buffers are created.
    */
   #takeOver({ positions, normals, indices, uvs }: Surface): void {
     const geometry = this.#fine;
@@ -232,7 +232,7 @@ export class SurfaceObject {
     geometry.setDrawRange(0, count);
   }
 
-  /** Fills the colour buffer. A quantity whose values have not arrived yet is drawn plain. */
+  /** Colours the surface as chosen. A quantity whose values have not arrived yet is drawn plain. */
   #fillColors(): void {
     const mode = this.#color;
     const shaded = isQuantity(mode) && this.#values.length === this.#vertices;
@@ -258,7 +258,7 @@ export class SurfaceObject {
   }
 }
 
-/** A vertex attribute: its name in three.js, its array, and the numbers per vertex. */
+/** A vertex attribute of a geometry: its name in three.js, its array, and the numbers per vertex. */
 interface Part {
   name: string;
   array: Float32Array;
@@ -280,7 +280,7 @@ function geometryOf(parts: Part[], indices: Uint32Array): BufferGeometry {
   return geometry;
 }
 
-/** Returns the colour attribute of a geometry, created on first use: most surfaces are plain. */
+/** Returns the vertex colours of a geometry, created on first use, since most surfaces are plain. */
 function colorsOf(geometry: BufferGeometry): BufferAttribute {
   const there = geometry.getAttribute('color') as BufferAttribute | undefined;
   if (there) return there;
@@ -290,8 +290,8 @@ function colorsOf(geometry: BufferGeometry): BufferAttribute {
 }
 
 /**
- * Creates a geometry that draws the surface's edges from the same vertices. A closed surface has half as many edges as
- * triangle corners.
+ * Creates a geometry of lines for the surface's edges, which uses the same vertices. Its index has room for all edges:
+ * a closed surface has half as many as triangle corners.
  */
 function edgeGeometry(surface: BufferGeometry): BufferGeometry {
   const geometry = new BufferGeometry();
@@ -302,8 +302,9 @@ function edgeGeometry(surface: BufferGeometry): BufferGeometry {
 }
 
 /**
- * Lists each edge of a closed surface once: by the one of its two triangles that traverses it from the smaller to the
- * larger index. Returns the number of indices written.
+ * Writes the ends of each edge of a closed surface into `out`, each edge once: from the one of its two triangles that
+ * traverses it from the smaller to the larger index. The first `length` of `indices` are used. Returns the number of
+ * indices written.
  */
 function listEdges(indices: Uint32Array, length: number, out: Uint32Array): number {
   let count = 0;
@@ -320,7 +321,8 @@ function listEdges(indices: Uint32Array, length: number, out: Uint32Array): numb
 }
 
 /**
- * Assigns an array of the same length to a buffer attribute; only its first `length` entries are uploaded to the GPU.
+ * Replaces the array of a buffer attribute by one of the same length; only its first `length` entries are uploaded to
+ * the GPU.
  */
 function refill(buffer: BufferAttribute, array: Float32Array | Uint32Array, length: number): void {
   buffer.array = array;

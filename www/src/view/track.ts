@@ -17,10 +17,13 @@ import { Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
-/** Content below the 3D view: the slices, or one of the paper's figures. */
+/** Content below the Track lab's 3D view: the slices, or one of the paper's figures. */
 export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
 
-/** Boundary votes that are shown: none, those near the surface (all if the frame has no surface), or all in the box. */
+/**
+ * Boundary votes that are shown: none, those near the surface (all if the frame has no surface), or all in the region
+ * of interest.
+ */
 export type VisibleVotes = 'none' | 'near' | 'all';
 
 export interface TrackViewOptions {
@@ -32,13 +35,13 @@ export interface TrackViewOptions {
   below: ContentBelow;
 }
 
-/** Diameter of a boundary vote, as a fraction of the voxel's shortest side. */
+/** Diameter of the disc that marks a boundary vote, as a fraction of the voxel's shortest side. */
 const DISC = 1.1;
-/** Distance from a vertex within which votes are near the surface, in shortest voxel sides. */
+/** Distance from a vertex of the surface within which boundary votes count as near it, in shortest voxel sides. */
 const NEAR_DISTANCE = 2;
 /**
- * Half the fraction of the region's sides to which the view is fitted; below ½, because the object leaves a margin in
- * the region.
+ * Half the fraction of the region of interest's sides to which the view is fitted; below ½, because the object leaves a
+ * margin in the region.
  */
 const FIT_SCALE = 0.44;
 
@@ -46,7 +49,7 @@ const FIT_SCALE = 0.44;
 export class TrackView {
   /** Called when a drag of the region of interest ends, with the region in voxels. */
   onRegion: (region: VoxelBox) => void = () => undefined;
-  /** Called whenever the slices have moved. */
+  /** Called whenever the crosshair, and with it the slices, may have moved. */
   onMoved: () => void = () => undefined;
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
@@ -62,7 +65,10 @@ export class TrackView {
   #shown: Surface | undefined;
   #votes: BoundaryVotes | undefined;
   #frame = 0;
-  /** Boundary votes previewed for an edge threshold, by voxel axis across the slice. */
+  /**
+   * Preview of the boundary votes for an edge threshold that is being chosen, by voxel axis across the slice; empty if
+   * there is none.
+   */
   #preview: ReturnType<typeof sliceVotes>[] = [];
   #crosshair: Vec3 = [0, 0, 0];
 
@@ -77,7 +83,7 @@ export class TrackView {
   }
 
   /**
-   * Shows another image, or, with `keep`, the same with other preprocessing: slices and camera then stay unchanged in
+   * Shows another image, or, with `keep`, the same after another preparation: slices and camera then stay unchanged in
    * world space.
    */
   setVolume(volume: VolumeView, keep: boolean): void {
@@ -100,7 +106,7 @@ export class TrackView {
     if (at) this.goTo(at);
   }
 
-  /** Fits a box of voxels closely into the 3D view. */
+  /** Fits a box of voxels, the region of interest, closely into the 3D view. */
   fitRegion(region: VoxelBox): void {
     if (!this.#scene) return;
     const { space, affine } = this.#scene.volume;
@@ -138,8 +144,8 @@ export class TrackView {
   }
 
   /**
-   * Previews the boundary for an edge threshold, found in each slice separately with windows of half width `halfWidth`,
-   * in pixels to each side; undefined removes the preview.
+   * Previews the boundary votes for an edge threshold (intensity units), found in each slice separately with windows of
+   * half width `halfWidth` (pixels); undefined removes the preview.
    */
   preview(threshold: number | undefined, halfWidth: number): void {
     const level = this.#level;
@@ -178,19 +184,20 @@ export class TrackView {
     this.#moveTo(voxel);
   }
 
-  /** The crosshair, in world space and as a voxel. */
+  /** The crosshair, where the three slices intersect: as a world point and as a voxel index. */
   get crosshair(): { point: Vec3; voxel: Vec3 } {
     const voxel: Vec3 = [...this.#crosshair];
     return { point: this.#scene ? toWorld(this.#scene.volume.affine, voxel) : [0, 0, 0], voxel };
   }
 
-  /** Redraws the slices with their overlays, and the region in the 3D view. */
+  /** Redraws the slices with their overlays, and the region of interest in the 3D view. */
   refresh(): void {
     this.#redraw();
   }
 
   /**
-   * Returns the cross-section of a surface with the slice across the given voxel axis, in pixels of the slice's image.
+   * Returns the cross-section of a surface with the present slice across the given voxel axis: x y x y per segment, in
+   * pixels of the slice's image.
    */
   outlineIn(surface: Surface, axis: 0 | 1 | 2): Float32Array {
     const scene = this.#scene;
@@ -206,7 +213,7 @@ export class TrackView {
     this.#viewport.dispose();
   }
 
-  /** The current frame as a volume of its own. */
+  /** Voxels of the displayed frame as a volume of its own; undefined if there is no image. */
   get #level(): LevelView | undefined {
     const volume = this.#scene?.volume;
     return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
@@ -231,7 +238,7 @@ export class TrackView {
     this.#viewport.invalidate();
   }
 
-  /** Updates the surface's outlines on the slices, in the panels and in the 3D view. */
+  /** Updates the surface's outlines on the slices, both in the slice panels and in the 3D view. */
   #updateSections(): void {
     const scene = this.#scene;
     if (!scene) return;
@@ -290,7 +297,7 @@ export class TrackView {
   }
 }
 
-/** Returns the grey values of one frame. */
+/** Returns the grey values of the voxels of one frame, without a copy. */
 export function voxelsOfFrame({ dims, voxels }: VolumeView, frame: number): Uint8Array {
   const size = dims[0] * dims[1] * dims[2];
   return voxels.subarray(frame * size, (frame + 1) * size);

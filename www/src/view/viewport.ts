@@ -22,9 +22,12 @@ import { WebGlRendering } from './rendering';
 const FIELD_OF_VIEW = 30;
 /** Rotation of the view by one press of an arrow key, radians. */
 const KEY_ROTATION = 0.12;
-/** Factor of the distance to the object by one press of − (or, inverted, of +). */
+/** Factor by which the − key increases the distance of the camera, and the + key reduces it. */
 const KEY_ZOOM = 1.12;
-/** Largest distance in pixels between pointer down and up for a click; beyond it the pointer rotates the view. */
+/**
+ * Largest distance in CSS pixels between pointer down and up that counts as a click; beyond it the pointer rotates the
+ * view.
+ */
 const CLICK_TOLERANCE = 4;
 
 /** A 3D view: a canvas, an orbit camera for mouse, touch and keyboard, and lights attached to the camera. */
@@ -32,38 +35,41 @@ export class Viewport {
   readonly canvas: HTMLCanvasElement;
   readonly #rendering: WebGlRendering;
   readonly #scene = new Scene();
-  /** Parent of all objects shown, rotated so that their upward axis is the scene's z. */
+  /** Parent of all objects shown, rotated so that their upward axis is the scene's z, as the orbit camera needs it. */
   readonly #world = new Group();
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1000);
-  /** Camera with the pose of a photograph. */
+  /** Camera in use while the view has the pose and projection of a photograph's camera. */
   readonly #photoCamera = new PerspectiveCamera();
-  /** Lights attached to the viewer. */
+  /** Lights that move with the camera. */
   readonly #lamp = new Group();
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
   /**
    * Called before each rendering, with the position of the orbit camera. `interactive`: whether the view is being
-   * rotated without a GPU, so that simplified objects are preferable.
+   * rotated without a GPU, so that simplified objects should be drawn.
    */
   onDraw: (viewer: Vector3, interactive: boolean) => void = () => undefined;
-  /** Called with the ray through the point that was clicked. */
+  /** Called with the ray from the camera through the point of the view that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
   /** Handler called first for key events; returns true if it has handled the key, which the view then ignores. */
   takesKey: (event: KeyboardEvent) => boolean = () => false;
-  /** Called when the view leaves the pose of a photograph. */
+  /** Called when the view leaves the pose of a photograph's camera. */
   onLeave: () => void = () => undefined;
   #through: PinholeCamera | undefined;
-  /** Whether a pointer or the wheel is in use: camera motion is then the user's. */
+  /** Whether a pointer or the wheel is in use, so that camera motion comes from the user. */
   #dragged = false;
   /** Whether the camera has moved during the current drag. */
   #rotating = false;
   #disposed = false;
   #pending = 0;
-  /** Changes to be made before the next rendering. */
+  /** Functions to call before the next rendering, which change the objects shown. */
   readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
-  /** Aspect ratio of the view, at most 1: in a narrow view the camera is farther away. */
+  /**
+   * Aspect ratio of the view, at most 1, by which the camera's distance is divided: in a narrow view the camera is
+   * farther away.
+   */
   #cappedAspect = 1;
 
   constructor(canvas: HTMLCanvasElement) {
@@ -91,7 +97,10 @@ export class Viewport {
     this.#world.remove(object);
   }
 
-  /** Creates handles to move, rotate and scale an object; the view does not rotate while one is dragged. */
+  /**
+   * Creates handles to move, rotate and scale one of the objects shown; the view does not rotate while a handle is
+   * dragged.
+   */
   addHandles(): TransformControls {
     const handles = new TransformControls(this.#camera, this.canvas);
     handles.addEventListener('change', () => this.invalidate());
@@ -102,7 +111,9 @@ export class Viewport {
     return handles;
   }
 
-  /** Returns the camera's axes in the coordinates of the objects shown: to the right, upwards, towards the viewer. */
+  /**
+   * Returns the orbit camera's axes in the coordinates of the objects shown: to the right, upwards, towards the viewer.
+   */
   directions(): [Vector3, Vector3, Vector3] {
     this.#camera.updateMatrixWorld();
     const inverse = this.#world.matrixWorld.clone().invert();
@@ -111,23 +122,29 @@ export class Viewport {
     return [axis(0), axis(1), axis(2)];
   }
 
-  /** The axis of the objects shown that points upwards. */
+  /** Axis of the coordinates of the objects shown that points upwards in the view. */
   set up(axis: 'y' | 'z') {
     this.#world.rotation.x = axis === 'y' ? Math.PI / 2 : 0;
     this.#world.updateMatrixWorld();
   }
 
-  /** Transforms a point hit by a ray from the scene to the coordinates of the objects shown. */
+  /**
+   * Transforms a point from the scene's coordinates, in which rays and their intersections are given, to those of the
+   * objects shown.
+   */
   toWorld(point: Vector3): Vector3 {
     return this.#world.worldToLocal(point.clone());
   }
 
-  /** Transforms a point from the coordinates of the objects shown to the scene. */
+  /** Transforms a point from the coordinates of the objects shown to the scene's, in which rays are given. */
   fromWorld(point: Vector3): Vector3 {
     return this.#world.localToWorld(point.clone());
   }
 
-  /** Uses pose and projection of a camera until the view is rotated; undefined returns to the orbit camera. */
+  /**
+   * Shows the objects with pose and projection of a photograph's camera until the user rotates the view; undefined
+   * returns to the orbit camera.
+   */
   lookThrough(camera: PinholeCamera | undefined): void {
     if (camera === this.#through) return;
     this.#through = camera;
@@ -146,7 +163,10 @@ export class Viewport {
     });
   }
 
-  /** Calls `change` at the next animation frame and renders in the same frame, not in the one after. */
+  /**
+   * Calls `change`, which changes objects, at the next animation frame and renders in the same frame, not in the one
+   * after.
+   */
   changeAndDraw(change: () => void): void {
     this.#changes.push(change);
     this.invalidate();
@@ -159,8 +179,8 @@ export class Viewport {
   }
 
   /**
-   * Fits a box, in the coordinates of the objects shown, into the view, a little from above and from the side. `front`
-   * is 1 to look along the scene's y, −1 against it; `aside` is the tangent of the angle to the side.
+   * Fits a box, in the coordinates of the objects shown, into the view, seen a little from above and from the side.
+   * `front` is 1 to look along the scene's y, −1 to look against it; `aside` is the tangent of the angle to the side.
    */
   fitBox(box: Box3, front: 1 | -1, aside = 0.7): void {
     this.#fitView(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));
@@ -183,7 +203,10 @@ export class Viewport {
     this.resetView();
   }
 
-  /** Moves the centre of rotation and zoom to another point, keeping the viewing direction. */
+  /**
+   * Moves the centre of rotation and zoom to a point in the coordinates of the objects shown, keeping the viewing
+   * direction.
+   */
   setPivot(point: Vec3): void {
     const target = new Vector3(...point).applyMatrix4(this.#world.matrixWorld);
     this.#camera.position.sub(this.#controls.target).add(target);
@@ -200,7 +223,7 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** Frees the GPU memory; browsers limit the number of contexts of a page. */
+  /** Ends rendering and releases the GPU memory; browsers limit the number of graphics contexts of a page. */
   dispose(): void {
     this.#disposed = true;
     cancelAnimationFrame(this.#pending);
@@ -255,7 +278,7 @@ export class Viewport {
     this.onClick(ray);
   }
 
-  /** Returns the active camera: orbit camera, or pose of a photograph. */
+  /** Returns the camera in use: the orbit camera, or one with the pose of a photograph. */
   #viewer(): PerspectiveCamera {
     const { clientWidth, clientHeight } = this.canvas;
     if (!this.#through || clientHeight === 0) return this.#camera;
@@ -335,7 +358,8 @@ export class Viewport {
   }
 
   /**
-   * Changes the camera position in spherical coordinates around its target. three's Spherical has y up, our world z.
+   * Changes the orbit camera's position by spherical coordinates around its target. The Spherical of three.js has y up,
+   * our scene z.
    */
   #orbit(change: (spherical: Spherical) => void): void {
     const offset = this.#camera.position.clone().sub(this.#controls.target);

@@ -19,7 +19,10 @@ const LETTERS = [
   ['A', 'P'],
   ['S', 'I'],
 ] as const;
-/** Distance of the letters from the box, as a fraction of the box's side in this direction. */
+/**
+ * Distance of the letters of anatomical directions from the volume's box, as a fraction of the box's side in the same
+ * direction.
+ */
 const LETTER_DISTANCE = 0.06;
 /**
  * Side of a letter's square sprite divided by its distance from the camera: about 8 % of the height of the view, whose
@@ -27,7 +30,7 @@ const LETTER_DISTANCE = 0.06;
  */
 const LETTER_SIZE = 0.045;
 
-/** The bounding box of a volume in the 3D view, with anatomical directions at its six faces. */
+/** The bounding box of a volume in the 3D view, with the letters of anatomical directions at its six faces. */
 export class VolumeBox {
   readonly object = new Group();
   readonly #box: LineSegments<EdgesGeometry, LineBasicMaterial>;
@@ -72,8 +75,8 @@ function boxOf(grid: Grid, color: ColorRepresentation): LineSegments<EdgesGeomet
 }
 
 /**
- * Returns a point on the line along a voxel axis through the centre of the volume's box, in world space: `part` is 0 at
- * the first voxel's face, 1 at the last one's.
+ * Returns a point, in world space, on the line along a voxel axis through the centre of the volume's box, to place a
+ * letter: `part` is 0 at the first voxel's face, 1 at the last one's.
  */
 function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   const at = grid.dims.map((n) => (n - 1) / 2) as Vec3;
@@ -81,7 +84,7 @@ function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   return toWorld(grid.affine, at);
 }
 
-/** Renders a letter in white with a dark outline, legible on any background. */
+/** Renders a letter in white with a dark outline, so that it is legible on any background. */
 function letterTexture(letter: string): CanvasTexture {
   const canvas = document.createElement('canvas');
   canvas.width = 64;

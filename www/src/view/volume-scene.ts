@@ -8,14 +8,17 @@ import { SlicePlane } from './planes';
 import type { Viewport } from './viewport';
 import { VolumeBox } from './volume-box';
 
-/** The display of one volume in the Extract and Track labs: a panel per slice, and the slices and the box in the 3D view. */
+/**
+ * The display of one volume in the Extract and Track labs: a panel per slice, and the slices and the volume's box in
+ * the 3D view.
+ */
 export class VolumeScene {
   readonly volume: VolumeView;
   /** The map from world space to voxel indices. */
   readonly inverse: Float64Array;
-  /** By voxel axis across the slice. */
+  /** The panels of the slices across the three voxel axes, in the order of the axes. */
   readonly panels: SlicePanel[];
-  /** The slices in the 3D view, by voxel axis across the slice. */
+  /** The slices across the three voxel axes in the 3D view, in the order of the axes. */
   readonly planes: SlicePlane[];
   readonly #box: VolumeBox;
   readonly #viewport: Viewport;
@@ -47,7 +50,10 @@ export class VolumeScene {
     slices.append(...byName.map((panel) => panel.element));
   }
 
-  /** Places the slices in the 3D view for a viewer, or hides them. */
+  /**
+   * Places the slices in the 3D view: in place, on the walls of the volume's box that are farther from the viewer, or
+   * hidden.
+   */
   placeSlices(placement: SlicePlacement, viewer: Vector3): void {
     for (const plane of this.planes) {
       plane.object.visible = placement !== 'hidden';

@@ -1,13 +1,18 @@
-/** Boundary votes as points in space and on slices, coloured by the share of windows that voted for them. */
+/**
+ * Displays boundary votes, which mark faces between two voxels that windows of the tracker separate, as points in space
+ * and on slices, coloured by the share of windows that voted for them.
+ */
 import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { BoundaryVotes } from '../track/protocol';
 import { type SliceOrientation, toWorld } from './anatomy';
 
-/** Colour of boundary votes in the limit of no windows voting for them, sRGB 0..1. */
+/**
+ * Colour of the boundary votes of weight 0, for which no window voted, sRGB 0..1; weights in between are interpolated.
+ */
 const FEW: Vec3 = [0.99, 0.82, 0.38];
-/** Colour of boundary votes that all windows voted for, sRGB 0..1. */
+/** Colour of the boundary votes of weight 1, for which all windows voted, sRGB 0..1. */
 const MANY: Vec3 = [0.78, 0.1, 0.24];
-/** Number of colour steps of votes on slices. */
+/** Number of colour steps of boundary votes drawn on slices. */
 const SHADES = 6;
 
 export function voteColors(weights: Float32Array): Float32Array {
@@ -20,8 +25,8 @@ export function voteColors(weights: Float32Array): Float32Array {
 }
 
 /**
- * Returns the votes near the surface: all within `reach` (world units) of a vertex, some up to twice as far along an
- * axis, and rarely others.
+ * Returns the boundary votes near the surface, for display: all within `reach` (world units) of a vertex, some up to
+ * twice as far along an axis, and rarely others.
  */
 export function votesNear(
   { frame, points, weights }: BoundaryVotes,
@@ -55,7 +60,9 @@ interface OnSlice {
   scaleY: number;
 }
 
-/** Returns the votes that lie within a quarter of a voxel of a slice, with positions in pixels of its image. */
+/**
+ * Returns the boundary votes that lie within a quarter of a voxel of a slice, with positions in pixels of its image.
+ */
 export function votesIn(
   { points, weights }: BoundaryVotes,
   { volume, inverse, orientation, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
@@ -81,7 +88,10 @@ export function drawVotes(context: CanvasRenderingContext2D, votes: BoundaryVote
   drawFaces(context, votesIn(votes, on), on.scaleX, on.scaleY);
 }
 
-/** Draws votes, given in pixels of a slice's image, as small squares coloured by weight. */
+/**
+ * Draws boundary votes, given in pixels of a slice's image, as small squares coloured by weight; a position times the
+ * scales is the position on the canvas.
+ */
 export function drawFaces(
   context: CanvasRenderingContext2D,
   faces: readonly { x: number; y: number; weight: number }[],

@@ -1,16 +1,28 @@
-/** Runs the same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
+/**
+ * Runs the same extraction by the deformable model twice, for comparison: on the volume itself, and coarse to fine
+ * (section 5.2 of Lachaud and Montanvert's paper).
+ */
 import type { StepReport, Volume } from 'vesicle';
 import type { ComparisonProgressEvent, ExtractionRun, Requests, Setup } from '../protocol';
 import { buildModel } from './models';
 
-/** Largest number of iterations of a run; one that has not converged by then is compared in its present state. */
+/**
+ * Largest number of iterations of each of the two compared runs; one that has not converged by then is compared in its
+ * present state.
+ */
 const MOST_ITERATIONS = 4000;
-/** Least milliseconds between two reports to the page; a report of convergence is sent at once. */
+/**
+ * Least time between two progress reports of a run to the page, milliseconds; the report of convergence is sent at
+ * once.
+ */
 const TELL_EVERY = 150;
 
 type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => void;
 
-/** Runs the extraction directly and coarse to fine, and returns both results; undefined if the signal aborts. */
+/**
+ * Runs the extraction directly and coarse to fine, and returns both results for display; undefined if the signal
+ * aborts.
+ */
 export async function compare(
   volume: Volume,
   setup: Setup,

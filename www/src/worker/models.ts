@@ -43,8 +43,8 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
 }
 
 /**
- * For each quantity, a function that returns one value per vertex, in the order of the mesh's arrays. A new quantity
- * needs an entry here and one in `view/shading`.
+ * For each quantity by which the surface can be coloured, a function that returns one value per vertex, in the order of
+ * the mesh's arrays. A new quantity needs an entry here and one in `view/shading`.
  */
 const QUANTITIES: Record<VertexQuantity, (model: DeformableModel) => Float32Array> = {
   /**

@@ -15,7 +15,8 @@ export class Refusal extends Error {
 }
 
 /**
- * Converts an error to a message for the page; errors other than the library's and refusals get the code 'internal'.
+ * Converts an error to a message for the page; errors that are neither the library's nor a {@link Refusal} get the code
+ * 'internal'.
  */
 export function toFailure(error: unknown): Failure {
   if (error instanceof VesicleError || error instanceof Refusal) return { code: error.code, message: error.message };

@@ -1,7 +1,7 @@
 /** Common parts of the app's workers: replies to requests, and cancellation of running work. */
 import { toFailure } from './refusal';
 
-/** Work that can be aborted. */
+/** Work in progress in a worker, which a later request of the page can abort. */
 export interface Task {
   abort: AbortController;
   ended: Promise<unknown>;
@@ -26,7 +26,7 @@ export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBu
   return reply;
 }
 
-/** Replies to a request with the handler's result, or with its failure. */
+/** Runs the handler for a request of the page, and replies with the handler's result, or with its failure. */
 export async function reply(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },

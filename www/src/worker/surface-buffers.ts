@@ -1,10 +1,11 @@
-/** Arrays with spare capacity in which a mesh is sent to the page. */
+/** Arrays with spare capacity in which a worker sends meshes to the page. */
 import type { Mesh } from 'vesicle';
 import type { Surface } from '../protocol';
 import { buffersOf } from './serving';
 
 /**
- * Ratio of consecutive capacities. A smaller one needs new buffers more often, a larger one leaves more of them unused.
+ * Ratio of consecutive capacities of the arrays of a mesh. A smaller one needs new buffers more often, a larger one
+ * leaves more memory unused.
  */
 const CAPACITY_RATIO = 1.25;
 

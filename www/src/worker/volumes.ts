@@ -1,4 +1,4 @@
-/** Opens volumes in the worker, and reduces them to the data that the page displays. */
+/** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
 import { VesicleError, Volume } from 'vesicle';
 import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
@@ -14,7 +14,10 @@ function isHeader({ name }: NamedBytes): boolean {
   return /\.(nhdr|mhd)$/i.test(name);
 }
 
-/** Parses a volume from one file; for a header without its data, the error message requests the data file. */
+/**
+ * Parses a volume from one file; for a header without its voxels, throws a `Refusal` whose message requests the file
+ * with them.
+ */
 function parseFile(file: NamedBytes): Volume {
   try {
     return Volume.parse(file.bytes);
@@ -38,7 +41,8 @@ export function parseFiles(files: NamedBytes[]): Volume {
 }
 
 /**
- * Computes a volume, or reads it from files in any supported format, the library's own or one read by other libraries.
+ * Returns the computed volume of a shape, or reads a volume from files in any supported format, the library's own or
+ * one that other libraries read.
  */
 export async function volumeFrom(source: VolumeSource): Promise<Volume> {
   if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
@@ -84,8 +88,8 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
 }
 
 /**
- * Converts the first `frames` frames to grey values, slice by slice to avoid a second full copy in floats. `window`
- * holds the intensities of black and white.
+ * Converts the first `frames` frames to grey values, slice by slice to avoid a full copy of the volume in floats.
+ * `window` holds the intensities of black and white.
  */
 function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
   const [nx, ny, nz] = volume.dims;

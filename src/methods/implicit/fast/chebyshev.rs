@@ -3,20 +3,20 @@
 use crate::math::DVec3;
 use std::f64::consts::PI;
 
-/// Number of Chebyshev nodes along an axis. With 4, errors reach a tenth of an extraction cell; with 6, evaluation
-/// takes twice as long.
+/// Number of Chebyshev nodes along an axis of a cube. With 4, the extracted surface is off by up to a tenth of a cell;
+/// with 6, evaluation takes twice as long.
 pub const NODES: usize = 5;
-/// Number of Chebyshev nodes of a cube; they are ordered x fastest.
+/// Number of Chebyshev nodes of a cube; x varies fastest in their order.
 pub const CUBE: usize = NODES * NODES * NODES;
 
-/// Values, or strengths of sources, at the Chebyshev nodes of a cube.
+/// Values, or strengths of sources, at the Chebyshev nodes of a cube, x fastest.
 pub type Nodal = [f32; CUBE];
 
 /// The Chebyshev nodes of [−1, 1], with tables for interpolation between them.
 #[derive(Clone, Debug)]
 pub struct Chebyshev {
     nodes: [f64; NODES],
-    /// The Chebyshev polynomials Tₘ at the nodes: row k, column m holds Tₘ at node k.
+    /// Table of the Chebyshev polynomials Tₘ at the nodes: row k, column m holds Tₘ at node k.
     polynomials: [[f64; NODES]; NODES],
     /// Interpolation from a cube to its lower (index 0) and upper half (1) along an axis: row k holds the weights of
     /// the cube's nodes at node k of the half.
@@ -24,7 +24,7 @@ pub struct Chebyshev {
 }
 
 impl Chebyshev {
-    /// Computes the tables.
+    /// Computes the nodes, and the tables for interpolation between them.
     pub fn new() -> Self {
         let angle = |k: usize| PI * (2 * k + 1) as f64 / (2 * NODES) as f64;
         let mut tables = Self {
@@ -40,13 +40,13 @@ impl Chebyshev {
         tables
     }
 
-    /// Returns the position of node `index` in the cube [−1, 1]³.
+    /// Returns the position of the Chebyshev node with number `index` in the cube [−1, 1]³.
     pub fn node(&self, index: usize) -> DVec3 {
         let [i, j, k] = node_coords(index);
         DVec3::new(self.nodes[i], self.nodes[j], self.nodes[k])
     }
 
-    /// Returns the interpolation weight of each node at `x` in [−1, 1].
+    /// Returns the weight of each Chebyshev node in the interpolation of a value at `x`, all in [−1, 1].
     pub fn weights(&self, x: f64) -> [f64; NODES] {
         let mut t = [1.0; NODES];
         t[1] = x;
@@ -56,7 +56,8 @@ impl Chebyshev {
         self.combined(&t)
     }
 
-    /// Returns the derivative of each node's interpolation weight at `x` in [−1, 1].
+    /// Returns the derivative by `x` of each Chebyshev node's interpolation weight at `x`, all in [−1, 1]; used for
+    /// gradients.
     pub fn slopes(&self, x: f64) -> [f64; NODES] {
         // Tₘ′ = m Uₘ₋₁
         let mut u = [1.0; NODES];
@@ -71,8 +72,9 @@ impl Chebyshev {
         self.combined(&derivatives)
     }
 
-    /// Returns the interpolation weight of each node at a point if `t` holds the Chebyshev polynomials Tₘ there, and
-    /// the derivative of that weight if `t` holds their derivatives: (1/n)(t₀ + 2 Σ tₘ Tₘ(node)), with n nodes.
+    /// Returns the interpolation weight of each Chebyshev node at a point of [−1, 1] if `t` holds the Chebyshev
+    /// polynomials Tₘ there, and the derivative of that weight if `t` holds their derivatives: (1/n)(t₀ + 2 Σ tₘ
+    /// Tₘ(node)), with n nodes.
     fn combined(&self, t: &[f64; NODES]) -> [f64; NODES] {
         std::array::from_fn(|k| {
             let sum: f64 = (1..NODES).map(|m| self.polynomials[k][m] * t[m]).sum();
@@ -80,8 +82,8 @@ impl Chebyshev {
         })
     }
 
-    /// Interpolates the values at the nodes of a cube, and returns those at the nodes of one of its octants (the
-    /// local-to-local translation); `half` is the side of the octant, 0 or 1, along each axis.
+    /// Interpolates the values `whole` at the Chebyshev nodes of a cube, and returns those at the nodes of one of its
+    /// octants (the local-to-local translation); `half` is the side of the octant, 0 or 1, along each axis.
     pub fn local_to_local(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -90,8 +92,9 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// Returns the sources at the nodes of a whole cube that replace those at the nodes of one of its octants (the
-    /// multipole-to-multipole translation), by the transpose of [`Self::local_to_local`].
+    /// Returns the sources at the Chebyshev nodes of a whole cube that replace the sources `part` at the nodes of one
+    /// of its octants (the multipole-to-multipole translation), by the transpose of [`Self::local_to_local`]; `half` is
+    /// the side of the octant, 0 or 1, along each axis.
     pub fn multipole_to_multipole(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = part.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -100,14 +103,15 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// Returns the value at a point in [−1, 1]³, interpolated from those at the nodes.
+    /// Returns the value at the point `at` of the cube [−1, 1]³, interpolated from the values `nodal` at its Chebyshev
+    /// nodes.
     pub fn value(&self, nodal: &Nodal, at: DVec3) -> f64 {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         contracted(nodal, &x, &y, &z)
     }
 
-    /// Returns the value at a point in [−1, 1]³, interpolated from those at the nodes, and its gradient in these
-    /// coordinates.
+    /// Returns the value at the point `at` of the cube [−1, 1]³, interpolated from the values `nodal` at its Chebyshev
+    /// nodes, and its gradient in the coordinates of that cube.
     pub fn value_and_gradient(&self, nodal: &Nodal, at: DVec3) -> (f64, DVec3) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         let [dx, dy, dz] = at.to_array().map(|t| self.slopes(t));
@@ -119,8 +123,8 @@ impl Chebyshev {
         (contracted(nodal, &x, &y, &z), gradient)
     }
 
-    /// Adds a source of strength `weight`, at a point in [−1, 1]³, to the sources at the nodes, by their interpolation
-    /// weights.
+    /// Replaces a source of strength `weight` at the point `at` of the cube [−1, 1]³ by sources at the Chebyshev nodes
+    /// of the cube, in proportion to their interpolation weights there, and adds these to `nodal`.
     pub fn spread_source(&self, nodal: &mut Nodal, at: DVec3, weight: f64) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         for (index, value) in nodal.iter_mut().enumerate() {
@@ -130,17 +134,19 @@ impl Chebyshev {
     }
 }
 
-/// Returns the index along x, y and z of node number `index` of a cube; the inverse of [`node_index`].
+/// Returns the index along x, y and z of the Chebyshev node with number `index` of a cube; the inverse of
+/// [`node_index`].
 pub fn node_coords(index: usize) -> [usize; 3] {
     [index % NODES, index / NODES % NODES, index / (NODES * NODES)]
 }
 
-/// Returns the number of the node of a cube with the given indices along x, y and z; x varies fastest.
+/// Returns the number of the Chebyshev node of a cube with the given indices along x, y and z; x varies fastest.
 pub fn node_index([i, j, k]: [usize; 3]) -> usize {
     (k * NODES + j) * NODES + i
 }
 
-/// Multiplies the nodal values on each line along `axis` by a matrix; `entry` returns its entry, given row and column.
+/// Multiplies the values at a cube's Chebyshev nodes, on each line of nodes along `axis`, by a matrix, which
+/// interpolates along one axis; `entry` returns its entry, given row and column.
 fn apply_along(values: &[f64; CUBE], axis: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; CUBE] {
     std::array::from_fn(|index| {
         let node = node_coords(index);

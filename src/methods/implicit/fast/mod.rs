@@ -15,14 +15,14 @@ use crate::math::DVec3;
 use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{CubeSymmetries, Translations};
 
-/// Maximum mean number of terms in the finest cubes that contain any. With more, sums of near terms take longer; with
-/// fewer, there are more cubes.
+/// Maximum mean number of terms of the implicit function in the finest cubes of the octree that contain any. With more,
+/// sums of near terms take longer; with fewer, there are more cubes.
 const TERMS_A_CUBE: usize = 24;
 /// Maximum depth of the octree of cubes: tables of the finest level have 8^this entries.
 const MAX_LEVELS: usize = 6;
-/// Marks a cube that does not exist or is not computed yet, in place of its number.
+/// Index that stands for a cube of the octree that contains no terms, or that is not computed yet.
 const NONE: u32 = u32::MAX;
-/// Cube coordinates outside the range of all points, for a cache that is still empty.
+/// Coordinates of a cube outside the range of all points, for the cache of the last cube while it is empty.
 const NO_CUBE: CubeCoords = [i32::MIN; 3];
 
 /// An implicit function prepared for fast evaluation at many points; used to extract the surface and to sample volumes.
@@ -31,13 +31,14 @@ pub struct FastField {
     field: Field,
     chebyshev: Chebyshev,
     turns: CubeSymmetries,
-    /// Lowest corner of the root cube, in box units; `edge` is the length of its edges.
+    /// Lowest corner of the octree's root cube, in units of the normalised box; `edge` is the length of its edges.
     origin: DVec3,
     edge: f64,
     levels: Vec<Level>,
-    /// The terms (centre and weight); grouped by finest cube, unless all are summed directly.
+    /// The terms of the implicit function (centre and weight); grouped by finest cube, unless all are summed directly.
     terms: Vec<(DVec3, f64)>,
-    /// For each finest cube with terms, numbered as its `sources`, the start and the end of its range in `terms`.
+    /// For each finest cube that contains terms, in the order of the finest level's `sources`, the start and the end
+    /// (exclusive) of its range in `terms`.
     ranges: Vec<[usize; 2]>,
     /// Whether all terms are summed directly, as kernels that grow with the distance require.
     direct: bool,
@@ -45,7 +46,8 @@ pub struct FastField {
     cached: CachedCube,
 }
 
-/// A cube with its index in `targets`, and the ranges of the terms near it.
+/// The cube of the octree in which a point was last evaluated, with its index in the `targets` of its level, and the
+/// ranges of `terms` near it.
 #[derive(Clone, Debug)]
 struct CachedCube {
     level: usize,
@@ -54,15 +56,16 @@ struct CachedCube {
     ranges: Vec<[usize; 2]>,
 }
 
-/// One level of the octree: the cubes of one size.
+/// One level of the octree: its cubes of one size, with sources (the terms in them) and targets (the far terms' sum in
+/// them).
 #[derive(Clone, Debug)]
 struct Level {
-    /// Number of cubes along a side.
+    /// Number of cubes along a side of the root cube.
     side: i32,
-    /// Index in `sources` of each cube, or [`NONE`] if it contains no terms.
+    /// Index in `sources` of each cube of the level, or [`NONE`] if it contains no terms.
     source_ids: Vec<u32>,
     sources: Vec<Nodal>,
-    /// Index in `targets` of each cube, or [`NONE`] until it is computed.
+    /// Index in `targets` of each cube of the level, or [`NONE`] until it is computed.
     target_ids: Vec<u32>,
     targets: Vec<Nodal>,
     translations: Option<Translations>,
@@ -95,8 +98,9 @@ impl Level {
 }
 
 impl FastField {
-    /// Prepares `field` for fast evaluation in a cube around all centres and the box between the corners `low` and
-    /// `high`. Outside it, and everywhere for kernels that grow with the distance, all terms are summed directly.
+    /// Prepares `field` for fast evaluation in a cube around the centres of all terms and the box between the corners
+    /// `low` and `high`. Outside it, and everywhere for kernels that grow with the distance, all terms are summed
+    /// directly.
     pub fn new(field: Field, low: DVec3, high: DVec3) -> Self {
         let terms = field.terms();
         let low = terms.iter().fold(low, |low, (c, _)| low.min(*c));
@@ -122,7 +126,8 @@ impl FastField {
         fast
     }
 
-    /// Writes the value of f at each of the points `targets`, which are in box units, to `out`.
+    /// Writes the value of the implicit function f at each of the points `targets`, which are in the normalised box, to
+    /// `out`.
     pub fn values(&mut self, targets: &[DVec3], out: &mut [f64]) {
         for (p, value) in targets.iter().zip(out) {
             *value = self.value(*p);
@@ -140,7 +145,7 @@ impl FastField {
         sum + self.field.polynomial(p)
     }
 
-    /// Returns f and its gradient ∇f at `p`, in box units.
+    /// Returns the implicit function f and its gradient ∇f at `p`, in units of the normalised box.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
         let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
@@ -155,7 +160,7 @@ impl FastField {
         (sum + self.field.polynomial(p), gradient + self.field.slopes())
     }
 
-    /// Returns the sum of all far terms at the nodes of the cached cube.
+    /// Returns the sum of all far terms at the Chebyshev nodes of the cube in which a point was last evaluated.
     fn nodal(&self) -> &Nodal {
         &self.levels[self.cached.level].targets[self.cached.number]
     }
@@ -168,7 +173,8 @@ impl FastField {
         ((p - self.origin) / self.cube_edge(level)).floor().to_array().map(|x| x as i32)
     }
 
-    /// Returns the position of `p` relative to the cube with coordinates `cube` at `level`, in [−1, 1]³ if inside.
+    /// Returns the position of `p` relative to the cube with coordinates `cube` at `level` of the octree, scaled so
+    /// that the cube is [−1, 1]³.
     fn within(&self, p: DVec3, cube: CubeCoords, level: usize) -> DVec3 {
         let middle = DVec3::from_array(cube.map(|k| f64::from(k) + 0.5));
         ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
@@ -189,8 +195,9 @@ impl FastField {
         }
     }
 
-    /// Upward pass: sorts the terms into the finest cubes, spreads them to the nodes, and moves these sources to the
-    /// larger cubes. Also computes the translations of all levels that have cubes which do not touch.
+    /// Upward pass of the fast multipole method: sorts the terms into the finest cubes, spreads them to the Chebyshev
+    /// nodes, and moves these sources to the larger cubes. Also computes the translations of all levels that have cubes
+    /// which do not touch.
     fn gather_sources(&mut self) {
         let finest = self.levels.len() - 1;
         let index =
@@ -239,8 +246,9 @@ impl FastField {
         }
     }
 
-    /// Finds the largest cube around `p` with no terms near it, or else its finest cube, and caches it. Returns the
-    /// position of `p` in it; `None` outside the root cube and with direct sums.
+    /// Finds the cube in which `p` is evaluated, the largest one around `p` with no terms near it, or else its finest
+    /// cube, and caches it. Returns the position of `p` in it, scaled to [−1, 1]³; `None` outside the root cube and if
+    /// all terms are summed directly.
     fn local(&mut self, p: DVec3) -> Option<DVec3> {
         if self.direct {
             return None;
@@ -262,8 +270,8 @@ impl FastField {
         Some(self.within(p, self.cached.cube, self.cached.level))
     }
 
-    /// Downward pass: computes the sum of all far terms at the nodes of a cube, unless that was done before. Returns
-    /// the cube's index in `targets`.
+    /// Downward pass of the fast multipole method: computes the sum of all far terms at the Chebyshev nodes of a cube,
+    /// unless that was done before. Returns the cube's index in `targets`.
     fn target(&mut self, level: usize, cube: CubeCoords) -> usize {
         let Some(slot) = self.levels[level].index(cube) else { return 0 };
         let number = self.levels[level].target_ids[slot];
@@ -291,13 +299,13 @@ impl FastField {
     }
 }
 
-/// Returns the coordinates of the cube and of its 26 neighbours.
+/// Returns the coordinates of a cube of the octree and of its 26 neighbours, whose terms are near.
 fn around(cube: CubeCoords) -> impl Iterator<Item = CubeCoords> {
     (0..27).map(move |k| [cube[0] + k % 3 - 1, cube[1] + k / 3 % 3 - 1, cube[2] + k / 9 - 1])
 }
 
-/// Returns the offsets to the cubes in the interaction list of the cube at `cube`: they do not touch it, but their
-/// parents touch its parent.
+/// Returns the offsets to the cubes in the interaction list of the cube at `cube`: cubes that do not touch it, but
+/// whose parents touch its parent; their sources are translated to it.
 fn far_offsets(cube: CubeCoords) -> impl Iterator<Item = CubeCoords> {
     // The children of the parent's neighbours extend two cubes to one side, and three to the other.
     let lowest = cube.map(|k| -2 - k.rem_euclid(2));
@@ -322,7 +330,8 @@ mod tests {
         DVec3::new(unit(random), unit(random), unit(random)).normalize_or(DVec3::X)
     }
 
-    /// Returns a function with terms of both signs around a sphere, which cancel as those of a solution do.
+    /// Returns an implicit function for tests with terms of both signs around a sphere, which cancel as those of a
+    /// solution do.
     fn field(kernel: Kernel) -> Field {
         let mut random = Random::new(1);
         let mut centres: Vec<Vec3> = (0..2000).map(|_| direction(&mut random).as_vec3()).collect();
@@ -334,7 +343,7 @@ mod tests {
         Field::new(KernelTable::new(kernel), &centres, &Solution { weights, coefficients })
     }
 
-    /// Returns points on the surface, near it, inside, at the rim of the box, and beyond it.
+    /// Returns test points on the unit sphere, near it, inside, at the rim of the root cube, and beyond it.
     fn random_points(count: usize) -> Vec<DVec3> {
         let mut random = Random::new(2);
         (0..count)

@@ -1,16 +1,17 @@
-//! Multipole-to-local translations: from the sources at the nodes of one cube to the values at the nodes of another, by
-//! a low-rank matrix for each relative position.
+//! Multipole-to-local translations of the fast multipole method: from the sources at the nodes of one cube to the
+//! values at the nodes of another, by a low-rank matrix for each relative position.
 
 use super::chebyshev::{CUBE, Chebyshev, NODES, Nodal, node_coords, node_index};
 use crate::math::DVec3;
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 
-/// Relative error of a translation matrix: below that of the interpolation.
+/// Relative error of the low-rank approximation of a translation matrix: below that of the Chebyshev interpolation.
 const TOLERANCE: f64 = 1e-5;
 
-/// Translation matrices between cubes of one size that are up to three apart along each axis, and at least two along
-/// one. Reflections and permutations of the axes leave 16 of them.
+/// Matrices that turn sources at the Chebyshev nodes of one cube into values at the nodes of another of the same size,
+/// up to three cubes away along each axis, and at least two along one. Reflections and permutations of the axes leave
+/// 16 of them.
 #[derive(Clone, Debug)]
 pub struct Translations {
     /// Matrices by canonical offset, whose components are non-negative and in descending order; `None` for other
@@ -22,7 +23,8 @@ pub struct Translations {
 pub type Offset = [i32; 3];
 
 impl Translations {
-    /// Computes the matrices for cubes with edges of length `edge`, in box units.
+    /// Computes the translation matrices of a kernel, tabulated in `table`, between cubes with edges of length `edge`,
+    /// in units of the normalised box.
     pub fn new(table: &KernelTable, chebyshev: &Chebyshev, edge: f64) -> Self {
         let matrices = (0..4 * 4 * 4).map(|index| {
             let offset = [index / 16, index / 4 % 4, index % 4];
@@ -45,7 +47,8 @@ impl Translations {
         Self { matrices: matrices.collect() }
     }
 
-    /// Adds the values that `sources`, in a cube at `offset`, produce at the nodes of the target cube to `targets`.
+    /// Adds to `targets` the values at the nodes of a target cube that are due to `sources`, the sources at the nodes
+    /// of the cube at `offset` from it.
     pub fn add(&self, symmetries: &CubeSymmetries, offset: Offset, sources: &Nodal, targets: &mut Nodal) {
         let (symmetry, canonical) = symmetries.find(offset);
         let index = (canonical[0] * 16 + canonical[1] * 4 + canonical[2]) as usize;
@@ -66,7 +69,7 @@ impl Translations {
     }
 }
 
-/// Returns the dot product of `a` and `b`, accumulated in eight independent partial sums that the compiler can
+/// Returns the dot product of two nodal vectors, accumulated in eight independent partial sums that the compiler can
 /// vectorise.
 fn dot(a: &Nodal, b: &Nodal) -> f32 {
     let mut sums = [0.0; 8];
@@ -81,8 +84,8 @@ fn dot(a: &Nodal, b: &Nodal) -> f32 {
     sums.iter().sum::<f32>() + tail
 }
 
-/// Permutations of a cube's nodes under reflections and permutations of the axes; they reduce the number of translation
-/// matrices.
+/// Permutations of a cube's Chebyshev nodes under reflections and permutations of the axes; they reduce the number of
+/// translation matrices.
 #[derive(Clone, Debug)]
 pub struct CubeSymmetries {
     /// For each symmetry, the new number of each node. The index of a symmetry is 6 × reflections (three bits) + the
@@ -90,11 +93,10 @@ pub struct CubeSymmetries {
     nodes: Vec<[u8; CUBE]>,
 }
 
-/// The permutations of three axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl CubeSymmetries {
-    /// Computes the permutations of all 48 symmetries.
+    /// Computes the permutations of a cube's Chebyshev nodes for all 48 symmetries of the cube.
     pub fn new() -> Self {
         let symmetry = |number: usize| {
             let (signs, order) = (number / 6, ORDERS[number % 6]);
@@ -112,7 +114,7 @@ impl CubeSymmetries {
     }
 
     /// Returns the permutation of nodes whose symmetry makes the components of an offset non-negative and descending,
-    /// and the resulting offset.
+    /// and the offset that results, for which there is a translation matrix.
     fn find(&self, offset: Offset) -> (&[u8; CUBE], Offset) {
         let signs = (0..3).map(|axis| usize::from(offset[axis] < 0) << axis).sum::<usize>();
         let size = offset.map(i32::abs);

@@ -1,41 +1,42 @@
-//! Binary cluster tree of the centres, for the hierarchical matrix.
+//! Binary cluster tree of the centres of the constraints, whose pairs of clusters are the blocks of the hierarchical
+//! matrix.
 
 use crate::math::order::{combined_rank, rank_f32};
 use crate::math::{Bounds, Vec3};
 
 /// Maximum number of centres in a leaf of the cluster tree. With 32, there are twice as many blocks; with 128, twice as
-/// many numbers are stored in full.
+/// many matrix entries are stored in full.
 const LEAF: usize = 64;
 
 /// A binary tree over points: each cluster is a range of [`ClusterTree::order`], each child about half of it.
 #[derive(Clone, Debug)]
 pub struct ClusterTree {
-    /// Indices of the points, ordered such that each cluster is contiguous.
+    /// Indices of the points given to [`Self::new`], ordered such that each cluster is contiguous.
     pub order: Vec<u32>,
-    /// All clusters; the first contains all points.
+    /// All clusters of the tree; the first contains all points.
     pub clusters: Vec<Cluster>,
 }
 
 /// A cluster of points that are near each other.
 #[derive(Clone, Debug)]
 pub struct Cluster {
-    /// Start of its range in [`ClusterTree::order`].
+    /// Start of the cluster's range in [`ClusterTree::order`].
     pub start: usize,
-    /// End, exclusive, of its range in [`ClusterTree::order`].
+    /// End (exclusive) of the cluster's range in [`ClusterTree::order`].
     pub end: usize,
-    /// Bounding box of its points.
+    /// Bounding box of the cluster's points.
     pub bounds: Bounds,
-    /// Indices of its two children in [`ClusterTree::clusters`]; `None` for a leaf.
+    /// Indices of the cluster's two children in [`ClusterTree::clusters`]; `None` for a leaf.
     pub halves: Option<[usize; 2]>,
 }
 
 impl Cluster {
-    /// Returns the number of points.
+    /// Returns the number of points in the cluster.
     pub fn len(&self) -> usize {
         self.end - self.start
     }
 
-    /// Returns the diameter of the cluster: the diagonal of its bounding box.
+    /// Returns the diameter of the cluster: the diagonal of its bounding box, which bounds the distance of its points.
     pub fn diameter(&self) -> f32 {
         self.bounds.min.distance(self.bounds.max)
     }
@@ -48,7 +49,7 @@ impl Cluster {
 }
 
 impl ClusterTree {
-    /// Builds the tree of `points`, by halving clusters at the median along their widest axis.
+    /// Builds the cluster tree of `points`, by halving clusters at the median along their widest axis.
     pub fn new(points: &[Vec3]) -> Self {
         let mut tree = Self { order: (0..points.len() as u32).collect(), clusters: Vec::new() };
         let mut order = std::mem::take(&mut tree.order);

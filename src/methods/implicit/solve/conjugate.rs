@@ -1,6 +1,8 @@
-//! Projected conjugate gradients for [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0], within the weights that are orthogonal to the
-//! polynomials B (Gould, Hribar & Nocedal, *On the solution of equality constrained quadratic programming problems*,
-//! 2001, algorithm 2.1). M is the preconditioner, an approximate inverse of Φ+Λ.
+//! Projected conjugate gradients for the linear system [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0] of the implicit function's weights
+//! w and polynomial coefficients p (Φ: kernel, Λ: regularisation, B: polynomials at the centres, y: prescribed values).
+//! Iterations stay within the weights that are orthogonal to B (Gould, Hribar & Nocedal, *On the solution of equality
+//! constrained quadratic programming problems*, 2001, algorithm 2.1). M is the preconditioner, an approximate inverse
+//! of Φ+Λ.
 
 use super::precondition::SparseInverse;
 use crate::methods::implicit::vectors::{add, dot};
@@ -11,12 +13,14 @@ use crate::methods::implicit::vectors::{add, dot};
 pub struct Polynomials {
     columns: Vec<Vec<f64>>,
     preconditioned: Vec<Vec<f64>>,
-    /// Inverse of BᵀMB, row by row.
+    /// Inverse of BᵀMB, row by row, where B is the matrix of polynomials and M the preconditioner; used to project
+    /// weights.
     inverse: Vec<f64>,
 }
 
 impl Polynomials {
-    /// Prepares the projection for the columns of B; `None` if they are linearly dependent.
+    /// Prepares the projection of weights for the columns of B, with the preconditioner `inverse`; `None` if these
+    /// columns are linearly dependent.
     pub fn new(columns: Vec<Vec<f64>>, inverse: &SparseInverse) -> Option<Self> {
         let preconditioned: Vec<Vec<f64>> = columns.iter().map(|column| inverse.product(column)).collect();
         let gram = columns.iter().flat_map(|a| preconditioned.iter().map(|b| dot(a, b))).collect();
@@ -25,7 +29,7 @@ impl Polynomials {
     }
 
     /// Returns the projection of `weights` onto those orthogonal to the polynomials: the nearest ones in the norm of
-    /// M⁻¹.
+    /// M⁻¹, where M is the preconditioner.
     pub fn project(&self, mut weights: Vec<f64>) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, &weights)).collect();
         for (row, preconditioned) in self.inverse.chunks_exact(moments.len()).zip(&self.preconditioned) {
@@ -34,35 +38,36 @@ impl Polynomials {
         weights
     }
 
-    /// Returns the value of the polynomial with these coefficients at the centre with index `centre`.
+    /// Returns the value of the polynomial with the given `coefficients` at the centre with the index `centre`.
     pub fn value(&self, centre: usize, coefficients: &[f64]) -> f64 {
         self.columns.iter().zip(coefficients).map(|(column, c)| c * column[centre]).sum()
     }
 
-    /// Returns the coefficients c for which r − Bc has the least norm, that of M; `preconditioned` is Mr.
+    /// Returns the polynomial coefficients c for which r − Bc is least in the norm of the preconditioner M;
+    /// `preconditioned` is Mr, for the residual r.
     fn coefficients(&self, preconditioned: &[f64]) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, preconditioned)).collect();
         self.inverse.chunks_exact(moments.len()).map(|row| dot(row, &moments)).collect()
     }
 }
 
-/// The state of the conjugate gradient iteration.
+/// The state of the conjugate gradient iteration for the weights and polynomial coefficients of an implicit function.
 #[derive(Clone, Debug)]
 pub struct ConjugateGradients {
-    /// The weights w, one per row of the system.
+    /// The weights w found so far, one per row of the linear system.
     pub weights: Vec<f64>,
-    /// The coefficients p, one per polynomial.
+    /// The polynomial coefficients p found so far, one per polynomial.
     pub coefficients: Vec<f64>,
-    /// The residual y − (Φ+Λ)w − Bp.
+    /// The residual y − (Φ+Λ)w − Bp of the linear system, one entry per row.
     pub residual: Vec<f64>,
     direction: Vec<f64>,
-    /// Squared norm of the residual r in the norm of M: rᵀMr.
+    /// Squared norm of the residual r in the norm of the preconditioner M: rᵀMr.
     energy: f64,
 }
 
 impl ConjugateGradients {
     /// Starts the iteration from `weights`, which must be orthogonal to the polynomials; `residual` is y − (Φ+Λ)w for
-    /// them.
+    /// these weights.
     pub fn new(
         weights: Vec<f64>,
         residual: Vec<f64>,
@@ -77,7 +82,8 @@ impl ConjugateGradients {
         start
     }
 
-    /// Does one iteration; `product` multiplies by Φ+Λ. Returns false if rounding prevents further progress.
+    /// Does one iteration, which improves weights and coefficients; `product` multiplies a vector by Φ+Λ. Returns false
+    /// if rounding prevents further progress, else true.
     pub fn iterate(
         &mut self,
         product: impl Fn(&[f64]) -> Vec<f64>,
@@ -100,8 +106,8 @@ impl ConjugateGradients {
         true
     }
 
-    /// Changes the polynomials' coefficients such that the residual r is least in the norm of M. Returns Mr, which is
-    /// then orthogonal to the polynomials.
+    /// Changes the polynomials' coefficients such that the residual r is least in the norm of the preconditioner M.
+    /// Returns Mr, which is then orthogonal to the polynomials.
     fn project_residual(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
         let mut preconditioned = inverse.product(&self.residual);
         let more = polynomials.coefficients(&preconditioned);

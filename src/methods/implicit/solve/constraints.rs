@@ -1,21 +1,23 @@
-//! Constraints on the implicit function: centres, values and regularisation.
+//! Constraints on the implicit function: centres, prescribed values and regularisation λ.
 
 use super::Solution;
 use crate::math::{Bounds, Vec3};
 use crate::methods::implicit::cloud::Cloud;
 
-/// The constraints on the implicit function: its values at some centres, and how much each may be missed.
+/// The constraints on the implicit function: its values at some centres, and how much each value may be missed.
 #[derive(Clone, Debug, Default)]
 pub struct Constraints {
-    /// Centres, in box units, all distinct; those on the surface come first.
+    /// Positions of the constraints, in units of the normalised box, all distinct; those of surface constraints come
+    /// first.
     pub centres: Vec<Vec3>,
-    /// Prescribed values of f: 0 on the surface, −1 outside.
+    /// Prescribed value of the implicit function f at each centre: 0 on the surface, −1 outside.
     pub values: Vec<f64>,
-    /// Regularisation λ of each constraint, at least 0: f differs from the prescribed value by λ times the weight.
+    /// Regularisation λ of each constraint, at least 0: f differs from the prescribed value by λ times the weight of
+    /// the kernel at this centre.
     pub lambda: Vec<f64>,
-    /// Number of surface constraints, which come first.
+    /// Number of surface constraints, which come before the exterior ones in all lists.
     pub surface: usize,
-    /// Confidence of the surface constraints, in (0, 1], if known.
+    /// Confidence of each surface constraint, in (0, 1], by which its λ is divided; `None` means 1 for all.
     pub confidence: Option<Vec<f32>>,
 }
 
@@ -34,9 +36,9 @@ impl Constraints {
         }
     }
 
-    /// Sets λ: `outside` for exterior constraints, `surface` divided by the confidence for surface constraints. From
-    /// 3,000 surface constraints on, their λ grows in proportion to their number, so that more points give a better
-    /// surface and not a rougher one.
+    /// Sets the regularisation λ: `outside` for exterior constraints, `surface` divided by the confidence for surface
+    /// constraints. From 3,000 surface constraints on, their λ grows in proportion to their number, so that more points
+    /// give a better surface and not a rougher one.
     pub fn regularize(&mut self, surface: f64, outside: f64) {
         let crowd = self.surface as f64 / USUAL_POINTS;
         let surface = if crowd > 1.0 { surface * crowd } else { surface };
@@ -46,49 +48,53 @@ impl Constraints {
         }
     }
 
-    /// Returns a centre that two constraints share, if any.
+    /// Returns a centre that two constraints share, or `None` if all centres are distinct, as the linear system
+    /// requires.
     pub fn shared_centre(&self) -> Option<Vec3> {
         let found = PositionIndex::new(&self.centres).0;
         let shared = found.windows(2).find(|pair| pair[0].0 == pair[1].0);
         shared.map(|pair| self.centres[pair[0].1 as usize])
     }
 
-    /// Returns the radius of a ball that contains all centres, in box units.
+    /// Returns the radius of a ball that contains all centres, in units of the normalised box; some kernels depend on
+    /// it.
     pub fn radius(&self) -> f64 {
         let bounds = Bounds::from_points(&self.centres);
         0.5 * f64::from(bounds.max.distance(bounds.min))
     }
 
-    /// Returns the mean over the surface constraints of f, which at a constraint is its value minus λ times its weight;
-    /// one of the choices for the iso-value.
+    /// Returns the mean of the implicit function f over the surface constraints, one of the choices for the iso-value.
+    /// At a constraint, f is the prescribed value minus λ times the weight.
     pub fn mean_on_surface(&self, solution: &Solution) -> f64 {
         let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
         -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64
     }
 }
 
-/// Number of surface constraints for which the usual values of λ are meant (paper, section VI-B).
+/// Number of surface constraints for which the usual values of λ are meant (Dinh, Turk & Slabaugh, section VI-B); with
+/// more constraints, λ is increased.
 const USUAL_POINTS: f64 = 3000.0;
 
-/// Points sorted by position, to find equal ones.
+/// Points sorted by position, with their indices, to find the one that equals a given point.
 pub struct PositionIndex(Vec<([u32; 3], u32)>);
 
 impl PositionIndex {
-    /// Sorts `points` for [`Self::find`].
+    /// Builds the index of `points` for [`Self::find`].
     pub fn new(points: &[Vec3]) -> Self {
         let mut all: Vec<([u32; 3], u32)> = points.iter().map(|&p| bits(p)).zip(0..).collect();
         all.sort_unstable();
         Self(all)
     }
 
-    /// Returns the index of the first of the points that equals `p`; `None` if there is none.
+    /// Returns the index, in the list given to [`Self::new`], of the first point that equals `p`; `None` if there is
+    /// none.
     pub fn find(&self, p: Vec3) -> Option<usize> {
         let at = self.0.partition_point(|(position, _)| *position < bits(p));
         self.0.get(at).filter(|(position, _)| *position == bits(p)).map(|&(_, i)| i as usize)
     }
 }
 
-/// Returns a key that is the same for equal points; −0 equals 0.
+/// Returns a key of a point for sorting that is the same for equal points; −0 equals 0.
 fn bits(p: Vec3) -> [u32; 3] {
     p.to_array().map(|x| (x + 0.0).to_bits())
 }

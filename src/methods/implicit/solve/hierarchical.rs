@@ -1,5 +1,5 @@
-//! Hierarchical matrix: Φ, the kernel between all centres, with near blocks stored in full and far ones as low-rank
-//! products. Its size and the time of a product grow as n log n.
+//! Hierarchical matrix of the linear system: Φ, the kernel between the centres of all constraints, with near blocks
+//! stored in full and far ones as low-rank products. Its size and the time of a product grow as n log n.
 
 use super::clusters::{Cluster, ClusterTree};
 use crate::math::DVec3;
@@ -8,48 +8,47 @@ use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 use crate::methods::implicit::vectors::{MatrixScalar, add, dot};
 use std::ops::Range;
 
-/// Admissibility: two clusters are far if they do not touch, and the smaller one's diameter is at most this many times
-/// their distance. With a larger number ranks grow, with a smaller one more is stored in full.
+/// Admissibility: two clusters count as far, and their block of the matrix is approximated by low rank, if they do not
+/// touch, and the smaller one's diameter is at most this many times their distance. With a larger number ranks grow,
+/// with a smaller one more blocks are stored in full.
 const ADMISSIBILITY: f32 = 3.0;
 
-/// A block on or above the diagonal, which also represents its mirror image.
+/// A block of the hierarchical matrix on or above the diagonal, which also represents its mirror image.
 #[derive(Clone, Debug)]
 struct Block {
-    /// Index of the cluster of the rows.
     rows: usize,
-    /// Index of the cluster of the columns.
     columns: usize,
     content: Content,
 }
 
 #[derive(Clone, Debug)]
 enum Content {
-    /// A near block: all entries, row by row.
+    /// A near block: its entries, row by row.
     Full(Span),
     /// A far block: the columns, then the rows of its low-rank approximation ([`LowRank`]).
     Far(Span, Span),
 }
 
-/// Location of numbers in a [`Store`].
+/// Location of a block's numbers in a [`Store`].
 #[derive(Clone, Debug)]
 struct Span {
     chunk: usize,
     range: Range<usize>,
 }
 
-/// Storage for the entries of all blocks, in a few large chunks. With thousands of small allocations, the memory of a
-/// wasm module grows page by page, which took longer than all the computation.
+/// Storage for the entries of all blocks of a matrix, in a few large chunks. With thousands of small allocations, the
+/// memory of a wasm module grows page by page, which took longer than all the computation.
 #[derive(Clone, Debug)]
 struct Store<T> {
     chunk_size: usize,
     chunks: Vec<Vec<T>>,
 }
 
-/// Maximum number of entries in a chunk of the store; a longer span gets a chunk of its own.
+/// Maximum number of entries in a chunk of a [`Store`]; a longer span gets a chunk of its own.
 const CHUNK: usize = 1 << 20;
 
 impl<T: Copy> Store<T> {
-    /// Creates an empty store for a matrix between `count` centres.
+    /// Creates an empty store of entries for a matrix between `count` centres.
     fn new(count: usize) -> Self {
         let all = count.saturating_mul(count);
         Self { chunk_size: if all < CHUNK { all } else { CHUNK }, chunks: Vec::new() }
@@ -71,7 +70,8 @@ impl<T: Copy> Store<T> {
     }
 }
 
-/// A symmetric kernel matrix Φ, with rows and columns in the order of its cluster tree, and entries stored as `T`.
+/// A symmetric matrix Φ of the kernel between all pairs of centres, as a hierarchical matrix, with rows and columns in
+/// the order of its cluster tree, and entries stored as `T`.
 #[derive(Clone, Debug)]
 pub struct HierarchicalMatrix<T> {
     centres: Vec<DVec3>,
@@ -85,8 +85,8 @@ pub struct HierarchicalMatrix<T> {
 }
 
 impl<T: MatrixScalar> HierarchicalMatrix<T> {
-    /// Creates the matrix between `centres`, which are in the order of `tree`. It is empty until [`Self::build`] has
-    /// computed all blocks, far ones to a relative error of `tolerance`.
+    /// Creates the matrix of the kernel between `centres`, which are in the order of `tree`. It is empty until
+    /// [`Self::build`] has computed all blocks, far ones to a relative error of `tolerance`.
     pub fn new(tree: ClusterTree, centres: Vec<DVec3>, tolerance: f64) -> Self {
         let mut pending = Vec::new();
         divide(&tree.clusters, 0, 0, &mut pending);
@@ -94,8 +94,8 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         Self { store: Store::new(centres.len()), centres, tree, tolerance, pending, blocks: Vec::new() }
     }
 
-    /// Computes blocks until about `work` values of the kernel have been evaluated. Returns the share of blocks
-    /// computed, 1 at the end.
+    /// Computes further blocks of the matrix until about `work` values of the kernel, tabulated in `table`, have been
+    /// evaluated. Returns the share of blocks computed, 1 at the end.
     pub fn build(&mut self, table: &KernelTable, work: usize) -> f64 {
         let mut done = 0;
         while done < work
@@ -116,13 +116,13 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         self.progress()
     }
 
-    /// Returns the share of blocks computed, 0 to 1.
+    /// Returns the share of the matrix's blocks that are computed, 0 to 1.
     pub fn progress(&self) -> f64 {
         let done = self.blocks.len();
         done as f64 / (done + self.pending.len()) as f64
     }
 
-    /// Returns the size of all blocks computed, in bytes.
+    /// Returns the size of all blocks of the matrix computed so far, in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.store.chunks.iter().map(Vec::len).sum::<usize>()
     }
@@ -146,7 +146,7 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
         )
     }
 
-    /// Returns the product Φx of the matrix and `x`; both vectors are in the order of the cluster tree.
+    /// Returns the product Φx of the kernel matrix and a vector `x`; both vectors are in the order of the cluster tree.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for block in &self.blocks {

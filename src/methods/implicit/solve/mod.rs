@@ -1,6 +1,6 @@
-//! The linear system of the weights (paper, section IV; equation 3 with λ on the diagonal), for tens of thousands of
-//! constraints: conjugate gradients (`conjugate`) on a hierarchical matrix (`system`, `hierarchical`), preconditioned
-//! by a sparse approximate inverse (`precondition`).
+//! The linear system for the weights of the implicit function (Dinh, Turk & Slabaugh, section IV; equation 3 with λ on
+//! the diagonal), for tens of thousands of constraints: conjugate gradients (`conjugate`) on a hierarchical matrix
+//! (`system`, `hierarchical`), preconditioned by a sparse approximate inverse (`precondition`).
 //!
 //! Work is done in slices of some milliseconds, always the same ones, so that a caller can show progress and stop. At
 //! the end the residual is recomputed from the kernel itself, not from the approximated matrix; if it is not small
@@ -22,47 +22,52 @@ use conjugate::{ConjugateGradients, Polynomials};
 use serde::{Deserialize, Serialize};
 use system::{System, WORK};
 
-/// The solution of the system: weights and polynomial of f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
+/// The solution of the linear system: weights and polynomial of f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x), the implicit function.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
-    /// The weights w, in the order of the constraints.
+    /// The weights w, one for each constraint, in the order of the constraints.
     pub weights: Vec<f64>,
     /// Coefficients of the polynomial p: the constant, and with a thin plate those of x, y and z.
     pub coefficients: Vec<f64>,
 }
 
-/// Error of a solver whose system cannot be solved to the tolerance.
+/// Error of a [`Solver`] whose linear system cannot be solved to the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// Share of the tolerance at which iterations stop: the rest is a margin, since the true residual is larger than the one
-/// that iterations compute.
+/// Share of the tolerance at which conjugate gradient iterations stop: the rest is a margin, since the true residual is
+/// larger than the one that iterations compute.
 const ITERATE_TO: f64 = 0.5;
-/// Maximum number of iterations for each round so far; a round may use what earlier ones left. A system that can be
-/// solved needs a few dozen.
+/// Maximum number of conjugate gradient iterations per round, each round starting from a recomputed residual; a round
+/// may also use the iterations that earlier ones left. A system that can be solved needs a few dozen.
 const MAX_ITERATIONS: u32 = 500;
-/// Share of the true residual that a round of iterations may leave: if a round after the first leaves more, rounding
-/// limits it, and the solve fails.
+/// Share of the true residual that a round of iterations, which starts from a recomputed residual, may leave. If a
+/// round after the first leaves more, rounding prevents progress, and the solve fails.
 const MAX_REMAINING: f64 = 0.7;
-/// Maximum number of rounds of iterations, each from a recomputed residual.
+/// Maximum number of rounds of iterations, each from a recomputed residual, before the solve fails.
 const MAX_ROUNDS: u32 = 6;
-/// Maximum number of rows from which the true residual is estimated. From a thousand, it is known to some 3 %.
+/// Maximum number of rows of the linear system from which the true residual is estimated. From a thousand rows, it is
+/// known to some 3 %.
 const CHECKED_ROWS: usize = 1024;
 
-/// Solver of a linear system, slice by slice. Its vectors are in the order of the rows of [`System`].
+/// Solver of the linear system for the weights of an implicit function, in slices of about ten milliseconds of work.
+/// Its vectors are in the order of the rows of [`System`].
 #[derive(Clone, Debug)]
 pub struct Solver {
     system: System,
     tolerance: f64,
-    /// Constraints to which the system is to be revised before it is solved, and the initial weights, in their order.
+    /// Constraints to which the system is to be revised before it is solved, and the initial weights, in the order of
+    /// these constraints.
     revision: Option<(Constraints, Vec<f64>)>,
     stage: Stage,
-    /// Slices of work since the system was complete, or, before that, since the start of the solve.
+    /// Slices of work since the matrix was complete, or, before that, since the start of the solve; part of the
+    /// position at which a run is saved.
     slices: u32,
     iterations: u32,
     rounds: u32,
     residual: f64,
-    /// The true relative residual after the previous round of iterations; infinite in the first.
+    /// The true relative residual after the previous round of iterations, to tell whether rounds still gain; infinite
+    /// in the first round.
     previous_residual: f64,
 }
 
@@ -70,15 +75,16 @@ pub struct Solver {
 enum Stage {
     Build,
     Iterate(Box<Polynomials>, ConjugateGradients),
-    /// Recomputing the residual of some rows from the kernel, as an estimate for all; holds those done so far.
+    /// Recomputing the residuals of some rows from the kernel, as an estimate for all rows; holds those of the rows
+    /// done so far.
     Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
-    /// Recomputing y − (Φ+Λ)w for all rows from the kernel; holds those done so far.
+    /// Recomputing y − (Φ+Λ)w for all rows from the kernel; holds the entries of the rows done so far.
     RecomputeResidual(Box<Polynomials>, ConjugateGradients, Vec<f64>),
     Done(ConjugateGradients),
 }
 
 impl Solver {
-    /// Creates a solver for the system of `constraints`; it stops at a relative residual of `tolerance`.
+    /// Creates a solver for the linear system of `constraints`; it stops at a relative residual of `tolerance`.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         Self {
             system: System::new(constraints, kernel, tolerance, seed),
@@ -95,7 +101,8 @@ impl Solver {
 
     /// Switches to other constraints, most of which must be those given to [`Self::new`]: keeps what was computed for
     /// these, and starts from `weights`, in the order of `constraints`. The result depends on the first constraints,
-    /// these and the weights, not on others in between. Returns false, and does nothing, if too many differ.
+    /// these and the weights, not on constraints in between. Returns false, and does nothing, if too many constraints
+    /// differ.
     pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
         if !self.system.can_revise(constraints) {
             return false;
@@ -107,7 +114,7 @@ impl Solver {
         true
     }
 
-    /// Does a slice of work. Returns whether the solution is complete.
+    /// Continues the solve by one slice, about ten milliseconds of work. Returns whether the solution is complete.
     ///
     /// # Errors
     /// [`Singular`] if the tolerance cannot be reached.
@@ -126,17 +133,17 @@ impl Solver {
         Ok(matches!(self.stage, Stage::Done(_)))
     }
 
-    /// Returns whether the constraints were replaced by [`Self::revise`].
+    /// Returns whether the constraints were replaced by [`Self::revise`] since the solver was created.
     pub fn is_revised(&self) -> bool {
         self.revision.is_some() || self.system.is_revised()
     }
 
-    /// Returns the progress as a position for [`Self::advance_to`], to be saved with a run.
+    /// Returns how far the solver has got, as a position for [`Self::advance_to`], to be saved with a run.
     pub fn position(&self) -> SolverPosition {
         SolverPosition { built: !matches!(self.stage, Stage::Build), slices: self.slices }
     }
 
-    /// Repeats the slices of work up to a position, to restore a saved run.
+    /// Repeats slices of work up to the position `to`, at which a run was saved, to restore that run.
     ///
     /// # Errors
     /// [`Singular`] if the tolerance cannot be reached.
@@ -148,25 +155,25 @@ impl Solver {
         Ok(())
     }
 
-    /// Returns the solution, once [`Self::advance`] has returned true.
+    /// Returns the solution of the linear system once [`Self::advance`] has returned true, `None` before.
     pub fn solution(&self) -> Option<Solution> {
         let Stage::Done(gradients) = &self.stage else { return None };
         let weights = self.system.to_constraints(&gradients.weights);
         Some(Solution { weights, coefficients: gradients.coefficients.clone() })
     }
 
-    /// Returns the kernel of the system.
+    /// Returns the radial basis function of the implicit function that is solved for.
     pub fn kernel(&self) -> Kernel {
         self.system.kernel()
     }
 
-    /// Returns the relative residual |y − (Φ+Λ)w − Bp| / |y|: during iterations the one they compute, at the end the
-    /// true one, estimated from some rows.
+    /// Returns the relative residual |y − (Φ+Λ)w − Bp| / |y|: during iterations the one that these update, at the end
+    /// the true one, estimated from some rows.
     pub fn residual(&self) -> f64 {
         self.residual
     }
 
-    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
+    /// Returns the approximate share of the solve that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         match &self.stage {
             Stage::Build => 0.7 * self.system.progress(),
@@ -179,7 +186,8 @@ impl Solver {
         }
     }
 
-    /// Returns the size of the matrix in bytes, most of what the solver occupies.
+    /// Returns the size of the matrix in bytes, most of the solver's memory, by which callers decide whether to keep
+    /// it.
     pub fn matrix_bytes(&self) -> usize {
         self.system.matrix_bytes()
     }
@@ -277,12 +285,13 @@ impl Solver {
     }
 }
 
-/// Progress of a solver, in slices of work.
+/// How far a [`Solver`] has got, in slices of work; it is saved with a run, which is restored by repeating as much
+/// work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SolverPosition {
-    /// Whether matrix and preconditioner are complete, and revised if they are to be.
+    /// Whether matrix and preconditioner are complete, including their revision if one was requested.
     built: bool,
-    /// Slices of work since `built` became true, or, before that, since the start.
+    /// Slices of work since `built` became true, or, before that, since the start of the solve.
     slices: u32,
 }
 
@@ -303,7 +312,8 @@ mod tests {
         }
     }
 
-    /// Returns constraints at points of a bumpy ball, some outside, and 16 around it.
+    /// Returns test constraints: `count` surface points on a bumpy ball, a tenth as many exterior points near it, and
+    /// 16 around it; `surface` and `outside` are their λ.
     fn system(count: usize, [surface, outside]: [f64; 2], confidence: bool) -> Constraints {
         let mut random = Random::new(5);
         let mut point = |size: f64| {
@@ -341,7 +351,7 @@ mod tests {
         panic!("no end")
     }
 
-    /// Returns |y − (Φ+Λ)w − Bp| / |y|, with all rows computed from the kernel.
+    /// Returns |y − (Φ+Λ)w − Bp| / |y|, the relative residual of a solution, with all rows computed from the kernel.
     fn true_residual(constraints: &Constraints, kernel: Kernel, solution: &Solution) -> f64 {
         let centres: Vec<DVec3> = constraints.centres.iter().map(|p| p.as_dvec3()).collect();
         let row = |i: usize| {
@@ -355,7 +365,8 @@ mod tests {
         squared.sqrt() / norm(&constraints.values)
     }
 
-    /// Solves the whole system by Gaussian elimination with pivoting. Returns the weights, then the coefficients.
+    /// Solves the whole linear system by Gaussian elimination with pivoting, as reference for the tests. Returns the
+    /// weights, then the coefficients.
     fn by_elimination(constraints: &Constraints, kernel: Kernel) -> Vec<f64> {
         let centres: Vec<DVec3> = constraints.centres.iter().map(|p| p.as_dvec3()).collect();
         let (n, columns) = (centres.len(), polynomial_columns(kernel, &centres));
@@ -388,7 +399,7 @@ mod tests {
         x
     }
 
-    /// Returns the columns of B: 1, and with a thin plate x, y and z, at the centres.
+    /// Returns the columns of the matrix B of polynomials: 1, and with a thin plate x, y and z, at the centres.
     fn polynomial_columns(kernel: Kernel, centres: &[DVec3]) -> Vec<Vec<f64>> {
         let constant = std::iter::once(vec![1.0; centres.len()]);
         let linear = (0..kernel.polynomials() - 1).map(|axis| centres.iter().map(|p| p[axis]).collect());
@@ -458,7 +469,8 @@ mod tests {
         }
     }
 
-    /// The matrix is stored in single precision, and iterations restart from the true residual.
+    /// With so many constraints, the matrix is stored in single precision, and iterations restart from the true
+    /// residual.
     #[cfg(not(target_arch = "wasm32"))]
     #[test]
     fn eight_thousand_constraints_to_many_digits() {
@@ -511,7 +523,7 @@ mod tests {
         assert!(solver.solution().unwrap().weights == copy.solution().unwrap().weights);
     }
 
-    /// Returns `base` with some of its surface and exterior constraints removed, and others added.
+    /// Returns the constraints `base` with some of its surface and exterior constraints removed, and others added.
     fn changed(base: &Constraints) -> Constraints {
         let mut random = Random::new(11);
         let (surface, outside) = base.centres.split_at(base.surface);
@@ -524,7 +536,7 @@ mod tests {
         changed
     }
 
-    /// Returns the weights of `solution` at those centres that are also in `to`, and 0 at others.
+    /// Returns the weights of `solution` at those centres of `to` that are also in `from`, and 0 at its other centres.
     fn weights_carried_over(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
         let known = PositionIndex::new(&from.centres);
         to.centres.iter().map(|&c| known.find(c).map_or(0.0, |i| solution.weights[i])).collect()

@@ -1,31 +1,32 @@
-//! Preconditioner: a sparse approximate inverse Cholesky factor of Φ + Λ. Each centre is predicted from its nearest
-//! predecessors, in an order from coarse to fine (Vecchia's approximation; Schäfer, Katzfuss & Owhadi, *Sparse Cholesky
-//! factorization by Kullback–Leibler minimization*, 2021).
+//! Preconditioner of the conjugate gradients: a sparse approximate inverse Cholesky factor of Φ + Λ. Each centre is
+//! predicted from its nearest predecessors, in an order from coarse to fine (Vecchia's approximation; Schäfer, Katzfuss
+//! & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler minimization*, 2021).
 
 use crate::math::order::rank_f64;
 use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
-/// Maximum number of predecessors of a centre in its row of the inverse. With 16, half as many iterations again are
-/// needed; with 32, the inverse takes twice as long to compute.
+/// Maximum number of predecessors of a centre in its row of the sparse inverse. With 16, half as many iterations again
+/// are needed; with 32, the inverse takes twice as long to compute.
 const NEIGHBOURS: usize = 24;
 
-/// A sparse approximate inverse of the system's matrix: (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ, with a sparse gᵢ for each centre. It
-/// preconditions conjugate gradients.
+/// A sparse approximate inverse of the linear system's matrix: (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ, with a sparse gᵢ for each centre.
+/// It preconditions conjugate gradients.
 #[derive(Clone, Debug)]
 pub struct SparseInverse {
-    /// The order of the centres, with the predecessors of each.
+    /// The order of the centres, with those predecessors of each that its row of the inverse refers to.
     rows: Rows,
-    /// The part of the ordering that is still to be done.
+    /// The part of the ordering of centres that is still to be done.
     ordering: MaximinOrdering,
-    /// Number of rows computed.
     computed: usize,
-    /// Entries of gᵢ for each row computed, one row after the other: for the centre itself, then for its neighbours.
+    /// Entries of the vectors gᵢ of the sparse inverse Σ gᵢ gᵢᵀ for each row computed, one row after the other: for the
+    /// centre itself, then for its neighbours.
     weights: Vec<f64>,
 }
 
-/// The centres in their order, from coarse to fine, each with some of its predecessors, called its neighbours.
+/// The centres in their order, from coarse to fine, each with some of its nearest predecessors, called its neighbours,
+/// to which its row of the inverse is limited.
 #[derive(Clone, Debug, Default)]
 struct Rows {
     centres: Vec<u32>,
@@ -49,15 +50,15 @@ impl Rows {
 }
 
 impl SparseInverse {
-    /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last` in its order;
-    /// together these lists hold the index of each centre once. Nothing is computed yet.
+    /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last` in the order of its
+    /// rows; together these lists hold the index of each centre once. Nothing is computed yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
         let ordering = MaximinOrdering::new(centres, first, last);
         Self { rows: Rows::default(), ordering, computed: 0, weights: Vec::new() }
     }
 
-    /// Tests up to `count` more centres for the ordering; once that is complete, computes up to `count` more rows.
-    /// Returns whether all are computed.
+    /// Continues the inverse: tests up to `count` more centres for the ordering; once that is complete, computes up to
+    /// `count` more rows. Returns whether all rows are computed.
     ///
     /// If a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
@@ -70,7 +71,7 @@ impl SparseInverse {
         self.computed == centres.len()
     }
 
-    /// Returns the share of the work that is done, 0 to 1: of rows ordered and of rows computed.
+    /// Returns the share of the inverse that is done, 0 to 1, by numbers of rows ordered and of rows computed.
     pub fn progress(&self) -> f64 {
         0.5 * (self.rows.centres.len() + self.computed) as f64 / self.ordering.centres.len() as f64
     }
@@ -114,7 +115,7 @@ impl SparseInverse {
         row(centre, near, centres, lambda, table, &mut self.weights);
     }
 
-    /// Returns the approximate inverse times `x`.
+    /// Returns the product of the approximate inverse and the vector `x`, which preconditions it.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         let mut rest = &self.weights[..];
@@ -144,7 +145,7 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
 }
 
 /// Appends one row of the inverse, the entries of gᵢ for one centre, to `out`: (1, −c)/√(φ(0) + λ − bᵀc) with c = A⁻¹b,
-/// where A is the matrix Φ+Λ of its neighbours, and b holds its entries of Φ with them.
+/// where A is the matrix Φ+Λ of its neighbours, and b holds the entries of Φ between the centre and them.
 fn row(
     centre: u32,
     neighbours: &[u32],
@@ -175,8 +176,8 @@ fn row(
     out.extend(b.iter().map(|x| -x * scale));
 }
 
-/// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: a lower one is due to rounding, and is
-/// raised to it.
+/// Smallest pivot of a Cholesky factorisation, as a share of the matrix's diagonal entry: a lower pivot is due to
+/// rounding, and is raised to this.
 const MIN_PIVOT: f64 = 1e-12;
 
 /// Replaces the lower triangle of a symmetric positive definite `n` by `n` matrix by its Cholesky factor; pivots are at
@@ -219,15 +220,19 @@ fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Minimum distance between the centres taken in the first round of the ordering, in box units.
+/// Minimum distance between the centres taken in the first round of the ordering of centres from coarse to fine, in
+/// units of the normalised box (longest side 2).
 const FIRST_SPACING: f32 = 2.0;
-/// Ratio of the minimum distance of one round of the ordering to that of the round before.
+/// Ratio of the minimum distance between the centres taken in one round of the ordering to that in the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Minimum distance of a round, in box units, at or below which all centres left are taken in their given order.
+/// Minimum distance between centres in a round of the ordering, in units of the normalised box (longest side 2), at or
+/// below which all remaining centres are taken in their given order.
 const MIN_SPACING: f32 = 1e-6;
-/// Edge length of the cells of the grid that holds the centres taken, in minimum distances of the round.
+/// Edge length of the cells of the grid that holds the centres taken so far by the ordering, in minimum distances of
+/// its current round.
 const CELL: f32 = 3.6;
-/// Initial search radius for the nearest predecessors of a centre, in minimum distances of the round.
+/// Initial search radius for the nearest predecessors of a centre in the ordering, in minimum distances of the current
+/// round.
 const SEARCH_RADIUS: f32 = 3.6;
 
 /// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors:
@@ -237,12 +242,12 @@ const SEARCH_RADIUS: f32 = 3.6;
 #[derive(Clone, Debug, Default)]
 struct MaximinOrdering {
     centres: Vec<Vec3>,
-    /// Positions of the centres taken so far, in their order.
+    /// Positions of the centres ordered so far, in their order, among which the nearest are searched for.
     grid: PointGrid,
     spacing: f32,
-    /// Centres to be tested in this round, the next one last.
+    /// Centres to be tested in the current round, the next one last.
     pending: Vec<u32>,
-    /// Centres left for the next round.
+    /// Centres too near to those taken, left for the next round.
     deferred: Vec<u32>,
     /// Centres that are ordered after all others: those of exterior constraints.
     last: Vec<u32>,
@@ -261,8 +266,8 @@ impl MaximinOrdering {
         }
     }
 
-    /// Tests up to `count` centres in the rounds of the ordering, and appends those taken to `rows`. Returns whether
-    /// all are ordered.
+    /// Continues the ordering: tests up to `count` centres and appends those taken to `rows`. Returns whether all
+    /// centres are ordered.
     fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
             while self.pending.is_empty() {

@@ -8,24 +8,26 @@ use crate::math::{DVec3, Random, Vec3};
 use crate::methods::implicit::kernel::{Kernel, KernelTable};
 use crate::methods::implicit::vectors::{add, dot};
 
-/// Work in a slice, in kernel evaluations or the equivalent: about ten milliseconds.
+/// Amount of work that the solver does in one slice, in evaluations of the kernel or their equivalent: about ten
+/// milliseconds.
 pub const WORK: usize = 2_000_000;
-/// Cost of a row of the sparse inverse, in kernel evaluations.
+/// Cost of computing a row of the sparse inverse, in evaluations of the kernel, which limits the rows in a slice of
+/// work.
 const ROW_WORK: usize = 4_000;
-/// Relative error of far blocks of the matrix, as a share of the solver's tolerance: with it, the final residual is
-/// seldom above the tolerance.
+/// Relative error of the low-rank blocks of the hierarchical matrix, as a share of the solver's tolerance: with it, the
+/// final residual is seldom above the tolerance.
 const FAR_ERROR: f64 = 0.1;
-/// Number of constraints above which far blocks are more accurate, in proportion to the number: errors add up, and a
-/// residual that is too large has to be recomputed from all pairs of constraints.
+/// Number of constraints above which low-rank blocks of the matrix are made more accurate, in proportion to the number:
+/// errors add up, and a residual that is too large has to be recomputed from all pairs of constraints.
 const USUAL_CONSTRAINTS: f64 = 25_000.0;
-/// Relative error of far blocks of the matrix for kernels that are only conditionally positive definite, whose large
-/// values cancel.
+/// Relative error of the low-rank blocks of the hierarchical matrix for kernels that are only conditionally positive
+/// definite, whose large values cancel.
 const CONDITIONAL_ERROR: f64 = 1e-11;
-/// Maximum number of constraints whose matrix is stored in double precision; with more, memory matters more. For
-/// kernels that are only conditionally positive definite it always is.
+/// Maximum number of constraints whose matrix is stored in double precision; with more, memory matters more. Kernels
+/// that are only conditionally positive definite always use double precision.
 const DOUBLE_BELOW: usize = 6000;
-/// Maximum number of constraints added, and of constraints removed, for which the system is revised and not rebuilt.
-/// Each added one costs a row of the full matrix.
+/// Maximum number of constraints added, and of constraints removed, for which the linear system is revised and not
+/// rebuilt. Each added constraint costs a row of the full matrix.
 const MAX_CHANGES: usize = 256;
 /// Marks a row whose constraint was removed, in place of the constraint's index.
 const REMOVED: u32 = u32::MAX;
@@ -50,12 +52,12 @@ pub struct System {
     revision: Option<Revision>,
 }
 
-/// Differences from the constraints for which the matrix was computed.
+/// Changes of the constraints since the matrix was computed, which allow it to be reused.
 #[derive(Clone, Debug)]
 struct Revision {
     /// For each row of the matrix, whether its constraint was removed.
     removed: Vec<bool>,
-    /// For each added row, its entries of Φ, up to the diagonal.
+    /// For each added row, its entries of the kernel matrix Φ, up to the diagonal.
     rows: Vec<Vec<f64>>,
     inverse: SparseInverse,
 }
@@ -67,8 +69,8 @@ enum Matrix {
 }
 
 impl System {
-    /// Creates the system of `constraints`; nothing is computed yet. Far blocks of the matrix will be as accurate as a
-    /// residual of `tolerance` requires.
+    /// Creates the linear system of `constraints`; nothing is computed yet. Low-rank blocks of the matrix will be as
+    /// accurate as a residual of `tolerance` requires.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         let tree = ClusterTree::new(&constraints.centres);
         let constraint_of_row = tree.order.clone();
@@ -91,7 +93,8 @@ impl System {
         }
     }
 
-    /// Does a slice of work on preconditioner and matrix. Returns whether both are complete.
+    /// Computes a slice, about ten milliseconds of work, of the preconditioner and then the matrix. Returns whether
+    /// both are complete.
     pub fn build(&mut self) -> bool {
         if self.revision.is_some() || self.matrix.progress() == 1.0 {
             return true;
@@ -113,7 +116,7 @@ impl System {
     }
 
     /// Returns whether [`Self::revise`] is worthwhile: at most `MAX_CHANGES` of the constraints for which the matrix
-    /// was computed are gone, and at most `MAX_CHANGES` are new.
+    /// was computed are missing in `constraints`, and at most `MAX_CHANGES` are new.
     pub fn can_revise(&self, constraints: &Constraints) -> bool {
         let known = PositionIndex::new(&constraints.centres);
         let own = self.base_centres();
@@ -145,32 +148,32 @@ impl System {
         self.revision = Some(Revision { removed, rows, inverse });
     }
 
-    /// Returns whether the system was revised.
+    /// Returns whether the system was revised for other constraints since its matrix was computed.
     pub fn is_revised(&self) -> bool {
         self.revision.is_some()
     }
 
-    /// Returns the centres for which the matrix was computed.
+    /// Returns the centres for which the matrix was computed, without those added by a revision.
     fn base_centres(&self) -> &[DVec3] {
         &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.removed.len())]
     }
 
-    /// Returns the entries of Φ between row `i` and the first `count` rows.
+    /// Returns the entries of the kernel matrix Φ between row `i` and the first `count` rows.
     fn row(&self, i: usize, count: usize) -> impl Iterator<Item = f64> {
         self.centres[..count].iter().map(move |c| self.table.value(self.centres[i].distance_squared(*c)))
     }
 
-    /// Returns the kernel φ of the matrix Φ.
+    /// Returns the kernel φ, whose values between centres are the matrix Φ.
     pub fn kernel(&self) -> Kernel {
         self.table.kernel()
     }
 
-    /// Returns the number of rows, with those of removed constraints.
+    /// Returns the number of rows of the linear system, including those of removed constraints.
     pub fn len(&self) -> usize {
         self.centres.len()
     }
 
-    /// Returns the size of the matrix, in bytes.
+    /// Returns the size of the stored kernel matrix, in bytes.
     pub fn matrix_bytes(&self) -> usize {
         match &self.matrix {
             Matrix::Single(matrix) => matrix.bytes(),
@@ -178,7 +181,7 @@ impl System {
         }
     }
 
-    /// Returns the right-hand side y, by row.
+    /// Returns the right-hand side y of the system, the prescribed value of f for each row.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -188,12 +191,13 @@ impl System {
         self.revision.as_ref().map_or(&self.inverse, |revision| &revision.inverse)
     }
 
-    /// Reorders a vector over constraints into one over rows; removed rows are 0.
+    /// Reorders a vector with an entry per constraint into one with an entry per row of the system; removed rows are 0.
     pub fn to_rows(&self, of_constraints: &[f64]) -> Vec<f64> {
         gather_rows(&self.constraint_of_row, of_constraints)
     }
 
-    /// Reorders a vector over rows into one over constraints.
+    /// Reorders a vector with an entry per row of the system into one with an entry per constraint, without removed
+    /// rows.
     pub fn to_constraints(&self, of_rows: &[f64]) -> Vec<f64> {
         let present = || self.constraint_of_row.iter().zip(of_rows).filter(|(i, _)| **i != REMOVED);
         let mut all = vec![0.0; present().count()];
@@ -201,7 +205,8 @@ impl System {
         all
     }
 
-    /// Returns the columns of B, by row: 1, and with a thin plate x, y and z, at the centres; 0 in removed rows.
+    /// Returns the columns of the matrix B of polynomials at the centres, by row: 1, and with a thin plate x, y and z;
+    /// 0 in removed rows.
     pub fn polynomials(&self) -> Vec<Vec<f64>> {
         let column = |power: usize| {
             let entry = |(centre, &i): (&DVec3, &u32)| match power {
@@ -214,7 +219,7 @@ impl System {
         (0..self.kernel().polynomials()).map(column).collect()
     }
 
-    /// Returns (Φ+Λ)x, with Φ approximated as a hierarchical matrix.
+    /// Returns the product (Φ+Λ)x of the system's matrix and a vector, with Φ approximated as a hierarchical matrix.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let own = self.base_centres().len();
         let mut out = match &self.matrix {
