@@ -303,7 +303,8 @@ export class DeformableModel implements Stepper {
 
   /**
    * Returns the speed of each vertex along its outward normal, in the order of `mesh.arrays()`: world units per unit of
-   * time, negative inwards. A newly created vertex has the speed of the surface at the point where it was created.
+   * time, negative inwards. A vertex created by an edit has the speed of the surface there; vertices of new components
+   * have 0.
    */
   speeds(): Float32Array {
     return this.#handle.use((raw) => raw.speeds());

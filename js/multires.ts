@@ -19,11 +19,14 @@ export interface ControlEllipsoid {
 /** Parameters of the multiresolution model; `paramSpecs('multires')` has their ranges, defaults and descriptions. */
 export interface MultiresParams {
   /**
-   * ε_min: edges shorter than this are collapsed, in the mesh's units; by default such that the base has some 10,000
-   * triangles.
+   * ε_min: edges shorter than this are collapsed, in the mesh's units; by default derived from `edgeMax`, or, without
+   * it, such that the base has some 10,000 triangles.
    */
   edgeMin?: number;
-  /** ε_max: edges longer than this are split, in the mesh's units; more than twice `edgeMin`. */
+  /**
+   * ε_max: edges longer than this are split, in the mesh's units; more than twice `edgeMin`, from which it is derived
+   * by default.
+   */
   edgeMax?: number;
   /** Largest number of levels of the multi-level solver that are coarser than the target resolution. */
   levels?: number;

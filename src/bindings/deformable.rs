@@ -9,9 +9,10 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{bytes, doubles, now, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh};
+use super::mesh::{LiveSurface, MeshKind, RawMesh};
 use super::volume::RawVolume;
 use crate::math::DVec3;
+use crate::mesh::TriangleMesh;
 use crate::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing,
     Start, param_specs,
@@ -56,6 +57,20 @@ impl RawStart {
     /// Returns a start from a copy of a mesh in world space, which must be closed and free of self-intersections.
     pub fn mesh(mesh: &RawMesh) -> RawStart {
         RawStart(Start::Mesh(Rc::unwrap_or_clone(mesh.triangles())))
+    }
+}
+
+impl LiveSurface for DeformableModel {
+    fn surface(&self) -> TriangleMesh {
+        self.surface()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.mesh().topology_version(), self.mesh().geometry_version()]
     }
 }
 

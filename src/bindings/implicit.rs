@@ -1,4 +1,4 @@
-//! Bindings of the implicit surface, its cameras, and files of points.
+//! Bindings of the implicit surface and its cameras.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -9,40 +9,13 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{bytes, floats, now, packed, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh};
+use super::mesh::{LiveSurface, MeshKind, RawMesh};
 use super::volume::RawVolume;
-use crate::io::{PointCloud, parse_points};
 use crate::math::Vec3;
+use crate::mesh::TriangleMesh;
 use crate::methods::implicit::{
     Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, param_specs,
 };
-
-/// The raw handle of a point cloud that was read from a file.
-#[wasm_bindgen]
-pub struct RawPoints(PointCloud);
-
-#[wasm_bindgen]
-impl RawPoints {
-    /// Reads a point cloud from the bytes of a PLY, OBJ or text file.
-    pub fn parse(file: &Uint8Array) -> Result<RawPoints, JsValue> {
-        Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
-    }
-
-    /// Returns the positions of the points as packed xyz.
-    pub fn points(&self) -> Vec<f32> {
-        packed(&self.0.points)
-    }
-
-    /// Returns the normals as packed xyz, if the file has them.
-    pub fn normals(&self) -> Option<Vec<f32>> {
-        self.0.normals.as_deref().map(packed)
-    }
-
-    /// Returns the colours as red, green and blue of each point in turn, in 0..1, if the file has them.
-    pub fn colors(&self) -> Option<Vec<f32>> {
-        self.0.colors.as_deref().map(packed)
-    }
-}
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
 #[wasm_bindgen]
@@ -71,6 +44,20 @@ impl RawCameras {
         let image = image.as_ref().map(bytes).transpose()?;
         self.0.push(Camera::new(projection, width, height, image).map_err(Failure::from)?);
         Ok(())
+    }
+}
+
+impl LiveSurface for ImplicitSurface {
+    fn surface(&self) -> TriangleMesh {
+        self.surface().clone()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.surface().positions.len(), self.surface().triangles.len()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.version(); 2]
     }
 }
 

@@ -11,13 +11,11 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{bytes, coordinates, packed, point, points, to_js, triangles};
 use super::error::Failure;
 use super::volume::RawVolume;
-use crate::io::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh};
+use crate::io::{MeshFormat, write_mesh};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{
     Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic_distances, measure, report,
 };
-use crate::methods::deformable::DeformableModel;
-use crate::methods::implicit::ImplicitSurface;
 use crate::remesh::{
     Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
 };
@@ -44,34 +42,6 @@ pub(super) trait LiveSurface {
     /// increases when a vertex moves or connectivity changes. Those of an implicit surface are one number, which
     /// increases with every new surface.
     fn versions(&self) -> [u32; 2];
-}
-
-impl LiveSurface for DeformableModel {
-    fn surface(&self) -> TriangleMesh {
-        self.surface()
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        [self.mesh().vertex_count(), self.mesh().triangle_count()]
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        [self.mesh().topology_version(), self.mesh().geometry_version()]
-    }
-}
-
-impl LiveSurface for ImplicitSurface {
-    fn surface(&self) -> TriangleMesh {
-        self.surface().clone()
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        [self.surface().positions.len(), self.surface().triangles.len()]
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        [self.version(); 2]
-    }
 }
 
 /// The raw handle of the TypeScript class `Mesh`: an editable mesh, a list of triangles, or the live surface of a
@@ -108,17 +78,6 @@ impl RawMesh {
             ..TriangleMesh::default()
         };
         Ok(RawMesh(triangle_list(mesh)))
-    }
-
-    /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
-    /// given.
-    pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
-        let file = bytes(file)?;
-        let mesh = match texture {
-            Some(texture) => parse_textured_mesh(&file, texture.0),
-            None => parse_mesh(&file),
-        };
-        Ok(RawMesh(triangle_list(mesh.map_err(Failure::from)?)))
     }
 
     /// Returns the iso-surface of one frame of a volume at intensity `iso`, in world space, as a list of triangles.
@@ -360,7 +319,7 @@ impl RawMesh {
 
 /// The texture of a mesh: an image file in memory.
 #[wasm_bindgen]
-pub struct RawTexture(Arc<Texture>);
+pub struct RawTexture(pub(super) Arc<Texture>);
 
 #[wasm_bindgen]
 impl RawTexture {
@@ -431,7 +390,7 @@ fn copy_into(out: &Float32Array, values: &[f32]) {
     out.subarray(0, values.len() as u32).copy_from(values);
 }
 
-fn triangle_list(mesh: TriangleMesh) -> MeshKind {
+pub(super) fn triangle_list(mesh: TriangleMesh) -> MeshKind {
     MeshKind::Triangles(Rc::new(mesh))
 }
 

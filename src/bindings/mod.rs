@@ -5,11 +5,19 @@
 
 mod animation;
 mod convert;
+#[cfg(feature = "deformable")]
 mod deformable;
+#[cfg(feature = "enrich")]
+mod enrich;
 mod error;
+#[cfg(feature = "implicit")]
 mod implicit;
+#[cfg(feature = "import")]
+mod import;
 mod mesh;
+#[cfg(feature = "multires")]
 mod multires;
+#[cfg(feature = "tracking")]
 mod tracking;
 mod volume;
 

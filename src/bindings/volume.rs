@@ -6,11 +6,11 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, copy_array, point};
+use super::convert::{copy_array, point};
 use super::error::Failure;
-use crate::io::{parse_volume, write_nifti};
+use crate::io::write_nifti;
 use crate::math::DAffine3;
-use crate::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
+use crate::volume::{Space, Volume, VolumeInit, Voxels};
 
 /// The raw handle of the TypeScript class `Volume`: a 3D or 4D volume.
 #[wasm_bindgen]
@@ -47,13 +47,6 @@ impl RawVolume {
             space: if space == "LPS" { Space::Lps } else { Space::Ras },
         };
         Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
-    }
-
-    /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of
-    /// its own.
-    pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
-        let payload = data.as_ref().map(bytes).transpose()?;
-        Ok(RawVolume(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
     }
 
     /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if a dimension exceeds 32,767.
@@ -141,15 +134,6 @@ impl RawVolume {
     pub fn binned(&self, factors: &[u32]) -> Result<RawVolume, JsValue> {
         let factors = [0, 1, 2].map(|axis| factors.get(axis).map_or(1, |&n| n as usize));
         Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
-    }
-
-    /// Returns the volume with `factor` − 1 slices inserted between neighbouring ones along the axis of the largest
-    /// spacing, interpolated by optical flow if `flow`, else linearly. Without `factor`, it is chosen so that voxels
-    /// become nearly cubes.
-    #[wasm_bindgen(js_name = enrichSlices)]
-    pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
-        let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
-        Ok(RawVolume(self.0.enrich_slices(factor, method).map_err(Failure::from)?))
     }
 }
 

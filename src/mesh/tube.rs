@@ -79,7 +79,8 @@ pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     Tube { pairs: best.map(|(_, pairs)| pairs).unwrap_or_default() }
 }
 
-/// The polygon along which a walk around the tube advances from one tube edge to the next.
+/// One of the two polygons that a tube joins: the one on which a walk around the tube advances by a corner, from one
+/// tube edge to the next. Used by the dynamic programming in [`shortest_tube`].
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Step {
     First = 0,

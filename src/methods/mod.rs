@@ -1,13 +1,17 @@
 //! Methods that fit surfaces to data, each in a module of its own, and the stepping interface common to all.
 
 mod caller_mesh;
+#[cfg(feature = "deformable")]
 pub mod deformable;
 mod error;
+#[cfg(feature = "implicit")]
 pub mod implicit;
+#[cfg(feature = "multires")]
 pub mod multires;
 mod saved;
 mod spec;
 mod step;
+#[cfg(feature = "tracking")]
 pub mod tracking;
 
 pub use error::MethodError;

@@ -51,7 +51,7 @@ pub struct Resolver {
     pub(super) changes: Changes,
 }
 
-/// What the [`Resolver`] does about contacts between non-adjacent vertices.
+/// Response of the [`Resolver`] to a contact between two non-adjacent vertices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactPolicy {
     /// Two vertices in contact are joined by a tube (axial change).
@@ -144,7 +144,8 @@ impl Resolver {
         }
     }
 
-    /// Sets what is done about contacts between non-adjacent vertices: they are joined by tubes, or left as they are.
+    /// Sets the response to contacts between non-adjacent vertices: to join the two by a tube, or to leave both
+    /// unchanged.
     pub fn set_contact_policy(&mut self, contact: ContactPolicy) {
         self.contact_policy = contact;
     }

@@ -1,4 +1,4 @@
-//! A bounding volume hierarchy of triangles, for closest-point and ray queries.
+//! A bounding volume hierarchy of triangles, for closest-point, ray and overlap queries.
 
 use crate::math::triangle::{self, Line, LineHit};
 use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};

@@ -15,8 +15,8 @@ const SPHERE_POINTS: usize = 16;
 const SPHERE: f64 = 1.2;
 /// Number of surface points for which one exterior point near the surface is made.
 const SURFACE_POINTS: usize = 10;
-/// Number to which the exterior points near the surface are reduced for clouds of at most ten times as many points;
-/// larger clouds get more.
+/// Largest number of exterior points kept near the surface if one for [`SURFACE_POINTS`] surface points would be fewer,
+/// as in clouds of less than 300 points.
 const MIN_POINTS: usize = 30;
 /// Distance at which exterior points are made from surface points, in mean spacings of the points, unless [`NOISE`] or
 /// [`MIN_OFFSET`] requires more. At a distance of 1 they constrain less than noise does, at 6 they fall into cavities.

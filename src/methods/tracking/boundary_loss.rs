@@ -41,7 +41,7 @@ const SMOOTHING: f32 = 0.5;
 impl FrameTracker {
     /// Treats the vertices at which the image shows no boundary: collapses sheets between walls that have met, grows
     /// the surface into bright regions, and smooths the rest. Counts these vertices in `statistics`, and returns the
-    /// edits of the mesh.
+    /// numbers of edits of the mesh.
     pub fn resolve_boundary_loss(
         &mut self,
         mesh: &mut Mesh,

@@ -24,7 +24,8 @@ impl Fan {
         Self { from, to, sides: SmallVec::new(), sum: Vec3::ZERO }
     }
 
-    /// Adds the triangle `to`, `a`, `b`; returns its normal, whose length is twice the area.
+    /// Adds the triangle of the fan's centre `to` with `a` and `b`, for [`Self::gap`]; returns its normal, whose length
+    /// is twice the area, by which callers detect triangles that turn over.
     pub fn push(&mut self, a: Vec3, b: Vec3) -> Vec3 {
         let normal = (a - self.to).cross(b - self.to);
         self.sides.push((a, b, normal));
