@@ -6,10 +6,11 @@
  *
  * @module vesicle
  */
-import { call } from './runtime.js';
-import { version as rawVersion } from './vesicle.js';
+import { type ParamSpec, paramSpecsOf } from './params.js';
+import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingParamSpecs } from './vesicle.js';
 
-export { animationGlb } from './animation.js';
+export * from './common.js';
+export { default } from './common.js';
 export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';
 export {
   type Attractor,
@@ -18,7 +19,6 @@ export {
   type DeformableParams,
   type DeformableStart,
 } from './deformable.js';
-export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
 export {
   type Camera,
   type Fitness,
@@ -29,36 +29,30 @@ export {
   parsePoints,
 } from './implicit.js';
 export {
-  type CurvatureKind,
-  Mesh,
-  type MeshArrays,
-  type MeshFormat,
-  type MeshHit,
-  type MeshInfo,
-  type MeshReport,
-  type MeshTexture,
-  type RestructurePass,
-  type SurfaceDistance,
-  type TextureType,
-} from './mesh.js';
-export {
   type ControlEllipsoid,
   type MultiresOptions,
   MultiresolutionModel,
   type MultiresParams,
 } from './multires.js';
-export { type ParamSpec, paramSpecs } from './params.js';
-export { type InitInput, init as default, initSync } from './runtime.js';
-export type { RunOptions, Stepper, StepReport } from './stepper.js';
 export {
   type FrameStatistics,
   SurfaceTracker,
   type TrackingOptions,
   type TrackingParams,
 } from './tracking.js';
-export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
 
-/** Returns the version of the package. */
-export function version(): string {
-  return call(rawVersion);
+const specsOf = paramSpecsOf({
+  deformable: deformableParamSpecs,
+  implicit: implicitParamSpecs,
+  tracking: trackingParamSpecs,
+  multires: multiresParamSpecs,
+});
+
+/**
+ * Returns descriptions of the parameters of a method, in their recommended order of display.
+ *
+ * @throws {@link VesicleError} `invalid-argument`: no such method.
+ */
+export function paramSpecs(method: 'deformable' | 'implicit' | 'tracking' | 'multires'): ParamSpec[] {
+  return specsOf(method);
 }

@@ -1,6 +1,5 @@
 import { choice } from './check.js';
 import { call } from './runtime.js';
-import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingParamSpecs } from './vesicle.js';
 
 /** Description of one parameter of a method, from which a page can build a control. */
 export interface ParamSpec {
@@ -26,18 +25,14 @@ export interface ParamSpec {
 }
 
 /**
- * Returns descriptions of the parameters of a method, in their recommended order of display.
- *
- * @throws {@link VesicleError} `invalid-argument`: no such method.
+ * Makes the function `paramSpecs` of an entry point from the functions of the WebAssembly module that return the
+ * specifications, by method.
  */
-export function paramSpecs(method: keyof typeof SPECS): ParamSpec[] {
-  choice('method', method, Object.keys(SPECS));
-  return call(() => SPECS[method]() as ParamSpec[]);
+export function paramSpecsOf<Method extends string>(
+  specs: Record<Method, () => unknown>,
+): (method: Method) => ParamSpec[] {
+  return (method) => {
+    choice('method', method, Object.keys(specs));
+    return call(() => specs[method]() as ParamSpec[]);
+  };
 }
-
-const SPECS = {
-  deformable: deformableParamSpecs,
-  implicit: implicitParamSpecs,
-  tracking: trackingParamSpecs,
-  multires: multiresParamSpecs,
-};

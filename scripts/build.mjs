@@ -3,22 +3,39 @@
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+import { join } from 'node:path';
 import { makeElement } from './element.mjs';
+import { ENTRIES, makeEntries } from './entries.mjs';
 import { makeInline } from './inline.mjs';
 import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
 import { at, must, say, script, startedAs, tool } from './shell.mjs';
 
-// The module is compiled with vectors and, for engines without them, plain. Glue and optimised module are kept between builds:
-// both depend on the compiled module alone.
-const WITH_VECTORS = { target: 'target', glue: 'target/glue', module: 'vesicle_bg.wasm', env: {} };
+/** The whole library, compiled with vector instructions. */
+const WHOLE = { target: 'target', name: 'vesicle_bg' };
+
+/** The whole library for engines without vector instructions. */
 const PLAIN = {
-  ...{ target: 'target/plain', glue: 'target/plain-glue', module: 'vesicle_plain_bg.wasm' },
+  ...{ target: 'target/plain', name: 'vesicle_plain_bg' },
   // After what .cargo/config.toml says of the target: the last word counts.
   env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
 
-const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
+/** The library with one method. */
+const only = (method, target) => ({ target, name: `${method}/vesicle_bg`, features: [method, 'import', 'enrich'] });
+
+/** Modules by lane; the lanes are compiled in parallel, since each module is linked by one thread. */
+const LANES = [
+  [WHOLE, ...ENTRIES.slice(0, 2).map((method) => only(method, 'target'))],
+  [PLAIN, ...ENTRIES.slice(2).map((method) => only(method, 'target/methods'))],
+];
+
+const MODULES = LANES.flat();
+
+/** Folder of a module's glue, and of the module as the glue needs it. */
+const folder = ({ name }) => at('target/modules', name);
+
+const optimised = (module) => join(folder(module), 'vesicle_bg.wasm');
 
 // Documents that the README links to.
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
@@ -26,7 +43,7 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk'];
 
-async function compile({ target, env }) {
+async function compile({ target, features, env }) {
   const args = [
     'rustc',
     '--locked',
@@ -37,38 +54,41 @@ async function compile({ target, env }) {
     '--target',
     'wasm32-unknown-unknown',
   ];
-  await must('cargo', [...args, '--target-dir', at(target)], { env });
+  const selected = features ? ['--no-default-features', '--features', features.join()] : [];
+  await must('cargo', [...args, ...selected, '--target-dir', at(target)], { env });
+  return at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
 }
 
-async function stamp(kind) {
+async function stamp(compiled) {
   const hash = createHash('sha256');
-  for (const file of [compiled(kind), at('Cargo.lock'), at('package-lock.json'), at('scripts/build.mjs')])
+  for (const file of [compiled, at('Cargo.lock'), at('package-lock.json'), at('scripts/build.mjs')])
     hash.update(await readFile(file));
   return hash.digest('hex');
 }
 
-async function makeGlue(kind) {
-  const wanted = await stamp(kind);
-  const stampFile = at(kind.glue, 'stamp');
+/** Compiles a module, and makes its glue. Both are kept between builds, since they depend on the compiled module alone. */
+async function make(module) {
+  // Compiled modules of one target directory replace each other.
+  const compiled = await compile(module);
+  const wanted = await stamp(compiled);
+  const stampFile = join(folder(module), 'stamp');
   if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === wanted) return;
-  await rm(at(kind.glue), { recursive: true, force: true });
+  await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
-    ...['run', '--locked', '--quiet', '--package', 'xtask', '--', 'bindgen', compiled(kind)],
+    ...['run', '--locked', '--quiet', '--package', 'xtask', '--', 'bindgen', compiled],
     // A trap loses the instance; the reset function lets a page start a new one without reloading.
-    ...['--target', 'web', '--out-dir', at(kind.glue), '--experimental-reset-state-function'],
+    ...['--target', 'web', '--out-dir', folder(module), '--experimental-reset-state-function'],
     // The face says where the module is, so that a bundler meets only one address of it.
     ...['--omit-default-module-path', '--remove-producers-section'],
   ]);
-  await optimise(at(kind.glue, 'vesicle_bg.wasm'));
+  await optimise(optimised(module));
   await writeFile(stampFile, wanted);
 }
 
-/** Both modules are called by the same glue. */
+/** The modules of the whole library are called by the same glue. */
 async function compareGlue() {
-  const [one, other] = await Promise.all(
-    [WITH_VECTORS, PLAIN].map(({ glue }) => readFile(at(glue, 'vesicle.js'), 'utf8')),
-  );
-  if (one !== other) throw new Error('the glue of the plain module is another than that of the module with vectors');
+  const [one, other] = await Promise.all([WHOLE, PLAIN].map((module) => readFile(join(folder(module), 'vesicle.js'))));
+  if (!one.equals(other)) throw new Error('the glue of the plain module differs from that of the module with vectors');
 }
 
 async function optimise(module) {
@@ -80,9 +100,10 @@ async function optimise(module) {
 async function assemble() {
   await rm(at('pkg'), { recursive: true, force: true });
   await mkdir(at('pkg'));
-  for (const file of ['vesicle.js', 'vesicle.d.ts']) await copyFile(at(WITH_VECTORS.glue, file), at('pkg', file));
-  for (const { glue, module } of [WITH_VECTORS, PLAIN]) await copyFile(at(glue, 'vesicle_bg.wasm'), at('pkg', module));
+  for (const file of ['vesicle.js', 'vesicle.d.ts']) await copyFile(join(folder(WHOLE), file), at('pkg', file));
   await must(tool('tsc'), ['-p', at('js')]);
+  await makeEntries((method) => folder(MODULES.find(({ name }) => name.startsWith(method))));
+  for (const module of MODULES) await copyFile(optimised(module), at('pkg', `${module.name}.wasm`));
   await makeInline();
   await makeElement();
   await writeNotices('pkg/licences.txt', 'element');
@@ -91,6 +112,11 @@ async function assemble() {
 }
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
+
+const entry = (method) => [
+  [`./${method}`, { types: `./${method}/index.d.ts`, default: `./${method}/index.js` }],
+  [`./${method}/vesicle_bg.wasm`, `./${method}/vesicle_bg.wasm`],
+];
 
 async function manifest() {
   const { description, license, version, engines } = JSON.parse(await readFile(at('package.json'), 'utf8'));
@@ -107,6 +133,7 @@ async function manifest() {
     types: './index.d.ts',
     exports: {
       '.': { types: './index.d.ts', default: './index.js' },
+      ...Object.fromEntries(ENTRIES.flatMap(entry)),
       './inline': { types: './index.d.ts', default: './inline.js' },
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
@@ -119,12 +146,14 @@ async function manifest() {
   };
 }
 
+async function inTurn(modules) {
+  for (const module of modules) await make(module);
+}
+
 /** The whole package; fast where nothing changed. */
 export async function build() {
   const started = performance.now();
-  // Side by side: each is linked by one thread.
-  await Promise.all([WITH_VECTORS, PLAIN].map(compile));
-  for (const kind of [WITH_VECTORS, PLAIN]) await makeGlue(kind);
+  await Promise.all(LANES.map(inTurn));
   await compareGlue();
   await assemble();
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;

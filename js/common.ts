@@ -1,0 +1,28 @@
+// What every entry point of the package exports: volumes, meshes, files and errors.
+import { call } from './runtime.js';
+import { version as rawVersion } from './vesicle.js';
+
+export { animationGlb } from './animation.js';
+export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+export {
+  type CurvatureKind,
+  Mesh,
+  type MeshArrays,
+  type MeshFormat,
+  type MeshHit,
+  type MeshInfo,
+  type MeshReport,
+  type MeshTexture,
+  type RestructurePass,
+  type SurfaceDistance,
+  type TextureType,
+} from './mesh.js';
+export type { ParamSpec } from './params.js';
+export { type InitInput, init as default, initSync } from './runtime.js';
+export type { RunOptions, Stepper, StepReport } from './stepper.js';
+export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
+
+/** Returns the version of the package. */
+export function version(): string {
+  return call(rawVersion);
+}

@@ -1,0 +1,31 @@
+/**
+ * `vesicle` with the surface tracker as its only method, in a smaller WebAssembly module of its own.
+ *
+ * All else is as in `vesicle`, and results are bit-identical. Objects belong to their module: a `Mesh` or `Volume` of
+ * another entry point is a different type, and is passed on as bytes (`Mesh.parse(mesh.toBytes('ply'))`) or arrays
+ * (`Mesh.fromArrays`, `new Volume`). Errors are those of `vesicle`.
+ *
+ * @module vesicle/tracking
+ */
+import { type ParamSpec, paramSpecsOf } from '../params.js';
+import { trackingParamSpecs } from '../vesicle.js';
+
+export * from '../common.js';
+export { default } from '../common.js';
+export {
+  type FrameStatistics,
+  SurfaceTracker,
+  type TrackingOptions,
+  type TrackingParams,
+} from '../tracking.js';
+
+const specsOf = paramSpecsOf({ tracking: trackingParamSpecs });
+
+/**
+ * Returns descriptions of the parameters of the method, in their recommended order of display.
+ *
+ * @throws {@link VesicleError} `invalid-argument`: another method, which this module does not have.
+ */
+export function paramSpecs(method: 'tracking'): ParamSpec[] {
+  return specsOf(method);
+}
