@@ -1,16 +1,22 @@
 // Runs every check. Continues after a failure; the last line is the total.
-// `npm test -- build package` runs only the stages of these names. On a terminal all output is shown; otherwise only
+// `npm test -- build package` runs only the stages of these names. `npm run test:all` also runs what takes too long for
+// every change, and records when it last ran, and on which commit. On a terminal all output is shown; otherwise only
 // failures, with all output in `target/test-logs`.
 import { existsSync } from 'node:fs';
 import { mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { buildApp } from './app.mjs';
 import { build } from './build.mjs';
 import { setup } from './setup.mjs';
-import { at, run, say, tool } from './shell.mjs';
+import { at, must, run, say, tool } from './shell.mjs';
 
 const LOGS = 'target/test-logs';
 const WASM = ['--target', 'wasm32-unknown-unknown'];
 const DENY = ['--', '-D', 'warnings'];
+
+/** Record of the last run of all tests, which `npm test` prints. */
+const RECORD = 'tests/all.json';
+
+const EVERYTHING = '--all';
 
 const echo = Boolean(process.stdout.isTTY);
 
@@ -68,42 +74,64 @@ function atLeastOneFailed(code, { passed, failed }) {
 }
 
 /**
- * Stages by group and lane. The lanes of a group run in parallel; groups, and the stages of a lane, one after the
- * other.
+ * Stages by group and lane, each with its budget: the seconds that it may take in a fresh clone on two cores. The lanes
+ * of a group run in parallel; groups, and the stages of a lane, one after the other.
  */
 const GROUPS = [
   [
     [
-      ['format', check('cargo', ['fmt', '--all', '--check'])],
-      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY])],
-      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY])],
+      ['format', check('cargo', ['fmt', '--all', '--check']), 5],
+      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 40],
+      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY]), 40],
       [
         'rust docs',
         check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
+        15,
       ],
       // Shows the tests' measurements in the log.
-      ['native', cargoTests('--', '--show-output')],
+      ['native', cargoTests('--', '--show-output'), 240],
     ],
   ],
   [
     // Has one thread only.
-    [['wasm', cargoTests('--lib', '--tests', ...WASM)]],
+    [['wasm', cargoTests('--lib', '--tests', ...WASM), 420]],
     [
-      ['build', works(build)],
-      ['biome', check(tool('biome'), ['ci', '--colors=off'])],
-      ['prose', check(process.execPath, [at('scripts/prose.mjs')])],
-      ['types', check(tool('tsc'), ['-p', at('tests/js')])],
-      ['publint', check(tool('publint'), ['run', '--strict', at('pkg')])],
-      ['package', vitest('tests/js')],
-      ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')])],
-      ['app build', works(buildApp)],
-      ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')])],
+      ['build', works(build), 360],
+      ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
+      ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
+      ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
+      ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
+      ['package', vitest('tests/js'), 100],
+      ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
+      ['app build', works(buildApp), 20],
+      ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
     ],
   ],
-  [[['app', vitest('tests/app')]]],
+  [[['app', vitest('tests/app'), 420]]],
 ];
 
-async function attempt([name, work]) {
+/** Stages that only `npm run test:all` runs: too long for every change. */
+const LONG = [
+  [
+    [
+      ['features', works(checkFeatures), 120],
+      ['scenes', cargoTests('--release', '--test', 'core', 'scenes::', '--', '--ignored', '--show-output'), 900],
+      ['slow wasm', cargoTests('--lib', '--tests', ...WASM, '--', '--ignored'), 900],
+    ],
+  ],
+];
+
+/** Checks that each feature compiles alone, natively and for wasm32. */
+async function checkFeatures() {
+  for (const feature of ['', 'deformable', 'implicit', 'tracking', 'multires', 'import', 'enrich']) {
+    for (const target of [[], WASM]) {
+      const args = ['clippy', '--locked', '-p', 'vesicle', '--lib', '--no-default-features', '--features', feature];
+      await must('cargo', [...args, ...target, ...DENY]);
+    }
+  }
+}
+
+async function attempt([name, work, budget]) {
   const started = performance.now();
   process.stdout.write(`\n── ${name}\n`);
   const { output = '', ...counts } = await work().catch((error) => {
@@ -112,8 +140,29 @@ async function attempt([name, work]) {
   });
   await writeFile(at(LOGS, `${name.replace(' ', '-')}.log`), output);
   if (counts.failed && !echo) process.stdout.write(`\n── ${name}: failed\n${failuresIn(output)}\n`);
-  const seconds = ((performance.now() - started) / 1000).toFixed(1);
-  return { name, seconds, ...counts };
+  return { name, budget, ...withinTwice(budget, { seconds: (performance.now() - started) / 1000, ...counts }) };
+}
+
+/** Fails a stage that takes more than twice its budget in continuous integration; elsewhere machines differ. */
+function withinTwice(budget, { seconds, passed, failed }) {
+  const isOver = Boolean(process.env.CI) && seconds > 2 * budget;
+  return { seconds, passed, failed: isOver && failed === 0 ? 1 : failed };
+}
+
+/** Records that all tests have passed on the present commit. */
+async function record(results) {
+  const commit = (await must('git', ['rev-parse', 'HEAD'])).trim();
+  const passed = results.reduce((total, one) => total + one.passed, 0);
+  const date = new Date().toISOString().slice(0, 10);
+  await writeFile(at(RECORD), `${JSON.stringify({ date, commit, passed }, null, 2)}\n`);
+}
+
+async function sayWhenAllRan() {
+  if (!existsSync(at(RECORD))) return say('test:all', 'never ran');
+  const { date, commit } = JSON.parse(await readFile(at(RECORD), 'utf8'));
+  const { code, output } = await run('git', ['rev-list', '--count', `${commit}..HEAD`], { echo: false });
+  const since = code === 0 ? `, ${output.trim()} commits ago` : '';
+  say('test:all', `last passed on ${date} on ${commit.slice(0, 7)}${since}`);
 }
 
 /**
@@ -131,7 +180,7 @@ function failuresIn(output) {
 }
 
 function checkNames(names) {
-  const known = GROUPS.flat(2).map(([stage]) => stage);
+  const known = [...GROUPS, ...LONG].flat(2).map(([stage]) => stage);
   const unknown = names.filter((name) => !known.includes(name));
   if (unknown.length > 0) throw new Error(`no stage is called ${unknown}; there are ${known}`);
 }
@@ -142,25 +191,34 @@ async function inTurn(stages) {
   return results;
 }
 
-async function all(names) {
+async function all(names, groups) {
   checkNames(names);
   await mkdir(at(LOGS), { recursive: true });
-  const ready = await attempt(['set-up', works(setup)]);
+  const ready = await attempt(['set-up', works(setup), 60]);
   // Without tools and packages no other stage can run.
   if (ready.failed) return [ready];
   const results = [ready];
-  for (const lanes of GROUPS) {
+  for (const lanes of groups) {
     const wanted = lanes.map((lane) => lane.filter(([stage]) => names.length === 0 || names.includes(stage)));
     results.push(...(await Promise.all(wanted.map(inTurn))).flat());
   }
   return results;
 }
 
-const results = await all(process.argv.slice(2));
-process.stdout.write('\n');
-for (const { name, seconds, passed, failed } of results) {
-  say(name, `${String(passed).padStart(5)} passed ${String(failed).padStart(4)} failed ${seconds.padStart(7)} s`);
-}
+const given = process.argv.slice(2);
+const names = given.filter((name) => name !== EVERYTHING);
+const isLong = given.includes(EVERYTHING) || names.some((name) => LONG.flat(2).some(([stage]) => stage === name));
+const results = await all(names, isLong ? [...GROUPS, ...LONG] : GROUPS);
 const sum = (key) => results.reduce((total, result) => total + result[key], 0);
+process.stdout.write('\n');
+for (const { name, seconds, budget, passed, failed } of results) {
+  const counts = `${String(passed).padStart(5)} passed ${String(failed).padStart(4)} failed`;
+  say(
+    name,
+    `${counts} ${seconds.toFixed(1).padStart(7)} s of ${String(budget).padStart(3)}${seconds > budget ? ', over' : ''}`,
+  );
+}
+if (given.includes(EVERYTHING) && sum('failed') === 0) await record(results);
+await sayWhenAllRan();
 process.stdout.write(`${sum('passed')} passed, ${sum('failed')} failed\n`);
 process.exitCode = sum('failed') > 0 ? 1 : 0;

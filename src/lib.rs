@@ -3,6 +3,21 @@
 //!
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
 //! methods < bindings`; `io` uses only math, mesh and volume.
+//!
+//! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
+//! files to the bindings, `enrich` the interpolation of slices. All are on by default.
+
+#![cfg_attr(
+    not(all(
+        feature = "deformable",
+        feature = "implicit",
+        feature = "tracking",
+        feature = "multires",
+        feature = "import",
+        feature = "enrich"
+    )),
+    allow(dead_code, reason = "what some methods share is unused in a build without them")
+)]
 
 pub mod io;
 pub mod math;
