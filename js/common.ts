@@ -1,4 +1,4 @@
-// What every entry point of the package exports: volumes, meshes, files and errors.
+// Exports that all entry points of the package share: volumes, meshes, files and errors.
 import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 

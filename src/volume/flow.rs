@@ -145,14 +145,28 @@ impl Image {
         for y in 0..(RADIUS).min(height) {
             sums.iter_mut().zip(row(y)).for_each(|(sum, v)| *sum += v);
         }
-        for y in 0..height {
-            if y + RADIUS < height {
-                sums.iter_mut().zip(row(y + RADIUS)).for_each(|(sum, v)| *sum += v);
+        for (y, to) in out.values.chunks_exact_mut(width).enumerate() {
+            let entering = (y + RADIUS < height).then(|| row(y + RADIUS));
+            let leaving = (y > RADIUS).then(|| row(y - RADIUS - 1));
+            let columns = sums.iter_mut().zip(to);
+            match (entering, leaving) {
+                (Some(entering), Some(leaving)) => {
+                    for (((sum, to), entering), leaving) in columns.zip(entering).zip(leaving) {
+                        *sum += entering;
+                        *sum -= leaving;
+                        *to = *sum;
+                    }
+                }
+                (Some(entering), None) => columns.zip(entering).for_each(|((sum, to), v)| {
+                    *sum += v;
+                    *to = *sum;
+                }),
+                (None, Some(leaving)) => columns.zip(leaving).for_each(|((sum, to), v)| {
+                    *sum -= v;
+                    *to = *sum;
+                }),
+                (None, None) => columns.for_each(|(sum, to)| *to = *sum),
             }
-            if y > RADIUS {
-                sums.iter_mut().zip(row(y - RADIUS - 1)).for_each(|(sum, v)| *sum -= v);
-            }
-            out.values[y * width..][..width].copy_from_slice(&sums);
         }
         Ok(out)
     }
@@ -259,15 +273,17 @@ impl NormalEquations {
             // Gradient of the mean of both images, by central differences over two pixels.
             let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(height - 1)));
             row_gradient(row(y), &mut slopes);
+            let [before, after] = [before, after].map(|image| &image.values[y * width..][..width]);
+            let [xx, xy, yy, xd, yd] = [&mut xx, &mut xy, &mut yy, &mut xd, &mut yd]
+                .map(|image| &mut image.values[y * width..][..width]);
             for x in 0..width {
-                let i = y * width + x;
                 let (gx, gy) = (slopes[x], 0.25 * (below[x] - above[x]));
-                let difference = after.values[i] - before.values[i];
-                xx.values[i] = gx * gx;
-                xy.values[i] = gx * gy;
-                yy.values[i] = gy * gy;
-                xd.values[i] = gx * difference;
-                yd.values[i] = gy * difference;
+                let difference = after[x] - before[x];
+                xx[x] = gx * gx;
+                xy[x] = gx * gy;
+                yy[x] = gy * gy;
+                xd[x] = gx * difference;
+                yd[x] = gy * difference;
             }
         }
         let squares: f32 = xx.values.iter().zip(&yy.values).map(|(a, b)| a + b).sum();
