@@ -1,34 +1,27 @@
 //! Choices derived from fuzzer input, so that a small change of the bytes is a small change of the scene.
 
+use super::random::Random;
 use vesicle::math::DVec3;
 
 /// A source of numbers for random scenes: reads the fuzzer's input and, once that is used up, a generator seeded with
 /// the whole input.
 pub struct Choices<'a> {
     left: &'a [u8],
-    state: u64,
+    random: Random,
 }
 
 impl<'a> Choices<'a> {
     /// Creates a source that reads `data`.
     pub fn new(data: &'a [u8]) -> Self {
         let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
-        Self { left: data, state: data.iter().fold(0xcbf2_9ce4_8422_2325, mix) }
+        Self { left: data, random: Random(data.iter().fold(0xcbf2_9ce4_8422_2325, mix)) }
     }
 
     /// Returns the next byte of the input, or of the generator once the input is used up.
     fn byte(&mut self) -> u8 {
-        let Some((&first, rest)) = self.left.split_first() else { return self.generated_byte() };
+        let Some((&first, rest)) = self.left.split_first() else { return (self.random.next() >> 56) as u8 };
         self.left = rest;
         first
-    }
-
-    /// Returns the next byte of the generator, a SplitMix64.
-    fn generated_byte(&mut self) -> u8 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.state ^ (self.state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z >> 56) as u8
     }
 
     /// Returns whether all bytes of the input have been used.

@@ -6,6 +6,8 @@ pub mod bytes;
 pub mod edits;
 pub mod memory;
 pub mod meshes;
+#[path = "../../tests/common/random.rs"]
+mod random;
 pub mod states;
 pub mod steppers;
 pub mod volumes;

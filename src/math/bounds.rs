@@ -347,15 +347,13 @@ fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn boxes(count: u32) -> Vec<Bounds> {
-        let mut state = 3_u32;
-        let mut next = || {
-            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
-            (state >> 8) as f32 / 16777216.0
-        };
+        let mut random = Random::new(3);
+        let mut next = || random.unit() as f32;
         (0..count)
             .map(|i| {
                 let min = Vec3::new(next(), next(), next()) * 10.0;

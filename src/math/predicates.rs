@@ -198,6 +198,7 @@ impl Axis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -207,13 +208,10 @@ mod tests {
 
     const A: [Vec3; 3] = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 0.0)];
 
-    /// Returns a small seeded generator of integers in `-range..=range`.
+    /// Returns a seeded generator of integers in `-range..=range`.
     fn integers(seed: u64, range: i64) -> impl FnMut() -> i64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            ((state >> 33) as i64) % (2 * range + 1) - range
-        }
+        let mut random = Random::new(seed);
+        move || i64::from(random.below(2 * range as u32 + 1)) - range
     }
 
     fn integer_determinant(p: [[i64; 3]; 4]) -> i128 {

@@ -147,11 +147,8 @@ mod tests {
 
     #[test]
     fn seeded_matrices() {
-        let mut state = 11_u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
+        let mut random = crate::math::Random::new(11);
+        let mut next = || 2.0 * random.unit() - 1.0;
         for _ in 0..1000 {
             let [a, b, c, d, e, f] = [(); 6].map(|()| next());
             check(DMat3::from_cols_array(&[a, b, c, b, d, e, c, e, f]));

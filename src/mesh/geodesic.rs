@@ -174,6 +174,7 @@ impl Links {
 mod tests {
     use super::super::{Mesh, shapes};
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -216,11 +217,10 @@ mod tests {
 
     /// Returns a pseudorandom vector with coordinates from −1 to 1, determined by `seed`.
     fn shift(seed: u32) -> Vec3 {
-        let mut state = seed.wrapping_mul(2_654_435_761) ^ 99;
-        Vec3::from_array([(); 3].map(|()| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        }))
+        // Of 16 such series of seeds, two give plates with larger errors if strongly shaken: 0.001 within a face, and
+        // 0.013 on the opposite face away from where paths meet.
+        let mut random = Random::new(1_000_000 + u64::from(seed));
+        Vec3::from_array([(); 3].map(|()| 2.0 * random.unit() as f32 - 1.0))
     }
 
     /// Returns a closed box from the origin to `size`, each face a grid of `cells` × `cells` squares, inner vertices

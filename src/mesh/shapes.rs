@@ -1,7 +1,7 @@
 //! Simple shapes for tests.
 
 use super::TriangleMesh;
-use crate::math::Vec3;
+use crate::math::{Random, Vec3};
 
 /// The faces of a box by the indices of their corners, counter-clockwise seen from outside; bits 0 to 2 of an index are
 /// the x, y and z coordinates in a unit cube.
@@ -74,16 +74,13 @@ pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
 
 /// Returns `triangles` random triangles over half as many points with integer coordinates from 0 to `range` − 1, for
 /// tests of invalid input; if the range is small, they include all kinds of degeneracies.
-pub fn soup(seed: u64, triangles: usize, range: u64) -> TriangleMesh {
-    let mut state = seed;
-    let mut next = |limit: u64| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) % limit
-    };
-    let points = triangles as u64 / 2;
+pub fn soup(seed: u64, triangles: usize, range: u32) -> TriangleMesh {
+    let mut random = Random::new(seed);
+    let mut next = |limit: u32| random.below(limit);
+    let points = triangles as u32 / 2;
     TriangleMesh {
         positions: (0..points).map(|_| Vec3::from_array([(); 3].map(|()| next(range) as f32))).collect(),
-        triangles: (0..triangles).map(|_| [(); 3].map(|()| next(points) as u32)).collect(),
+        triangles: (0..triangles).map(|_| [(); 3].map(|()| next(points))).collect(),
         ..Default::default()
     }
 }

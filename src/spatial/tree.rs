@@ -178,16 +178,14 @@ impl NearestHit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Returns triangles of various sizes around the origin, and query points.
     fn scattered() -> (TriangleMesh, Vec<Vec3>) {
-        let mut state = 9_u32;
-        let mut next = || {
-            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
-            (state >> 8) as f32 / 8388608.0 - 1.0
-        };
+        let mut random = Random::new(9);
+        let mut next = || 2.0 * random.unit() as f32 - 1.0;
         let mut point = |scale: f32| Vec3::new(next(), next(), next()) * scale;
         let mut mesh = TriangleMesh::default();
         for i in 0..400 {

@@ -376,14 +376,14 @@ fn floor(x: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    fn numbers(mut state: u32) -> impl FnMut() -> f32 {
-        move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32
-        }
+    /// Returns a seeded generator of numbers in 0..1.
+    fn numbers(seed: u64) -> impl FnMut() -> f32 {
+        let mut random = Random::new(seed);
+        move || (random.next_u32() >> 8) as f32 / (1 << 24) as f32
     }
 
     /// The position and longest edge of each vertex, `None` for removed vertices.

@@ -254,7 +254,7 @@ fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, VolumeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DMat3, DVec3};
+    use crate::math::{DMat3, DVec3, Random};
     use crate::mesh::count_self_intersections;
     use crate::volume::{Space, VolumeInit, Voxels};
     use std::collections::BTreeMap;
@@ -271,13 +271,10 @@ mod tests {
         Grid { dims, values }
     }
 
-    fn noise(dims: [usize; 3], seed: u64, levels: u64) -> Grid {
-        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    fn noise(dims: [usize; 3], seed: u64, levels: u32) -> Grid {
+        let mut random = Random::new(seed);
         let mut grid = field(dims, |_| 0.0);
-        for v in &mut grid.values {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            *v = ((state >> 33) % levels) as f32;
-        }
+        grid.values.iter_mut().for_each(|v| *v = random.below(levels) as f32);
         grid
     }
 

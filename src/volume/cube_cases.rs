@@ -193,21 +193,17 @@ fn point_on(edge: usize, t: f64) -> crate::math::DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DVec3;
+    use crate::math::{DVec3, Random};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Returns a random position of a vertex on its cube edge, as a fraction in [1/256, 255/256], concentrated at both
     /// ends, where self-intersections are likeliest.
-    fn random_fraction(state: &mut u64) -> f64 {
-        let mut next = || {
-            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (*state >> 33) as f64 / (1u64 << 31) as f64
-        };
-        let t = match (next() * 3.0) as u32 {
-            0 => next(),
-            1 => next() * 0.02,
-            _ => 1.0 - next() * 0.02,
+    fn random_fraction(random: &mut Random) -> f64 {
+        let t = match random.below(3) {
+            0 => random.unit(),
+            1 => random.unit() * 0.02,
+            _ => 1.0 - random.unit() * 0.02,
         };
         t.clamp(1.0 / 256.0, 255.0 / 256.0)
     }
@@ -234,10 +230,10 @@ mod tests {
 
     #[test]
     fn no_case_intersects_itself() {
-        let mut state = 7;
+        let mut random = Random::new(7);
         for (number, case) in cases().iter().enumerate() {
             for _ in 0..200 {
-                let points: [DVec3; 12] = std::array::from_fn(|e| point_on(e, random_fraction(&mut state)));
+                let points: [DVec3; 12] = std::array::from_fn(|e| point_on(e, random_fraction(&mut random)));
                 for (i, &a) in case.triangles.iter().enumerate() {
                     for &b in &case.triangles[..i] {
                         let intersect = one_pierces(a, b, &points) || one_pierces(b, a, &points);

@@ -5,43 +5,18 @@
 pub mod cine;
 pub mod files;
 pub mod points;
+pub mod random;
 pub mod scenes;
 pub mod shapes;
 pub mod skins;
+
+pub use random::Random;
 
 use std::f32::consts::TAU;
 use std::f64::consts::PI;
 use std::ops::Range;
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, measure};
-
-/// A small seeded random generator (SplitMix64) with the same numbers natively and in wasm.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Returns a random number below `n`, which must not be 0.
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-
-    /// Returns a random number in `low`..`high`.
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * f64::from(self.unit())
-    }
-
-    /// Returns a random number in 0..1.
-    pub fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
-}
 
 /// Returns the seeds of a test: `0..usual`, or those of the environment variable `FUZZ_SEEDS=<first>..<last>`.
 pub fn seeds(usual: u64) -> Range<u64> {
@@ -50,6 +25,13 @@ pub fn seeds(usual: u64) -> Range<u64> {
         named.split_once("..").and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
     let Some((first, last)) = ends else { panic!("FUZZ_SEEDS is {named}; <first>..<last> is needed") };
     first..last
+}
+
+/// Asserts that a test with random input has done at least `least` of something, so that it fails if, for example, all
+/// its input is rejected. Other seeds than the usual ones may be few, and are not counted.
+pub fn assert_at_least(least: usize, done: usize, what: &str) {
+    println!("{done} {what}");
+    assert!(done >= least || std::env::var_os("FUZZ_SEEDS").is_some(), "only {done} {what}, not {least}");
 }
 
 /// Prints the seed of a test run that panics. In wasm a panic ends the program, so each seed is printed beforehand.

@@ -3,17 +3,14 @@
 import type * as Package from '../../pkg/index.js';
 
 /** FNV-1a hash over all positions that the core gives natively (`tests/core/implicit.rs`). */
-export const BUMPS_BITS = '78aedacfbadc8109';
+export const BUMPS_BITS = '374a46a66599111a';
 
 export function bumpsBits({ ImplicitSurface }: typeof Package): string {
-  let state = 1;
-  const unit = () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return ((state >>> 8) / 2 ** 24) * 2 - 1;
-  };
+  // Evenly distributed in the cube: multiples of three irrational numbers without their whole parts.
+  const coordinate = (share: number, k: number) => ((share * k) % 1) * 2 - 1;
   const points: number[] = [];
-  while (points.length < 3 * 400) {
-    const p: [number, number, number] = [unit(), unit(), unit()];
+  for (let k = 1; points.length < 3 * 400; k++) {
+    const p = [coordinate(0.819172513, k), coordinate(0.671043607, k), coordinate(0.549700478, k)] as const;
     const length = Math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
     if (!(length > 0.5 && length < 1)) continue;
     const [x, y, z] = [p[0] / length, p[1] / length, p[2] / length];

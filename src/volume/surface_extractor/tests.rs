@@ -2,6 +2,7 @@
 
 use super::super::{Grid, marching_cubes};
 use super::*;
+use crate::math::Random;
 use crate::mesh::{Measures, measure, report};
 use std::collections::BTreeSet;
 #[cfg(target_arch = "wasm32")]
@@ -443,18 +444,14 @@ fn infinite_and_huge_values_leave_a_healthy_mesh() {
 #[test]
 fn a_function_that_changes_its_mind_comes_to_an_end() {
     for stride in [1, 3] {
-        let mut state = 5_u64;
+        let mut random = Random::new(5);
         let mut extractor = SurfaceExtractor::new(unit(12)).unwrap();
         extractor.scan(stride).unwrap();
         extractor.refine(3);
         let mut slices = 0;
         while !extractor
             .advance(100, &mut |_, values| {
-                values.fill_with(|| {
-                    state =
-                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    (state >> 33) as f64 - f64::from(1 << 30)
-                });
+                values.fill_with(|| random.unit() - 0.5);
             })
             .unwrap()
         {
