@@ -156,6 +156,7 @@ pub(super) fn full_channel(colors: impl Iterator<Item = Vec3> + Clone) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -335,9 +336,9 @@ mod tests {
     }
 
     /// Asserts that the point cloud in a file, if the bytes are read without an error, has points, one entry per point
-    /// in each array, finite numbers, and colours in 0..1.
-    fn assert_sound(bytes: &[u8], context: &str) {
-        let Ok(cloud) = parse_points(bytes) else { return };
+    /// in each array, finite numbers, and colours in 0..1. Returns whether the bytes are read.
+    fn assert_sound(bytes: &[u8], context: &str) -> bool {
+        let Ok(cloud) = parse_points(bytes) else { return false };
         let count = cloud.points.len();
         assert!((1..=bytes.len()).contains(&count), "{context}");
         let normals = cloud.normals.unwrap_or(cloud.points.clone());
@@ -345,13 +346,18 @@ mod tests {
         assert_eq!((normals.len(), colors.len()), (count, count), "{context}");
         assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{context}");
         assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{context}");
+        true
     }
 
     #[test]
     fn cut_files_are_refused_or_sound() {
+        let mut counts = [0; 2];
         for (name, bytes) in files().into_iter().chain([("keyed", keyed())]) {
-            (0..bytes.len()).for_each(|end| assert_sound(&bytes[..end], &format!("{name} cut at {end}")));
+            for end in 0..bytes.len() {
+                counts[usize::from(assert_sound(&bytes[..end], &format!("{name} cut at {end}")))] += 1;
+            }
         }
+        assert!(counts.iter().all(|&count| count > 100), "{counts:?} refused and read");
         for (name, bytes) in [("little", ply_binary(true)), ("big", ply_binary(false))] {
             (0..bytes.len()).for_each(|end| assert!(parse_points(&bytes[..end]).is_err(), "{name} at {end}"));
         }
@@ -359,18 +365,17 @@ mod tests {
 
     #[test]
     fn files_with_a_wrong_byte_are_refused_or_sound() {
-        let mut state = 1u64;
-        let mut random = |below: usize| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as usize % below
-        };
+        let mut random = Random::new(1);
         for (name, bytes) in files().into_iter().chain([("keyed", keyed())]) {
+            let mut counts = [0; 2];
             for turn in 0..3000 {
-                let (at, byte) = (random(bytes.len()), random(256) as u8);
+                let (at, byte) = (random.below(bytes.len() as u32) as usize, random.below(256) as u8);
                 let mut broken = bytes.clone();
                 broken[at] = byte;
-                assert_sound(&broken, &format!("{name}, turn {turn}: byte {at} is {byte}"));
+                let is_read = assert_sound(&broken, &format!("{name}, turn {turn}: byte {at} is {byte}"));
+                counts[usize::from(is_read)] += 1;
             }
+            assert!(counts.iter().all(|&count| count > 50), "{name}: {counts:?} refused and read");
         }
     }
 }

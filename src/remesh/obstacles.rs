@@ -272,13 +272,16 @@ mod tests {
     fn an_updated_tree_equals_a_new_one() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
         let mut updated = Obstacles::new(&mesh, u64::MAX);
+        let mut collapses = 0;
         for i in 0..300 {
             let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
             let position = mesh.position(v);
             if mesh.collapse(u, v, position).is_ok() {
                 updated.update(&mesh, u, v);
+                collapses += 1;
             }
         }
+        assert!(collapses > 100, "{collapses}");
         let leaf = |v: VertexId| updated.nodes[updated.nodes.len() / 2 + updated.leaves[v.index()] as usize];
         assert!(mesh.vertices().all(|v| leaf(v) == one_ring_bounds(&mesh, v)));
         let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.union(&one_ring_bounds(&mesh, v)));

@@ -86,14 +86,17 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
+    /// Compares each voxel with the expected value, if there is one.
     fn check(surface: &TriangleMesh, dims: [usize; 3], expected: impl Fn(Vec3) -> Option<bool>) {
-        let inside = voxels_inside(surface, dims);
+        let (inside, mut checked) = (voxels_inside(surface, dims), [0; 2]);
         for (i, inside) in (0..dims.iter().product()).map(|i| (i, inside.contains(i))) {
             let p = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]].map(|k| k as f32);
             if let Some(expected) = expected(Vec3::from(p)) {
                 assert_eq!(inside, expected, "at {p:?}");
+                checked[usize::from(inside)] += 1;
             }
         }
+        assert!(checked[0] > 100 && checked[1] >= 27, "{checked:?} checked");
     }
 
     fn moved(mut surface: TriangleMesh, by: Vec3) -> TriangleMesh {

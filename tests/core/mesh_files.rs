@@ -1,5 +1,6 @@
 //! Mesh files: real ones, hand-made ones of every kind, round trips, and broken ones.
 
+use crate::common::Random;
 use crate::common::files::glb;
 use crate::common::shapes::{octahedron, octahedron_with_seam};
 use std::sync::Arc;
@@ -119,10 +120,15 @@ fn written_meshes_read_back_the_same() {
         ] {
             let mut found = parse_mesh(&write_mesh(&mesh, format).unwrap()).unwrap();
             let expected = only(&mesh, normals, uvs, colors);
+            assert_eq!(
+                found.colors.as_ref().map(Vec::len),
+                expected.colors.as_ref().map(Vec::len),
+                "{format:?}"
+            );
             for (a, b) in found.colors.iter().flatten().zip(expected.colors.iter().flatten()) {
                 assert!((*a - *b).abs().max_element() <= 0.51 / 255.0, "{format:?} {a} {b}");
             }
-            found.colors = expected.colors.clone().filter(|_| found.colors.is_some());
+            found.colors = expected.colors.clone();
             assert_eq!(found, expected, "{format:?}");
         }
     }
@@ -469,16 +475,20 @@ fn samples() -> Vec<Vec<u8>> {
     all
 }
 
-/// Asserts that parsing gives a valid mesh or an error; a panic names the input.
-fn survives(bytes: &[u8], what: &str) {
+/// Asserts that parsing gives a valid mesh or an error, and returns whether it gives a mesh; a panic names the input.
+fn survives(bytes: &[u8], what: &str) -> bool {
     let outcome = std::panic::catch_unwind(|| parse_mesh(bytes));
     match outcome {
         Ok(Ok(mesh)) => {
             assert_eq!(mesh.validate(), Ok(()), "{what}");
             // The mesh is no larger than the file.
             assert!(mesh.positions.len() <= bytes.len() && mesh.triangles.len() <= bytes.len(), "{what}");
+            true
         }
-        Ok(Err(error)) => assert!(!error.to_string().is_empty()),
+        Ok(Err(error)) => {
+            assert!(!error.to_string().is_empty());
+            false
+        }
         Err(_) => panic!("{what} panics"),
     }
 }
@@ -486,9 +496,9 @@ fn survives(bytes: &[u8], what: &str) {
 #[test]
 fn truncated_files_give_a_mesh_or_an_error() {
     for (n, sample) in samples().iter().enumerate() {
-        for length in 0..sample.len() {
-            survives(&sample[..length], &format!("sample {n} cut to {length}"));
-        }
+        let read = (0..sample.len())
+            .filter(|&length| survives(&sample[..length], &format!("sample {n} cut to {length}")));
+        assert!(10 * read.count() < sample.len(), "many truncations of sample {n} are read");
     }
     for (n, file) in [KNOT, FUZE, SPOT, DRACO].into_iter().enumerate() {
         for k in 0..40 {
@@ -501,19 +511,18 @@ fn truncated_files_give_a_mesh_or_an_error() {
 #[test]
 fn files_with_changed_bytes_give_a_mesh_or_an_error() {
     for (n, sample) in samples().iter().enumerate() {
+        let mut read = 0;
         for seed in 0..4000_u64 {
-            let mut state = seed.wrapping_mul(2862933555777941757).wrapping_add(n as u64 + 1);
-            let mut next = |limit: usize| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                (state >> 33) as usize % limit
-            };
+            let mut random = Random(4000 * n as u64 + seed);
             let mut bytes = sample.clone();
-            for _ in 0..1 + next(3) {
-                let at = next(bytes.len());
+            for _ in 0..1 + random.below(3) {
+                let at = random.below(bytes.len());
                 // Digits in text get further into the parser than random bytes.
-                bytes[at] = if next(2) == 0 { b'0' + next(10) as u8 } else { next(256) as u8 };
+                bytes[at] =
+                    if random.below(2) == 0 { b'0' + random.below(10) as u8 } else { random.next() as u8 };
             }
-            survives(&bytes, &format!("sample {n}, seed {seed}"));
+            read += usize::from(survives(&bytes, &format!("sample {n}, seed {seed}")));
         }
+        assert!((200..4000).contains(&read), "sample {n}: {read} of 4000 are read");
     }
 }

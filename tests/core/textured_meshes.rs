@@ -38,6 +38,7 @@ fn tetrahedron(shift: f32, texture: Option<Arc<Texture>>) -> TriangleMesh {
 fn assert_near(found: &TriangleMesh, expected: &TriangleMesh) {
     assert_eq!((&found.positions, &found.triangles), (&expected.positions, &expected.triangles));
     let uvs = |mesh: &TriangleMesh| mesh.corner_uvs.clone().unwrap().concat();
+    assert_eq!(uvs(found).len(), uvs(expected).len());
     for (a, b) in uvs(found).iter().zip(uvs(expected)) {
         assert!((a - b).abs().max_element() < 1e-6, "{a} {b}");
     }
