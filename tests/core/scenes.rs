@@ -1,7 +1,7 @@
 //! The paper's complete scenes: the result of each, and no self-intersections at any iteration. Prints a line for each
 //! scene.
 //!
-//! By default only scenes that take seconds run. `VESICLE_SCENES=all` runs all (some minutes): `npm run scenes`.
+//! Scenes that take long are ignored; `npm run scenes` runs all of them (some minutes).
 
 use crate::common::scenes;
 use crate::common::{Random, euler_of_parts, fingerprint};
@@ -12,11 +12,6 @@ use vesicle::methods::deformable::{DeformableModel, DeformableOptions, Deformabl
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
-
-/// Returns whether long scenes are run, too.
-fn all() -> bool {
-    std::env::var("VESICLE_SCENES").is_ok_and(|which| which == "all")
-}
 
 /// The result of a scene.
 struct Outcome {
@@ -64,13 +59,12 @@ fn mean_distance(model: &DeformableModel, distance: impl Fn(Vec3) -> f32) -> f32
     surface.positions.iter().map(|&p| distance(p).abs()).sum::<f32>() / surface.positions.len() as f32
 }
 
-/// Figure 7: starts from spheres of twelve radii around the two rings, which extend 28.5 voxels from the centre. The
-/// paper needed 90 iterations.
-#[test]
-fn chain_from_twelve_radii() {
+/// Figure 7: starts from spheres around the two rings, which extend 28.5 voxels from the centre, with
+/// radii of 29 voxels plus 0.35 times each of the given numbers. The paper needed 90 iterations.
+fn chain_from_radii(numbers: impl Iterator<Item = u32>) {
     let volume = scenes::chain();
     let centre = Vec3::from(volume.dims().map(|n| 0.5 * (n as f32 - 1.0)));
-    for k in (0..12).filter(|k| all() || k % 4 == 0) {
+    for k in numbers {
         let radius = 29.0 + 0.35 * k as f32;
         let sphere = Mesh::icosphere(centre, radius, 3.0).unwrap().to_triangles();
         let options = DeformableOptions {
@@ -82,6 +76,17 @@ fn chain_from_twelve_radii() {
         let (_, outcome) = play(&format!("chain from radius {radius}"), &volume, options, 90);
         assert_eq!(outcome.euler, [0, 0]);
     }
+}
+
+#[test]
+fn chain_from_three_radii() {
+    chain_from_radii((0..12).step_by(4));
+}
+
+#[test]
+#[ignore = "long scene: npm run scenes"]
+fn chain_from_nine_more_radii() {
+    chain_from_radii((0..12).filter(|k| k % 4 != 0));
 }
 
 /// With edges of one voxel the rings are accurate to a tenth of a voxel.
@@ -103,10 +108,8 @@ fn the_chain_is_accurate() {
 /// Figure 14, depth 3: holes three voxels wide. The holes of depth 4, one voxel wide, are narrower than the contact
 /// distance of two vertices.
 #[test]
+#[ignore = "long scene: npm run scenes"]
 fn menger_sponge_of_depth_three() {
-    if !all() {
-        return;
-    }
     let volume = scenes::menger(3);
     let options = DeformableOptions {
         start: Start::Enclosing,
@@ -162,9 +165,8 @@ fn rigidity_removes_noise_from_marching_cubes() {
     assert_eq!(outcome.euler.len(), 1);
 }
 
-/// Nothing regularises the surface here; it must stay valid whether it converges or not.
-#[test]
-fn marching_cubes_of_noise_without_rigidity_stay_valid() {
+/// Runs a model in which nothing regularises the surface; it must stay valid whether it converges or not.
+fn noise_without_rigidity(steps: usize) {
     let volume = noisy_ball();
     let options = DeformableOptions {
         start: Start::MarchingCubes(0.5),
@@ -172,13 +174,24 @@ fn marching_cubes_of_noise_without_rigidity_stay_valid() {
         ..Default::default()
     };
     let mut model = DeformableModel::new(&volume, options).unwrap();
-    let steps = if all() { 300 } else { 25 };
     for step in 0..steps {
         model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "step {step}");
         assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "step {step}");
     }
     println!("noisy ball, no rigidity: {steps} iterations, {} vertices", model.mesh().vertex_count());
+    assert!(model.mesh().vertex_count() > 1000);
+}
+
+#[test]
+fn marching_cubes_of_noise_without_rigidity_stay_valid() {
+    noise_without_rigidity(25);
+}
+
+#[test]
+#[ignore = "long scene: npm run scenes"]
+fn marching_cubes_of_noise_without_rigidity_stay_valid_for_long() {
+    noise_without_rigidity(300);
 }
 
 /// A model restored from a state saved in the middle of a merge continues with the same bits.
@@ -267,22 +280,20 @@ fn compare(name: &str, volume: &Volume, levels: usize, iso: f64) -> [i64; 2] {
 }
 
 #[test]
+#[ignore = "long scene: npm run scenes"]
 fn a_head_phantom_direct_and_coarse_to_fine() {
-    if all() {
-        let [direct, coarse_to_fine] = compare("head phantom", &scenes::head_phantom(), 2, 0.5);
-        assert_eq!(direct, coarse_to_fine);
-    }
+    let [direct, coarse_to_fine] = compare("head phantom", &scenes::head_phantom(), 2, 0.5);
+    assert_eq!(direct, coarse_to_fine);
 }
 
 /// The skin of the Visible Human's head, one of the app's examples.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
+#[ignore = "long scene: npm run scenes"]
 fn a_head_ct_direct_and_coarse_to_fine() {
-    if all() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head-full.nii.gz");
-        let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
-        compare("computed tomography", &volume, 2, 35.0);
-    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head-full.nii.gz");
+    let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
+    compare("computed tomography", &volume, 2, 35.0);
 }
 
 /// Returns milliseconds since the first call. The core reads no clock, so the test supplies one.

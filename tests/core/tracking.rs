@@ -2,7 +2,7 @@
 
 use crate::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
-use vesicle::mesh::{MeshError, TriangleMesh, count_self_intersections, measure};
+use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
@@ -47,6 +47,28 @@ fn errors(cine: &Cine, meshes: &[TriangleMesh]) -> Vec<f64> {
     meshes.iter().enumerate().map(one).collect()
 }
 
+/// Asserts that the area of every frame is within 5 % of the truth (10 % in the frames `hard`), and the ejection
+/// fraction, from the largest to the smallest volume, within 2 percentage points.
+fn assert_area_and_ejection(cine: &Cine, tracker: &SurfaceTracker, hard: &[usize]) {
+    let truths: Vec<Measures> =
+        (0..cine.frames).map(|frame| measure(&cine.truth(frame as f64, 0.7))).collect();
+    let ratios = tracker.meshes().iter().zip(&truths).map(|(mesh, truth)| measure(mesh).area / truth.area);
+    let ratios: Vec<f64> = ratios.collect();
+    let ejected = |volumes: Vec<f64>| {
+        let [low, high] = volumes.iter().fold([f64::MAX, 0.0], |[low, high], &v| [low.min(v), high.max(v)]);
+        1.0 - low / high
+    };
+    let found = ejected(tracker.meshes().iter().map(|mesh| measure(mesh).volume).collect());
+    let truth = ejected(truths.iter().map(|truth| truth.volume).collect());
+    println!("areas {ratios:.3?} of the truth, ejection fraction {found:.4} instead of {truth:.4}");
+    assert_eq!(ratios.len(), cine.frames);
+    for (frame, ratio) in ratios.iter().enumerate() {
+        let allowed = if hard.contains(&frame) { 0.1 } else { 0.05 };
+        assert!((ratio - 1.0).abs() <= allowed, "{frame} {ratio}");
+    }
+    assert!((found - truth).abs() <= 0.02, "{found} {truth}");
+}
+
 #[test]
 fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
     let cine = Cine::small();
@@ -56,8 +78,14 @@ fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
         let found = measure(mesh);
         assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let truth = measure(&cine.truth(frame as f64, 0.8));
-        assert!((found.volume / truth.volume - 1.0).abs() < 0.1, "{frame} {} {}", found.volume, truth.volume);
+        assert!(
+            (found.volume / truth.volume - 1.0).abs() < 0.05,
+            "{frame} {} {}",
+            found.volume,
+            truth.volume
+        );
     }
+    assert_area_and_ejection(&cine, &tracker, &[]);
     let errors = errors(&cine, tracker.meshes());
     assert!(errors.iter().all(|error| *error < 0.3 * cine.spacing.x), "{errors:?}");
     assert_eq!(tracker.volumes().len(), cine.frames);
@@ -113,12 +141,15 @@ fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     for (frame, (mesh, statistics)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
         assert_eq!((found.components, count_self_intersections(mesh)), (1, 0), "{frame}");
-        let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
-        assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.05, "{frame} {area} {volume}");
+        let volume = found.volume / truth.volume;
+        assert!((volume - 1.0).abs() < 0.05, "{frame} {volume}");
         assert!(statistics.folded * 100 < statistics.triangles, "{frame} {statistics:?}");
         retracted += statistics.without_boundary;
     }
     assert!(retracted > 100, "{retracted}");
+    // The gaps are two voxels wide at first, and in these frames a fifth of a voxel or closed; the surface still enters
+    // them, and has an area of 1.08 times the truth.
+    assert_area_and_ejection(&cine, &tracker, &[3, 4]);
 }
 
 #[test]
@@ -131,6 +162,23 @@ fn gaps_that_open_faster_than_the_boundary_attracts_are_filled() {
         let off = surface_distance(mesh, &cine.truth(frame as f64, 0.8)).unwrap();
         assert!(off.mean < 0.5 && off.p95 < 1.8, "{frame} {} {}", off.mean, off.p95);
     }
+}
+
+/// A sequence of the paper's size: 25 frames of 156 × 192 × 25 voxels of 1.67 × 1.67 × 5 mm.
+#[test]
+#[ignore = "takes a minute: npm run scenes"]
+fn a_sequence_of_the_papers_size_is_tracked_within_tolerances() {
+    let cine = Cine::full();
+    let volume = cine.volume().enrich_slices(None, Enrichment::Flow).unwrap();
+    let tracker = tracked(options(&cine, volume));
+    for (frame, (mesh, statistics)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
+        let off = surface_distance(mesh, &cine.truth(frame as f64, 0.8)).unwrap();
+        println!("frame {frame}: {:.3} mm in the mean, 95 % within {:.3} mm", off.mean, off.p95);
+        assert!(off.mean < 0.5 && off.p95 < 1.8, "{frame} {} {}", off.mean, off.p95);
+        assert_eq!((measure(mesh).components, count_self_intersections(mesh)), (1, 0), "{frame}");
+        assert!(statistics.folded * 100 < statistics.triangles, "{frame} {statistics:?}");
+    }
+    assert_area_and_ejection(&cine, &tracker, &[]);
 }
 
 /// Returns a pulsating tube along the third axis through the whole volume, whose signal falls to a third along it.
