@@ -3,9 +3,11 @@
 //! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
 use crate::common::scenes;
-use crate::common::{Named, Random, misplaced_parts, seeds};
+use crate::common::{Named, Random, assert_at_least, misplaced_parts, seeds};
+use std::collections::BTreeMap;
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::count_self_intersections;
+use vesicle::methods::MethodError;
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Seeding, Start,
 };
@@ -69,9 +71,20 @@ fn params(random: &mut Random, volume: &Volume) -> DeformableParams {
     }
 }
 
-/// Runs the model once, with parameter changes and attractors in between; a start that does not fit is refused. Returns
-/// the number of steps.
-fn run(seed: u64) -> usize {
+/// Counts over all runs.
+#[derive(Debug, Default)]
+struct Tally {
+    /// Accepted starts by kind.
+    starts: BTreeMap<&'static str, usize>,
+    steps: usize,
+    /// Merges and splits.
+    topology_changes: usize,
+    new_params: usize,
+    attractors: usize,
+}
+
+/// Runs the model once, with parameter changes and attractors in between; a start that does not fit is refused.
+fn run(seed: u64, tally: &mut Tally) {
     let mut random = Random(seed);
     let dims = dims(&mut random);
     let volume = image(&mut random, dims);
@@ -82,36 +95,62 @@ fn run(seed: u64) -> usize {
         params: Some(params(&mut random, &volume)),
         ..Default::default()
     };
-    let Ok(mut model) = DeformableModel::new(&volume, options) else { return 0 };
+    let kind = match options.start {
+        Start::Enclosing => "enclosing surfaces",
+        Start::Bubbles(_) => "bubbles",
+        Start::MarchingCubes(_) => "marching cubes",
+        Start::Seeds { .. } => "seeds",
+        _ => "contours",
+    };
+    let mut model = match DeformableModel::new(&volume, options) {
+        Ok(model) => model,
+        Err(MethodError::InvalidArgument { .. }) => return,
+        Err(error) => panic!("seed {seed}: {error}"),
+    };
+    *tally.starts.entry(kind).or_default() += 1;
     for step in 0..STEPS {
         let report = model.step().unwrap_or_else(|error| panic!("seed {seed}, step {step}: {error}"));
         assert_eq!(model.mesh().check(), Ok(()), "seed {seed}, step {step}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "seed {seed}, step {step}");
         let self_intersections = count_self_intersections(&model.mesh().to_triangles());
         assert_eq!(self_intersections, 0, "seed {seed}, step {step}: {report:?}");
+        tally.steps += 1;
+        tally.topology_changes += (report.events.axial + report.events.annular) as usize;
         match random.below(40) {
-            0 => model.set_params(params(&mut random, &volume)).unwrap(),
+            0 => {
+                model.set_params(params(&mut random, &volume)).unwrap();
+                tally.new_params += 1;
+            }
             1 => {
                 let point = DVec3::from(dims.map(|n| random.within(0.0, n as f64)));
                 let pull = Attractor { point, strength: random.within(-0.5, 0.5), radius: 8.0 };
                 model.set_attractors(vec![pull]).unwrap();
+                tally.attractors += 1;
             }
             _ => {}
         }
     }
     let misplaced = misplaced_parts(&model.mesh().to_triangles());
     assert!(misplaced.is_empty(), "seed {seed}: {misplaced:?}");
-    STEPS
 }
 
 #[test]
 fn every_run_keeps_the_mesh_valid() {
-    let mut steps = 0;
+    let mut tally = Tally::default();
     for seed in seeds(SEEDS) {
         let named = Named::new(seed);
-        steps += run(named.0);
+        run(named.0, &mut tally);
     }
-    println!("{steps} steps");
+    println!("{tally:?}");
+    let seeds = SEEDS as usize;
+    assert_at_least(5, tally.starts.len(), "kinds of starts accepted");
+    for (kind, &accepted) in &tally.starts {
+        assert_at_least(seeds / 50, accepted, kind);
+    }
+    assert_at_least(25 * seeds, tally.steps, "steps");
+    assert_at_least(20 * seeds, tally.topology_changes, "merges and splits");
+    assert_at_least(seeds / 2, tally.new_params, "changes of parameters");
+    assert_at_least(seeds / 2, tally.attractors, "attractors");
 }
 
 /// Regression: marching cubes of noise, resolved with edges much longer than voxels. Collapses drew needles through all

@@ -3,7 +3,7 @@
 //! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
 use crate::common::points::{direction, normal};
-use crate::common::{Named, Random, seeds};
+use crate::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::MethodError;
@@ -138,11 +138,17 @@ fn options(random: &mut Random, cloud: &Cloud) -> ImplicitOptions {
 }
 
 /// Counts of outcomes over all runs.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Tally {
+    accepted: usize,
+    steps: usize,
     surfaces: usize,
+    /// Surfaces that are not empty.
+    nonempty: usize,
     refused: usize,
     singular: usize,
+    edits: usize,
+    new_params: usize,
 }
 
 fn check(surface: &ImplicitSurface, report_euler: i32, seed: u64) {
@@ -173,21 +179,25 @@ fn run(seed: u64, tally: &mut Tally) {
         }
         Err(error) => panic!("seed {seed}: {error}"),
     };
+    tally.accepted += 1;
     let mut changes = random.below(4);
     for step in 0..MOST_STEPS {
         let before = (surface.version(), surface.surface().clone());
         match surface.step() {
             Ok(report) => {
+                tally.steps += 1;
                 let same = surface.version() == before.0;
                 assert!(!same || before.1 == *surface.surface(), "seed {seed}, step {step}");
                 if !report.done {
                     if random.below(30) == 0 && changes > 0 {
                         changes -= 1;
-                        let _ = change(&mut surface, count, &mut random);
+                        // Refused if an edit names a point that is not there.
+                        let _ = change(&mut surface, count, &mut random, tally);
                     }
                     continue;
                 }
                 tally.surfaces += 1;
+                tally.nonempty += usize::from(!surface.surface().triangles.is_empty());
                 check(&surface, report.euler, seed);
             }
             Err(error) => {
@@ -203,19 +213,22 @@ fn run(seed: u64, tally: &mut Tally) {
             return;
         }
         changes -= 1;
-        if change(&mut surface, count, &mut random).is_err() {
+        if change(&mut surface, count, &mut random, tally).is_err() {
             return;
         }
     }
     panic!("seed {seed}: no end");
 }
 
-/// Returns random edits: points added near others or anywhere, and some of the first removed; or no edits.
+/// Returns random edits: points added near others or, seldom, too far away, and some of the first removed, seldom with
+/// an index that is out of range; or no edits.
 fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointEdits {
     let [known, _] = surface.constraints();
+    let size = known.iter().map(|p| p.as_dvec3().distance(known[0].as_dvec3())).fold(0.0, f64::max);
     let mut places = |most: usize| -> Vec<Vec3> {
+        let reach = size * [0.0, 1e-6, 0.01, 0.1, 0.3, 9.0][random.below(6)];
         let near = |random: &mut Random| match known.get(random.below(known.len().max(1))) {
-            Some(p) => *p + (direction(random) * [0.0, 1e-6, 0.01, 1.0, 9.0][random.below(5)]).as_vec3(),
+            Some(p) => (p.as_dvec3() + direction(random) * reach).as_vec3(),
             None => direction(random).as_vec3(),
         };
         (0..random.below(most)).map(|_| near(random)).collect()
@@ -224,14 +237,22 @@ fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointE
         return PointEdits::default();
     }
     let (added, exterior) = (places(300), places(4));
-    let removed = (0..random.below(40)).map(|_| random.below(count + 1) as u32).collect();
+    let end = count + usize::from(random.below(8) == 0);
+    let removed = (0..random.below(40)).map(|_| random.below(end) as u32).collect();
     PointEdits { added, removed, exterior }
 }
 
-fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> Result<(), MethodError> {
+fn change(
+    surface: &mut ImplicitSurface,
+    count: usize,
+    random: &mut Random,
+    tally: &mut Tally,
+) -> Result<(), MethodError> {
     if random.below(2) == 0 {
         let edits = edits(surface, count, random);
-        return surface.set_edits(edits);
+        surface.set_edits(edits)?;
+        tally.edits += 1;
+        return Ok(());
     }
     let now = surface.params().clone();
     let next = match random.below(3) {
@@ -242,7 +263,9 @@ fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> R
         1 => ImplicitParams { cell: surface.cell() * random.within(0.7, 3.0), ..now.clone() },
         _ => ImplicitParams { cell: now.cell, ..params(random) },
     };
-    surface.set_params(next)
+    surface.set_params(next)?;
+    tally.new_params += 1;
+    Ok(())
 }
 
 #[test]
@@ -252,5 +275,12 @@ fn every_run_gives_a_valid_surface_or_an_error() {
         let named = Named::new(seed);
         run(named.0, &mut tally);
     }
-    println!("{} surfaces, {} refused, {} singular", tally.surfaces, tally.refused, tally.singular);
+    println!("{tally:?}");
+    let seeds = SEEDS as usize;
+    assert_at_least(seeds / 2, tally.accepted, "starts accepted");
+    assert_at_least(20 * seeds, tally.steps, "steps");
+    assert_at_least(seeds / 2, tally.surfaces, "surfaces");
+    assert_at_least(seeds / 3, tally.nonempty, "surfaces with triangles");
+    assert_at_least(seeds / 5, tally.edits, "sets of edits accepted");
+    assert_at_least(seeds / 5, tally.new_params, "sets of parameters accepted");
 }
