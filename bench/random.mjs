@@ -1,6 +1,9 @@
-// Random numbers for synthetic data.
+// Random numbers for the synthetic data of benchmarks and tests.
 
-/** Returns a generator of reproducible random numbers in (0, 1) (Mulberry32). */
+/**
+ * Returns a generator of reproducible random numbers in (0, 1) (Mulberry32).
+ * @param {number} seed
+ */
 export function randomNumbers(seed) {
   let state = seed;
   return () => {

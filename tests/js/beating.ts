@@ -1,4 +1,5 @@
 // A pulsating ball as a 4D volume with noise, and its true measures.
+import { randomNumbers } from '../../bench/random.mjs';
 import { type Vec3, Volume, type VolumeInit } from '../../pkg/index.js';
 
 export const FRAMES = 8;
@@ -19,15 +20,6 @@ const radius = (frame: number) => 6 - 0.75 * (1 - Math.cos((2 * Math.PI * frame)
 
 /** Returns the true volume of the ball in a frame, in world units cubed. */
 export const truth = (frame: number) => (4 / 3) * Math.PI * (SIDE * radius(frame)) ** 3;
-
-/** Returns a generator of reproducible random numbers in [0, 1). */
-function randomNumbers(seed: number) {
-  let state = seed;
-  return () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return state / 2 ** 32;
-  };
-}
 
 /** Returns the intensities of one ball, with a ramp of one voxel at its surface. */
 function paint(size: number, middle: Vec3, radius: number, random: () => number): number[] {
