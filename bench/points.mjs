@@ -1,5 +1,6 @@
 // Times the implicit surface of few and of many points of a torus. Runs in Node and in a page.
 import init, { ImplicitSurface, version } from '../pkg/index.js';
+import { randomNumbers } from './random.mjs';
 
 /** Numbers of points; one exterior point is added for every ten. */
 export const FEW = 3000;
@@ -8,18 +9,9 @@ export const MANY = 20_000;
 const CELL = 2 / 128;
 const [RING, TUBE] = [0.65, 0.35];
 
-/** Returns a generator of reproducible random numbers in [0, 1). */
-function randomNumbers() {
-  let state = 7;
-  return () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return state / 2 ** 32;
-  };
-}
-
 /** Returns uniformly distributed points of a torus as packed xyz. */
 function torus(count) {
-  const random = randomNumbers();
+  const random = randomNumbers(7);
   const points = [];
   while (points.length < 3 * count) {
     const [u, v] = [2 * Math.PI * random(), 2 * Math.PI * random()];
