@@ -290,6 +290,51 @@ describe('a finished run', () => {
   });
 });
 
+describe('an example', () => {
+  test('opened while the previous one is about to play never runs that one', async () => {
+    const page = await anotherPage(app, () => {
+      const { prototype } = Worker;
+      const { postMessage } = prototype;
+      const listeners = Object.getOwnPropertyDescriptor(prototype, 'onmessage');
+      const sent: string[] = [];
+      let film = 0;
+      let held: (() => void) | undefined;
+      prototype.postMessage = function (this: Worker, ...given: unknown[]) {
+        const { id, kind } = given[0] as { id: number; kind: string };
+        sent.push(kind);
+        if (kind === 'film') film ||= id;
+        Reflect.apply(postMessage, this, given);
+      };
+      // The reply to the first request about a film is late, so that the lab waits with a scene that does not play yet.
+      Object.defineProperty(prototype, 'onmessage', {
+        set(this: Worker, listener: (event: MessageEvent) => void) {
+          const listen = (event: MessageEvent) => {
+            if (held || !film || event.data.id !== film) listener(event);
+            else held = () => listener(event);
+          };
+          listeners?.set?.call(this, listen);
+        },
+      });
+      Object.assign(window, { sent, release: () => held?.(), isHeld: () => held !== undefined });
+    });
+    await page.goto(`${app.address}#sculpt?example=lava`);
+    await expect.poll(() => page.evaluate('isHeld()')).toBe(true);
+    await page.selectOption('.data select', 'globe');
+    // By then the data of the globe are ready, since they are computed.
+    for (let i = 0; i < 20; i++) await page.evaluate(() => new Promise(requestAnimationFrame));
+    await page.evaluate('release()');
+    await expect.poll(() => page.evaluate(() => location.hash)).toBe('#sculpt?example=globe');
+    await reach(page, 'done');
+    const sent = await page.evaluate<string[]>('sent');
+    const runs = ['open', 'play', 'settle'];
+    expect(sent.filter((kind) => runs.includes(kind))).toEqual(['open', 'play', 'open', 'settle']);
+    await page.locator('canvas[tabindex]').first().press('r');
+    await expect.poll(() => page.textContent('.iteration')).toBe('Iteration 0');
+    await reach(page, 'paused');
+    await page.close();
+  });
+});
+
 describe('a file', () => {
   test('opens with fitted ellipsoids', async () => {
     const mesh = Mesh.icosphere([3, 0, 0], 2, 0.5);

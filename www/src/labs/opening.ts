@@ -55,6 +55,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   #requestCount = 0;
   /** Settles when the worker has answered the last request to load data. */
   #loads: Promise<unknown> = Promise.resolve();
+  /** Settles when the last data opened are displayed, and the worker has answered the requests that this takes. */
+  #adoption: Promise<unknown> = Promise.resolve();
   /**
    * Whether the worker's model is not the one displayed, or is missing; if opening fails then, the engine counts as
    * broken.
@@ -235,8 +237,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       await this.#needEngine();
       await changesDone;
       const data = await source.load();
-      // In turn, so that the worker ends up with the newest request.
+      // In turn, so that the worker ends up with the newest request, and never runs its model for an earlier one.
       await this.#loads;
+      await this.#adoption;
       if (request !== this.#requestCount) return;
       await this.#needEngine();
       const opened = await this.#load(source, data, reopening);
@@ -245,7 +248,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
       if (!reopening) this.#awaiting = undefined;
-      await this.adopt(opened, source, reopening);
+      const adoption = this.adopt(opened, source, reopening);
+      this.#adoption = adoption.catch(() => undefined);
+      await adoption;
     } catch (error) {
       if (request === this.#requestCount) await this.#failed(source, error, reopening);
     }
