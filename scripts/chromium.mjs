@@ -7,10 +7,10 @@ const ARGUMENTS = [
   ...['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking'],
 ];
 
-/** Launches a browser, which the caller closes. Throws if none is installed. */
-export async function launchChromium() {
+/** Launches a browser, with further arguments if given; the caller closes it. Throws if none is installed. */
+export async function launchChromium(...more) {
   const executablePath = findChromium();
   if (!executablePath) throw new Error('no Chromium or Chrome was found: install one, or set CHROMIUM_PATH');
   const sandbox = process.getuid?.() === 0 ? ['--no-sandbox'] : [];
-  return chromium.launch({ executablePath, args: [...ARGUMENTS, ...sandbox] });
+  return chromium.launch({ executablePath, args: [...ARGUMENTS, ...sandbox, ...more] });
 }

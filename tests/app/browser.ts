@@ -1,6 +1,5 @@
-import { existsSync } from 'node:fs';
 import type { Browser, Page } from 'playwright-core';
-import { buildApp } from '../../scripts/app.mjs';
+import { expect } from 'vitest';
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
@@ -25,11 +24,16 @@ export const QUICK = {
 };
 export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
 
+/**
+ * Launches a browser, which the caller closes. It composes pages without WebGL: with WebGL in software, composing the
+ * page would take longer than drawing the surface.
+ */
+export const launch = () => launchChromium('--disable-gpu-compositing');
+
 /** Opens the built app in a browser of its own, at an address within the app. */
 export async function openApp(viewport = { width: 1280, height: 800 }, address = ''): Promise<App> {
-  if (!existsSync(at('dist/index.html'))) await buildApp();
   const server = await serve(at('dist'), 0);
-  const browser = await launchChromium();
+  const browser = await launch();
   const context = await browser.newContext({ viewport });
   // A busy machine with software rendering is slow, not wrong.
   context.setDefaultTimeout(PATIENCE);
@@ -102,6 +106,14 @@ export async function recordStates(page: Page): Promise<() => Promise<string[]>>
     return states;
   });
   return () => list.jsonValue();
+}
+
+/** Makes a change that starts a run, and waits until that run, or the last of several, has converged. */
+export async function afterRun<Result>(page: Page, change: () => Promise<Result>): Promise<Result> {
+  const states = await recordStates(page);
+  const result = await change();
+  await expect.poll(async () => (await states()).join(' ')).toMatch(/\brunning\b.* done$/);
+  return result;
 }
 
 /** Records every text of the status line from now on, since the next may replace it before a test reads it. */

@@ -4,10 +4,10 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at, must } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
+import { launch } from './browser';
 
 let browser: Browser;
 /** A project with the packed package installed, and nothing else. */
@@ -31,7 +31,7 @@ const write = (path: string, text: string) => writeFile(join(project, path), tex
 
 beforeAll(async () => {
   project = await mkdtemp(join(tmpdir(), 'vesicle-bundled-'));
-  browser = await launchChromium();
+  browser = await launch();
   const packed = await must('npm', ['pack', '--silent', '--pack-destination', project, at('pkg')]);
   await write('package.json', '{ "name": "a-page", "private": true, "type": "module" }');
   const install = [

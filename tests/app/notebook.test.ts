@@ -6,9 +6,9 @@ import type { Browser, Page } from 'playwright-core';
 import init, { Mesh } from 'vesicle';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 import type { Traits } from '../../examples/notebook/surface';
-import { launchChromium } from '../../scripts/chromium.mjs';
 import { makeNotebook, WIDGET } from '../../scripts/notebook.mjs';
 import { serve } from '../../scripts/serve.mjs';
+import { launch } from './browser';
 import { countPixels } from './pixels';
 
 /** A notebook's restrictions on widgets: no files beside it, no network. */
@@ -85,7 +85,7 @@ beforeAll(async () => {
     `<!doctype html><html lang="en"><head>${head}</head><body>${body}</body></html>`,
   );
   server = await serve(folder, 0);
-  browser = await launchChromium();
+  browser = await launch();
 });
 afterAll(async () => {
   await browser.close();

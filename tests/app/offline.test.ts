@@ -4,10 +4,9 @@ import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { build, createServer } from 'vite';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
-import { measures, open, openApp, reach } from './browser';
+import { launch, measures, open, reach } from './browser';
 
 let folder: string;
 let browser: Browser;
@@ -16,12 +15,10 @@ let server: Awaited<ReturnType<typeof serve>>;
 const uncaught: string[] = [];
 
 beforeAll(async () => {
-  // Builds the app if that has not been done.
-  await (await openApp(undefined, 'bench.html')).close();
   folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   await cp(at('dist'), folder, { recursive: true });
   server = await serve(folder, 0);
-  browser = await launchChromium();
+  browser = await launch();
   page = await browser.newPage();
   page.setDefaultTimeout(120_000);
   page.on('pageerror', ({ message }) => uncaught.push(message));

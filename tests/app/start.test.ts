@@ -7,9 +7,9 @@ import type { Browser, Page } from 'playwright-core';
 import init, { Volume } from 'vesicle';
 import { build, createServer, preview } from 'vite';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
-import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at, must } from '../../scripts/shell.mjs';
+import { launch } from './browser';
 import { countPixels } from './pixels';
 
 let home = '';
@@ -32,7 +32,7 @@ beforeAll(async () => {
   }
   await writeFile(join(folder, 'public/volume.nii.gz'), await balls());
   await cp(join(folder, 'public/volume.nii.gz'), join(folder, 'plain/volume.nii.gz'));
-  browser = await launchChromium();
+  browser = await launch();
 });
 afterAll(async () => {
   await browser.close();

@@ -1,15 +1,31 @@
 import { fileURLToPath } from 'node:url';
 import { defineConfig } from 'vitest/config';
 
+const at = (path: string) => fileURLToPath(new URL(path, import.meta.url));
+
+/** Tests that count frames, or measure how soon a page responds. */
+const ALONE = ['frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
+
 export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
-  resolve: { alias: { vesicle: fileURLToPath(new URL('../../pkg/index.js', import.meta.url)) } },
+  resolve: { alias: { vesicle: at('../../pkg/index.js') } },
   test: {
+    globalSetup: at('setup.ts'),
+    dir: at('.'),
     // Pages are rendered in software on two cores: slow machines need time, and nothing waits for a fixed duration.
     testTimeout: 300_000,
     hookTimeout: 300_000,
     expect: { poll: { timeout: 120_000 } },
-    // One browser at a time; two would compete for the cores.
-    fileParallelism: false,
+    projects: [
+      // Two files at a time: a page that waits for its worker, or for a test, leaves a core free.
+      {
+        extends: true,
+        test: { name: 'together', exclude: ALONE, maxWorkers: 2, sequence: { groupOrder: 0 } },
+      },
+      {
+        extends: true,
+        test: { name: 'alone', include: ALONE, fileParallelism: false, sequence: { groupOrder: 1 } },
+      },
+    ],
   },
 });

@@ -7,16 +7,16 @@ import { extname, join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
 import { build } from 'vite';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
+import { launch } from './browser';
 
 let browser: Browser;
 let server: Awaited<ReturnType<typeof serve>>;
 
 beforeAll(async () => {
-  browser = await launchChromium();
+  browser = await launch();
   server = await serve(at('pkg'), 0);
 });
 
