@@ -4,7 +4,17 @@ import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { computedCloud } from '../../www/src/reconstruct/clouds';
-import { type App, drop, iteration, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
+import {
+  type App,
+  afterRun,
+  drop,
+  iteration,
+  openApp,
+  overflow,
+  reach,
+  recordStates,
+  unnamedControls,
+} from './browser';
 import { countPixels } from './pixels';
 
 let app: App;
@@ -57,13 +67,6 @@ async function pauseAtOnce(): Promise<void> {
     const watch = new MutationObserver(press);
     if (lab) watch.observe(lab, { attributeFilter: ['data-state'] });
   });
-}
-
-/** Waits until the run that a change starts has ended. */
-async function afterRun(change: () => Promise<unknown>): Promise<void> {
-  const states = await recordStates(app.page);
-  await change();
-  await expect.poll(async () => (await states()).join(' ')).toMatch(/running.* done$|^running done$/);
 }
 
 describe('the built-in example', () => {
@@ -144,7 +147,7 @@ describe('running', () => {
       if (element) new MutationObserver(note).observe(element, { attributeFilter: ['data-measures'] });
       return list;
     });
-    await afterRun(() => setParam('lambdaSurface', '0.01'));
+    await afterRun(app.page, () => setParam('lambdaSurface', '0.01'));
     const after = await measured();
     expect(after).toMatchObject({ components: 1, genus: 1, closed: true });
     expect(after.meanCurvature).toBeLessThan(Number(before.meanCurvature));
@@ -155,10 +158,10 @@ describe('running', () => {
   test('undo restores the previous value and surface, redo the later', async () => {
     const field = app.page.locator('[data-param=lambdaSurface] input[type=number]');
     const later = await measured();
-    await afterRun(() => app.page.click('[data-transport=undo]'));
+    await afterRun(app.page, () => app.page.click('[data-transport=undo]'));
     expect(await field.inputValue()).toBe('0.001');
     expect((await measured()).meanCurvature).toBeGreaterThan(Number(later.meanCurvature));
-    await afterRun(() => app.page.click('[data-transport=redo]'));
+    await afterRun(app.page, () => app.page.click('[data-transport=redo]'));
     expect(await field.inputValue()).toBe('0.01');
     expect((await measured()).vertices).toBe(later.vertices);
   });
@@ -185,9 +188,9 @@ describe('running', () => {
   test('the width of the Gaussian is shown only for the Gaussian', async () => {
     const shown = (name: string) => app.page.locator(`[data-param=${name}]`).isVisible();
     expect([await shown('sigma'), await shown('delta')]).toEqual([false, true]);
-    await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'gaussian'));
+    await afterRun(app.page, () => app.page.selectOption('[data-param=kernel] select', 'gaussian'));
     expect([await shown('sigma'), await shown('delta')]).toEqual([true, false]);
-    await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'multi-order'));
+    await afterRun(app.page, () => app.page.selectOption('[data-param=kernel] select', 'multi-order'));
   });
 
   test('a parameter out of range is refused beside it, and the previous value is kept', async () => {
@@ -197,7 +200,7 @@ describe('running', () => {
   });
 
   test('a smaller limit uses fewer points', async () => {
-    await afterRun(() => setParam('maxPoints', '500'));
+    await afterRun(app.page, () => setParam('maxPoints', '500'));
     const { surfaceConstraints, components, genus } = await measured();
     expect(surfaceConstraints).toBeLessThanOrEqual(500);
     expect({ components, genus }).toEqual({ components: 1, genus: 1 });
@@ -210,10 +213,10 @@ describe('edits of points', () => {
   test('a point added in the centre of the view is one more constraint until it is undone', async () => {
     const before = await measured();
     await app.page.check('[data-tool=add]');
-    await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
+    await afterRun(app.page, () => app.page.locator('.scene > canvas').press('Enter'));
     expect((await measured()).surfaceConstraints).toBe(Number(before.surfaceConstraints) + 1);
     expect(await app.page.evaluate(() => location.hash)).toMatch(/add=[-\d.e]+,[-\d.e]+,[-\d.e]+/);
-    await afterRun(() => app.page.click('[data-edit=clear]'));
+    await afterRun(app.page, () => app.page.click('[data-edit=clear]'));
     const { surfaceConstraints, vertices } = await measured();
     expect(surfaceConstraints).toBe(before.surfaceConstraints);
     // Solved from another start, so equal within the tolerance only.
@@ -227,12 +230,12 @@ describe('edits of points', () => {
     // There is a ball right of the centre.
     const position = { x: 0.68 * width, y: 0.5 * height };
     await app.page.check('[data-tool=remove]');
-    await afterRun(() => view.click({ position }));
+    await afterRun(app.page, () => view.click({ position }));
     const { surfaceConstraints } = await measured();
     expect(surfaceConstraints).toBeLessThan(Number(before.surfaceConstraints));
     await app.page.check('[data-tool=outside]');
     const { exteriorConstraints } = await measured();
-    await afterRun(() => view.click({ position }));
+    await afterRun(app.page, () => view.click({ position }));
     expect((await measured()).exteriorConstraints).toBe(Number(exteriorConstraints) + 1);
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     await app.page.check('[data-tool=none]');
@@ -260,11 +263,11 @@ describe('edits of points', () => {
 
   test('an edit only changes the solution: points are not sampled again, and the surface is kept until the next', async () => {
     const times = () => app.page.locator('.phases .time').allTextContents();
-    await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
+    await afterRun(app.page, () => app.page.locator('.scene > canvas').press('Enter'));
     const [subsample, constraints, solve, extract] = await times();
     expect([subsample, constraints]).toEqual(['', '']);
     for (const time of [solve, extract]) expect(time).toMatch(/^[\d.,]+ m?s$/);
-    await afterRun(() => app.page.keyboard.press('Control+z'));
+    await afterRun(app.page, () => app.page.keyboard.press('Control+z'));
     expect((await times())[0]).toBe('');
     expect(await text('.edit-tools [role=status]')).toBe('1 point added.');
     expect((await measured()).surfaceConstraints).toBe(1601);
@@ -315,7 +318,7 @@ describe('edits of points', () => {
     const { width = 0, height = 0 } = (await view.boundingBox()) ?? {};
     await app.page.fill('.edit-tools input[type=number]', '50');
     // One ball after the other; together they would be refused together.
-    await afterRun(() => view.click({ position: { x: 0.3 * width, y: 0.5 * height } }));
+    await afterRun(app.page, () => view.click({ position: { x: 0.3 * width, y: 0.5 * height } }));
     await view.click({ position: { x: 0.7 * width, y: 0.5 * height } });
     await expect.poll(() => text('[data-error]')).toContain('at least 4');
     expect((await measured()).vertices).toBeLessThan(Number(before.vertices));
@@ -335,7 +338,7 @@ describe('edits of points', () => {
 describe('files', () => {
   test('dropped points replace the example', async () => {
     await openAt('#reconstruct?example=torus', 'done');
-    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
     expect(await measured()).toMatchObject({ components: 2, genus: 0, closed: true });
     expect(await text('.facts')).toContain('balls.xyz');
   });
@@ -361,18 +364,18 @@ describe('files', () => {
 
   test("a file does not inherit an example's settings: both balls are kept after the cow, of which one cluster is kept", async () => {
     await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
-    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
     expect(await measured()).toMatchObject({ components: 2 });
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
-    await afterRun(() => setParam('lambdaSurface', '0.003'));
-    await afterRun(() => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
+    await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
+    await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
   });
 
   test('a link to a file waits for it and then applies its settings', async () => {
     await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
     expect(await text('.banner')).toContain('Open balls.xyz from your disk');
-    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&p.delta=9');
     expect(await measured()).toMatchObject({ components: 2 });
   });
@@ -380,7 +383,7 @@ describe('files', () => {
   test('points given twice count once', async () => {
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
-    await afterRun(() => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
+    await afterRun(app.page, () => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
     expect(await measured()).toMatchObject({ components: 2, duplicates: 1600, surfaceConstraints: 1600 });
   });
 
@@ -406,7 +409,7 @@ describe('files', () => {
       })),
     );
     files.push({ name: 'cameras.json', bytes: new TextEncoder().encode(JSON.stringify(two)) });
-    await afterRun(() => drop(app.page, files));
+    await afterRun(app.page, () => drop(app.page, files));
     expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true });
     expect(await app.page.locator('.strip button').count()).toBe(2);
     expect(await app.page.inputValue('[data-view=color]')).toBe('own');
@@ -475,7 +478,7 @@ describe('a link', () => {
     expect(await text('.figure')).toMatch(
       /Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/,
     );
-    await afterRun(() => app.page.click('.figure button:has-text("a subset")'));
+    await afterRun(app.page, () => app.page.click('.figure button:has-text("a subset")'));
     expect(await text('[data-figure=came]')).toContain('812');
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
   });
@@ -485,11 +488,11 @@ describe('a link', () => {
     const pressed = () => text('.figure button[aria-pressed=true]');
     expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
     expect(await text('[data-figure=came]')).toContain('a spurious handle');
-    await afterRun(() => app.page.click('.figure button:has-text("2,168 points")'));
+    await afterRun(app.page, () => app.page.click('.figure button:has-text("2,168 points")'));
     expect([await pressed(), (await measured()).genus]).toEqual(['2,168 points', 0]);
     expect(await text('[data-figure=came]')).toContain('genus 0');
     expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
-    await afterRun(() => setParam('tau', '0.02'));
+    await afterRun(app.page, () => setParam('tau', '0.02'));
     expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
     expect(await text('[data-figure=came]')).toBe('The settings differ from those of the figure.');
   });
@@ -522,7 +525,7 @@ describe('a link', () => {
 
   test('without an example, followed in the open page, keeps the open data and its address', async () => {
     await app.page.evaluate(() => {
-      location.hash = '#reconstruct?example=nope';
+      location.hash = '#reconstruct?example=nowhere';
     });
     await expect.poll(() => text('.banner')).toContain('no example “nope”');
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');

@@ -3,7 +3,17 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { type App, anotherPage, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+import {
+  type App,
+  afterRun,
+  anotherPage,
+  drop,
+  openApp,
+  overflow,
+  reach,
+  recordNews,
+  unnamedControls,
+} from './browser';
 import { countPixels } from './pixels';
 
 let app: App;
@@ -34,12 +44,6 @@ const view = () => app.page.locator('.scene > canvas');
 /** A surface with few triangles, so that a page with software rendering is fast. */
 const SMALL = '#sculpt?example=globe&p.edgeMin=0.09&p.edgeMax=0.2';
 
-/** Waits until a change and what follows from it have settled. */
-async function atRest(): Promise<void> {
-  await app.page.waitForTimeout(100);
-  await reach(app.page, 'done');
-}
-
 /**
  * Runs in the page, before anything else: keeps WebGL pictures readable at any time, not only in the frame in which
  * they are drawn.
@@ -53,12 +57,13 @@ function keepPictures(): void {
 
 /**
  * Runs in the page: moves the selected ellipsoid by keys, and returns after how many animation frames each move was
- * visible.
+ * visible. Afterwards the model has followed all moves.
  */
 async function framesUntilSeen(): Promise<number[]> {
   const canvas = document.querySelector<HTMLCanvasElement>('.scene > canvas');
   const copy = new OffscreenCanvas(320, 240).getContext('2d', { willReadFrequently: true });
-  if (!canvas || !copy) throw new Error('there is no view');
+  const lab = document.querySelector<HTMLElement>('[data-state]');
+  if (!canvas || !copy || !lab) throw new Error('there is no view');
   /** Resolves when all callbacks of an animation frame have run. */
   const animationFrame = () => new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
   /** Horizontal centre of the drawn pixels, from the left. */
@@ -74,8 +79,14 @@ async function framesUntilSeen(): Promise<number[]> {
     return sum / count;
   };
   const answers: number[] = [];
-  for (let move = 0; move < 6; move++) {
-    await animationFrame();
+  const moves = 6;
+  const states: (string | undefined)[] = [];
+  new MutationObserver(() => states.push(lab.dataset.state)).observe(lab, { attributeFilter: ['data-state'] });
+  for (let move = 0; move < moves; move++) {
+    // The last move starts a run of its own, whose end can be awaited.
+    do await animationFrame();
+    while (move === moves - 1 && lab.dataset.state !== 'done');
+    states.length = 0;
     const before = middle();
     canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true }));
     let frames = 0;
@@ -85,6 +96,7 @@ async function framesUntilSeen(): Promise<number[]> {
     } while (middle() < before + 1 && frames < 100);
     answers.push(frames);
   }
+  while (!/running.*done$/.test(states.join(' '))) await animationFrame();
   return answers;
 }
 
@@ -136,10 +148,11 @@ describe('dragging', () => {
     await app.page.click('[data-ellipsoid="1"]');
     const { x, y } = await findHandle();
     await app.page.mouse.move(x, y);
-    await app.page.mouse.down();
-    for (let i = 1; i <= 8; i++) await app.page.mouse.move(x + 4 * i, y - 3 * i);
-    await app.page.mouse.up();
-    await atRest();
+    await afterRun(app.page, async () => {
+      await app.page.mouse.down();
+      for (let i = 1; i <= 8; i++) await app.page.mouse.move(x + 4 * i, y - 3 * i);
+      await app.page.mouse.up();
+    });
     const { alongMs, answerFrames, closed, crossings } = await measured();
     expect(alongMs).toBeGreaterThanOrEqual(0);
     expect(answerFrames).toBeGreaterThan(0);
@@ -154,21 +167,17 @@ describe('dragging', () => {
     await app.page.uncheck('[data-view=ellipsoids]');
     const frames = await app.page.evaluate(framesUntilSeen);
     expect(frames).toEqual([1, 1, 1, 1, 1, 1]);
-    await atRest();
     await app.page.check('[data-view=ellipsoids]');
   });
 
   test('undo restores the previous surface, and redo the later', async () => {
     const { volume: dragged } = await measured();
-    await app.page.click('[data-transport=undo]');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('[data-transport=undo]'));
     await expect.poll(async () => (await measured()).volume).not.toBe(dragged);
     const { volume: before } = await measured();
-    await app.page.click('[data-transport=redo]');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('[data-transport=redo]'));
     await expect.poll(async () => (await measured()).volume).toBe(dragged);
-    await app.page.click('[data-transport=undo]');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('[data-transport=undo]'));
     await expect.poll(async () => (await measured()).volume).toBe(before);
   });
 
@@ -177,16 +186,15 @@ describe('dragging', () => {
     expect(await text('.status')).toBe('Ellipsoid 2, small: selected.');
     const before = await app.page.inputValue('[aria-label="Centre, x"]');
     const news = await recordNews(app.page);
-    await view().press('ArrowRight');
+    await afterRun(app.page, () => view().press('ArrowRight'));
     const moved = /^Ellipsoid 2, small: moved, centre /;
     await expect.poll(news).toContainEqual(expect.stringMatching(moved));
     expect(await app.page.inputValue('[aria-label="Centre, x"]')).not.toBe(before);
     await view().press('t');
-    await view().press('ArrowLeft');
+    await afterRun(app.page, () => view().press('ArrowLeft'));
     await expect.poll(news).toContainEqual(expect.stringMatching(/small: rotated/));
     await view().press('Escape');
     expect(await app.page.locator('.numbers').isVisible()).toBe(false);
-    await atRest();
   });
 
   test('numbers are accepted, or refused beside their field', async () => {
@@ -195,17 +203,14 @@ describe('dragging', () => {
     await app.page.keyboard.press('Enter');
     expect(await text('.ellipsoids .field-error')).toBe('The length must be > 0.');
     await app.page.fill('[aria-label="Semi-axis 1"]', '0.95');
-    await app.page.keyboard.press('Enter');
-    await atRest();
+    await afterRun(app.page, () => app.page.keyboard.press('Enter'));
     expect(await hash()).toMatch(/pose=[^;]*,0\.95,/);
   });
 
   test('an added ellipsoid grows, and disappears when it is removed', async () => {
-    await app.page.click('[data-ellipsoid=add]');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('[data-ellipsoid=add]'));
     expect(await app.page.locator('.chips [data-ellipsoid]').count()).toBe(3);
-    await app.page.click('[data-ellipsoid=remove]');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('[data-ellipsoid=remove]'));
     expect(await app.page.locator('.chips [data-ellipsoid]').count()).toBe(2);
   });
 });
@@ -217,13 +222,11 @@ describe('an animation', () => {
     await app.page.click('[data-film=add]');
     await app.page.click('[data-ellipsoid="2"]');
     await app.page.fill('[aria-label="Centre, y"]', '0.5');
-    await app.page.keyboard.press('Enter');
-    await atRest();
+    await afterRun(app.page, () => app.page.keyboard.press('Enter'));
     await app.page.click('[data-film=add]');
     await app.page.fill('.film input[type=number]', '6');
     await app.page.keyboard.press('Enter');
-    await app.page.click('.play');
-    await atRest();
+    await afterRun(app.page, () => app.page.click('.play'));
     await expect.poll(() => text('.film output')).toBe('6 of 6');
     const address = await hash();
     expect(address.match(/key=/g)).toHaveLength(2);
