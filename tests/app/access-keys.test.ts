@@ -1,6 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, LABS, open, openApp, QUICK, reach, unfold } from './browser';
+import { changes, showsAgain } from './pixels';
 
 const SLICED = ['extract', 'track'];
 
@@ -107,13 +108,13 @@ describe.each(LABS)('the %s lab', (lab) => {
   test('rotates, zooms and resets its view by keys', async () => {
     const view = app.page.locator('canvas[tabindex]').first();
     await view.press('Home');
-    const picture = async () => (await view.screenshot()).toString('base64');
+    const picture = () => view.screenshot();
     const home = await picture();
     for (const key of ['ArrowLeft', 'ArrowUp', '+']) {
       await view.press(key);
-      await expect.poll(picture, { message: key }).not.toBe(home);
+      await changes(app.page, home, picture, 0.02, key);
       await view.press('Home');
-      await expect.poll(picture, { message: `Home after ${key}` }).toBe(home);
+      await showsAgain(app.page, home, picture, `Home after ${key}`);
     }
   });
 
@@ -142,7 +143,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await expect.poll(() => app.page.textContent('.edit-tools [role=status]')).toContain('1 point added');
   });
 
-  test('can be run by keys: reset, a step, ten steps, and undo of steps where possible', async () => {
+  test('can be run by keys: reset, a step, ten steps', async () => {
     // The globe has converged after a step.
     if (lab === 'sculpt') await open(app, 'sculpt?example=lava');
     await reach(app.page, 'running', 'paused', 'done');
@@ -153,7 +154,10 @@ describe.each(LABS)('the %s lab', (lab) => {
     await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
     await app.page.keyboard.press('d');
     await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 11');
-    if (lab === 'reconstruct') return;
+  });
+
+  // A system of equations has no earlier steps to return to.
+  test.skipIf(lab === 'reconstruct')('undoes steps by keys', async () => {
     await app.page.keyboard.press('Control+z');
     await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
   });

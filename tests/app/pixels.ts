@@ -1,5 +1,6 @@
 // Measures pictures. They are decoded by the browser that took them.
 import type { Page } from 'playwright-core';
+import { expect } from 'vitest';
 
 /** Runs in the page: returns red, green, blue and alpha of each pixel. */
 const PIXELS = `async (base64) => {
@@ -42,16 +43,41 @@ export function countColors(page: Page, picture: Buffer): Promise<number> {
   return told(page, [picture], '(data) => new Set(new Uint32Array(data.buffer)).size');
 }
 
-/** Returns the fraction of pixels that clearly differ between two PNGs. */
+/** Returns the fraction of pixels that clearly differ between two PNGs; 1 if their sizes differ. */
 export function difference(page: Page, before: Buffer, after: Buffer): Promise<number> {
   return told(
     page,
     [before, after],
     `(a, b) => {
+      if (a.length !== b.length) return 1;
+      const differs = (i) => Math.abs(a[i] - b[i]) > 24;
       let count = 0;
-      for (let i = 0; i < a.length; i += 4)
-        if ([0, 1, 2].some((k) => Math.abs(a[i + k] - b[i + k]) > 24)) count += 1;
+      for (let i = 0; i < a.length; i += 4) if (differs(i) || differs(i + 1) || differs(i + 2)) count += 1;
       return (4 * count) / a.length;
     }`,
   );
+}
+
+/** Largest fraction of clearly differing pixels in two pictures of the same. */
+const SAME = 0.0002;
+
+/** Waits until `take` gives a picture of the same as `picture`. */
+export async function showsAgain(
+  page: Page,
+  picture: Buffer,
+  take: () => Promise<Buffer>,
+  message = '',
+): Promise<void> {
+  await expect.poll(async () => difference(page, picture, await take()), { message }).toBeLessThanOrEqual(SAME);
+}
+
+/** Waits until at least the fraction `part` of the pixels of the picture that `take` gives differ from `picture`. */
+export async function changes(
+  page: Page,
+  picture: Buffer,
+  take: () => Promise<Buffer>,
+  part: number,
+  message = '',
+): Promise<void> {
+  await expect.poll(async () => difference(page, picture, await take()), { message }).toBeGreaterThanOrEqual(part);
 }
