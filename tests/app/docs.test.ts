@@ -1,9 +1,8 @@
-// The documentation beside the app: its links.
+// The documentation beside the app: its links; and the addresses that the tests open.
 import { existsSync } from 'node:fs';
 import { readdir, readFile } from 'node:fs/promises';
 import { dirname, join, relative } from 'node:path';
 import { beforeAll, expect, test } from 'vitest';
-import { buildApp } from '../../scripts/app.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { exampleById } from '../../www/src/presets';
 import { cloudById } from '../../www/src/reconstruct/presets';
@@ -28,7 +27,6 @@ interface Link {
 let links: Link[] = [];
 
 beforeAll(async () => {
-  if (!existsSync(DOCS)) await buildApp();
   const names = await readdir(DOCS, { recursive: true });
   const pages = names.filter((name) => name.endsWith('.html'));
   links = (await Promise.all(pages.map(linksOf))).flat();
@@ -73,4 +71,19 @@ test('every method has a page, and its examples exist in the lab', () => {
   expect([...labs].sort()).toEqual(Object.keys(LABS).sort());
   expect(examples.length).toBeGreaterThan(9);
   expect(examples.filter((example) => example.endsWith('name'))).toEqual([]);
+});
+
+test('every example that a test opens exists, except those that a test says do not', async () => {
+  const folder = at('tests/app');
+  // Unit tests only parse addresses.
+  const sources = (await readdir(folder)).filter((name) => name.endsWith('.ts') && !name.endsWith('units.test.ts'));
+  const opened: string[] = [];
+  for (const source of sources) {
+    const text = await readFile(join(folder, source), 'utf8');
+    for (const [, lab = '', id = ''] of text.matchAll(/\b(\w+)\?(?:[^'"`\s]*&)?example=([\w-]+)/g))
+      if (id !== 'nowhere' && lab in LABS)
+        opened.push(`${source}: ${lab} ${LABS[lab]?.(id)?.id === id ? id : 'has none'}`);
+  }
+  expect(opened.length).toBeGreaterThan(40);
+  expect(opened.filter((one) => one.endsWith('none'))).toEqual([]);
 });
