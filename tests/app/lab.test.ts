@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { PRESETS } from '../../www/src/presets';
 import { type App, iteration, measures, openApp, reach } from './browser';
+import { changes, showsAgain } from './pixels';
 
 let app: App;
 
@@ -58,14 +59,14 @@ describe('a figure of the paper', () => {
     const fine = await picture(slice);
     await app.page.click('.pyramid [data-level="3"]');
     expect(await app.page.getAttribute('.pyramid [data-level="3"]', 'aria-pressed')).toBe('true');
-    await expect.poll(async () => (await picture(slice)).equals(fine)).toBe(false);
+    await changes(app.page, fine, () => picture(slice), 0.1);
     const small = await picture('.pyramid [data-level="0"]');
     await app.page.locator('.slice input[type=range]').first().press('Home');
-    await expect.poll(async () => (await picture('.pyramid [data-level="0"]')).equals(small)).toBe(false);
+    await changes(app.page, small, () => picture('.pyramid [data-level="0"]'), 0.1);
     await app.page.locator('.slice input[type=range]').first().fill('55');
     await app.page.check('[data-pyramid=follow]');
     expect(await app.page.getAttribute('.pyramid [data-level="0"]', 'aria-pressed')).toBe('true');
-    await expect.poll(async () => (await picture(slice)).equals(fine)).toBe(true);
+    await showsAgain(app.page, fine, () => picture(slice));
     await app.page.uncheck('[data-pyramid=follow]');
   });
 
@@ -116,10 +117,24 @@ describe('a figure of the paper', () => {
     );
     expect(direct).toMatchObject({ levels: 0, done: true, components: 1, genus: 5 });
     expect(coarseToFine).toMatchObject({ levels: 3, done: true, components: 1, genus: 5, vertices: before.vertices });
-    expect(direct.milliseconds).toBeGreaterThan(2.75 * coarseToFine.milliseconds);
-    expect(await text('.compare [role=status]')).toMatch(/times as fast as direct\. Area differs by 0\.\d\d %/);
+    // How fast each is depends on the machine; the sentence tells what was measured.
+    const [faster, slower] = [coarseToFine, direct].toSorted((a, b) => a.milliseconds - b.milliseconds);
+    const names = faster === direct ? ['Direct', 'coarse to fine'] : ['Coarse to fine', 'direct'];
+    const factor = Number((slower.milliseconds / faster.milliseconds).toPrecision(2));
+    expect(await text('.compare [role=status]')).toMatch(
+      new RegExp(`^${names[0]} was ${factor} times as fast as ${names[1]}\\. Area differs by 0\\.\\d\\d %`),
+    );
     const table = app.page.getByRole('region', { name: 'Times of both runs' });
     expect(await table.locator('thead th').allTextContents()).toEqual(['Part', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
+    const steps = await table
+      .locator('tbody tr', { hasText: 'steps' })
+      .evaluateAll((rows) =>
+        rows.map((row) => [...row.querySelectorAll('td')].map((cell) => Number(cell.textContent?.replace(/\D/g, '')))),
+      );
+    // On I₀, where a step costs most, coarse to fine has few left to do.
+    expect(steps[1]?.slice(0, 3)).toEqual([0, 0, 0]);
+    expect(steps[1]?.[3]).toBeGreaterThan(5 * (steps[0]?.[3] ?? Number.POSITIVE_INFINITY));
+    expect(steps.map((row) => row.slice(0, 4).reduce((sum, n) => sum + n) - (row[4] ?? 0))).toEqual([0, 0]);
     const heads = await table.locator('tbody th').allTextContents();
     expect(heads).toEqual(['coarse to fine', 'T', 'N', 'F', '=', 'steps', 'direct', 'T', 'N', 'F', '=', 'steps']);
     expect(await measures(app.page)).toEqual(before);
@@ -170,14 +185,12 @@ describe('attractors', () => {
   });
 
   test('are shown in the slices and in 3D', async () => {
-    const pictures = async () => [await picture('.slice canvas'), await picture('.view > canvas')];
-    const before = await pictures();
+    const before = [await picture('.slice canvas'), await picture('.view > canvas')];
     await app.page.getByLabel('Radius of attractor 1').fill('11');
     await app.page.getByLabel('Radius of attractor 1').press('Enter');
     await pause();
-    await expect
-      .poll(async () => (await pictures()).map((one, i) => one.equals(before[i] ?? Buffer.of())))
-      .toEqual([false, false]);
+    for (const [i, canvas] of ['.slice canvas', '.view > canvas'].entries())
+      await changes(app.page, before[i] ?? Buffer.of(), () => picture(canvas), 0.005, canvas);
   });
 
   test('are placed by clicking in a slice and on the surface', async () => {
@@ -232,10 +245,10 @@ describe('colour', () => {
     const legend = app.page.getByRole('group', { name: 'Colour scale' });
     await legend.waitFor();
     expect(await legend.textContent()).toMatch(/^Speed along the normal, δ per iteration−([\d.]+)0\1inwardsoutwards$/);
-    await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(false);
+    await changes(app.page, plain, () => picture('.view > canvas'), 0.05);
     await app.page.selectOption('[data-view=color]', 'plain');
     await legend.waitFor({ state: 'hidden' });
-    await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(true);
+    await showsAgain(app.page, plain, () => picture('.view > canvas'));
   });
 
   test("by curvature has a legend in the volume's unit, and distinguishes convex from concave", async () => {
