@@ -55,6 +55,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await open(app, lab);
     await reach(app.page, 'running');
     await expectNothing('html', [LOOKS[1]]);
+    expect(await app.page.getAttribute('[data-state]', 'data-state')).toBe('running');
   });
 
   test('has no violations when it is done and everything is expanded, nor in its message', async () => {
