@@ -1,7 +1,17 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
-import { type App, cancelAtOnce, drop, iteration, measures, openApp, reach, recordStates } from './browser';
+import {
+  type App,
+  anotherPage,
+  cancelAtOnce,
+  drop,
+  iteration,
+  measures,
+  openApp,
+  reach,
+  recordStates,
+} from './browser';
 import { changes, countColors } from './pixels';
 import { ball, metaImageHeader, ring } from './volumes';
 
@@ -115,6 +125,24 @@ describe('running', () => {
 });
 
 describe('files', () => {
+  test('opened while the engine is loading are not replaced by the example', async () => {
+    const page = await anotherPage(app, () => {
+      const { postMessage } = Worker.prototype;
+      // The engine gets the first request only when it is released.
+      Worker.prototype.postMessage = function (this: Worker, ...given: unknown[]) {
+        Worker.prototype.postMessage = postMessage;
+        Object.assign(window, { release: () => Reflect.apply(postMessage, this, given) });
+      };
+    });
+    await page.goto(app.address);
+    const buffer = Buffer.from(niftiOf(ball()));
+    await page.setInputFiles('input[type=file]', { name: 'ball.nii', mimeType: '', buffer });
+    await page.evaluate('release()');
+    await reach(page, 'done');
+    expect(await page.textContent('.facts')).toContain('ball.nii');
+    await page.close();
+  });
+
   test('a dropped volume replaces the example', async () => {
     await drop(app.page, [{ name: 'ball.nii', bytes: niftiOf(ball()) }]);
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('ball.nii'));

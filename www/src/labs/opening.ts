@@ -53,6 +53,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   #awaiting: Linked | undefined;
   /** Counts requests, so that a slow download does not replace what was opened after it. */
   #requestCount = 0;
+  /** Settles when the engine has loaded for the first time, or failed to. */
+  #started: Promise<unknown> = Promise.resolve();
   /** Settles when the worker has answered the last request to load data. */
   #loads: Promise<unknown> = Promise.resolve();
   /** Settles when the last data opened are displayed, and the worker has answered the requests that this takes. */
@@ -129,20 +131,22 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /**
-   * Opens what another lab passes on, or what the address asks for, or else the first example; then follows changes of
-   * the address until `signal` is aborted. After each such change, `onFollowed` is called, which corrects an address
+   * Opens what another lab passes on, or what the address asks for, or else the first example, unless the user has
+   * opened something while the engine was loading; then follows changes of the address until `signal` is aborted. After each such change, `onFollowed` is called, which corrects an address
    * that could not be followed.
    */
   async start(signal: AbortSignal, onFollowed: () => void, passedOn?: () => Promise<void>): Promise<void> {
     try {
-      await this.#greet();
+      const greeting = this.#greet();
+      this.#started = greeting.catch(() => undefined);
+      await greeting;
     } catch (error) {
       this.states.fail(text('labs.startFailed'), error);
       return;
     }
     if (signal.aborted) return;
     window.addEventListener('hashchange', () => void this.#link().then(onFollowed), { signal });
-    await (passedOn ? passedOn() : this.#link(this.first));
+    if (this.#requestCount === 0) await (passedOn ? passedOn() : this.#link(this.first));
   }
 
   /** Waits until the engine has loaded, and makes controls for its parameters. */
@@ -234,6 +238,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
     );
     try {
+      await this.#started;
       await this.#needEngine();
       await changesDone;
       const data = await source.load();
