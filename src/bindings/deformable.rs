@@ -13,9 +13,10 @@ use super::mesh::{LiveSurface, MeshKind, RawMesh};
 use super::volume::RawVolume;
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
+use crate::methods::Parameters;
 use crate::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing,
-    Start, param_specs,
+    Start,
 };
 
 /// The raw handle of a start surface, from which a deformable model begins.
@@ -248,5 +249,5 @@ impl From<Coverage> for CoverageResult {
 /// Returns the specifications of the model's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = deformableParamSpecs)]
 pub fn deformable_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&param_specs())?)
+    Ok(to_js(&DeformableParams::specs())?)
 }

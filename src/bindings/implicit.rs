@@ -13,8 +13,9 @@ use super::mesh::{LiveSurface, MeshKind, RawMesh};
 use super::volume::RawVolume;
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
+use crate::methods::Parameters;
 use crate::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, param_specs,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
 };
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
@@ -258,5 +259,5 @@ struct Statistics {
 /// Returns the specifications of the implicit surface's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = implicitParamSpecs)]
 pub fn implicit_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&param_specs())?)
+    Ok(to_js(&ImplicitParams::specs())?)
 }

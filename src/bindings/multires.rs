@@ -11,8 +11,9 @@ use super::convert::{bytes, doubles, now, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{LiveSurface, MeshKind, RawMesh, TriangleCopy};
 use crate::mesh::TriangleMesh;
+use crate::methods::Parameters;
 use crate::methods::multires::{
-    ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
+    ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel,
 };
 
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
@@ -216,5 +217,5 @@ fn packed(all: &[ControlEllipsoid]) -> Vec<f64> {
 /// Returns the specifications of the model's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = multiresParamSpecs)]
 pub fn multires_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&param_specs())?)
+    Ok(to_js(&MultiresParams::specs())?)
 }

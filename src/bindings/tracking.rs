@@ -14,8 +14,9 @@ use super::volume::RawVolume;
 use crate::io::write_animation;
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
+use crate::methods::Parameters;
 use crate::methods::tracking::{
-    Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
+    Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams,
 };
 
 /// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
@@ -185,5 +186,5 @@ struct Statistics<'a> {
 /// Returns the specifications of the tracker's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = trackingParamSpecs)]
 pub fn tracking_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&param_specs())?)
+    Ok(to_js(&TrackingParams::specs())?)
 }

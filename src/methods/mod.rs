@@ -8,6 +8,7 @@ mod error;
 pub mod implicit;
 #[cfg(feature = "multires")]
 pub mod multires;
+mod params;
 mod saved;
 mod spec;
 mod step;
@@ -15,5 +16,6 @@ mod step;
 pub mod tracking;
 
 pub use error::MethodError;
+pub use params::Parameters;
 pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};
 pub use step::{StepReport, Times};

@@ -1,7 +1,9 @@
 //! Descriptions of the parameters of all methods, from which a user interface can build its controls.
 
 use super::MethodError;
+use super::params::ParamType;
 use serde::Serialize;
+use std::ops::RangeInclusive;
 
 /// The description of one parameter: its name, type, default and range, and the texts of its control.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,22 +44,69 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
-    /// The specification of an unbounded number with default 0; those of all parameters are made from it by overriding
-    /// the fields in which they differ.
-    pub(super) const NUMBER: Self = Self {
-        name: "",
-        label: "",
-        help: "",
-        symbol: None,
-        kind: ParamKind::Number,
-        default: ParamDefault::Number(0.0),
-        min: None,
-        max: None,
-        step: None,
-        scale: Some(ParamScale::Linear),
-        unit: None,
-        choices: None,
-    };
+    /// Returns the description of a parameter of which only the name, the type and the default are known; the methods
+    /// below add the rest.
+    pub(super) fn new<T: ParamType>(name: &'static str, default: &T) -> Self {
+        Self {
+            name,
+            label: "",
+            help: "",
+            symbol: None,
+            kind: T::KIND,
+            default: default.as_default(),
+            min: None,
+            max: None,
+            step: None,
+            scale: if T::KIND == ParamKind::Choice { None } else { Some(ParamScale::Linear) },
+            unit: None,
+            choices: T::CHOICES,
+        }
+    }
+
+    /// Returns the description with a label.
+    pub(super) fn label(self, label: &'static str) -> Self {
+        Self { label, ..self }
+    }
+
+    /// Returns the description with a sentence of help.
+    pub(super) fn help(self, help: &'static str) -> Self {
+        Self { help, ..self }
+    }
+
+    /// Returns the description with the symbol of the parameter in the paper.
+    pub(super) fn symbol(self, symbol: &'static str) -> Self {
+        Self { symbol: Some(symbol), ..self }
+    }
+
+    /// Returns the description of a parameter whose default, if the caller gives no value, is derived from the data.
+    pub(super) fn default(self, default: ParamDefault) -> Self {
+        Self { default, ..self }
+    }
+
+    /// Returns the description with the range of accepted numbers, ends included.
+    pub(super) fn range(self, range: RangeInclusive<f64>) -> Self {
+        Self { min: Some(*range.start()), max: Some(*range.end()), ..self }
+    }
+
+    /// Returns the description with an increment of the parameter's control.
+    pub(super) fn step(self, step: f64) -> Self {
+        Self { step: Some(step), ..self }
+    }
+
+    /// Returns the description with another scale of the slider than a linear one; `None` for no slider.
+    pub(super) fn scale(self, scale: impl Into<Option<ParamScale>>) -> Self {
+        Self { scale: scale.into(), ..self }
+    }
+
+    /// Returns the description with the unit of the parameter's values.
+    pub(super) fn unit(self, unit: &'static str) -> Self {
+        Self { unit: Some(unit), ..self }
+    }
+
+    /// Returns the description with the accepted words in another order than that of the type.
+    pub(super) fn choices(self, choices: &'static [&'static str]) -> Self {
+        Self { choices: Some(choices), ..self }
+    }
 
     /// Checks that a numerical value of the parameter is finite and within the accepted range, ends included.
     ///

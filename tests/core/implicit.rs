@@ -7,9 +7,8 @@ use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{
     Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
-    param_specs,
 };
-use vesicle::methods::{MethodError, StepReport};
+use vesicle::methods::{MethodError, Parameters, StepReport};
 use vesicle::volume::marching_cubes_world;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -779,7 +778,7 @@ fn invalid_parameters_are_refused_by_name() {
         assert_eq!(refused(surface.set_params(params)), name);
         assert_eq!(*surface.params(), usual());
     }
-    assert_eq!(param_specs().len(), 9);
+    assert_eq!(ImplicitParams::specs().len(), 9);
     for delta in [24.9, 25.0, 40.0] {
         assert_eq!(ImplicitParams { delta, ..usual() }.warning().is_some(), delta >= 25.0);
     }

@@ -60,7 +60,7 @@ mod start;
 mod state;
 
 pub use coverage::{Coverage, CoverageSurvey, Missing, UncoveredRegion};
-pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology, param_specs};
+pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology};
 pub use start::Start;
 
 use super::{MethodError, StepReport, Times};

@@ -57,7 +57,7 @@ pub use camera::Camera;
 pub use cloud::Cloud;
 pub use edits::PointEdits;
 pub use measure::Fitness;
-pub use params::{ImplicitParams, IsoValue, KernelKind, param_specs};
+pub use params::{ImplicitParams, IsoValue, KernelKind};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::Vec3;

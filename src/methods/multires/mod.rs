@@ -33,7 +33,7 @@ mod topology;
 
 pub use distortion::Distortion;
 pub use ellipsoid::ControlEllipsoid;
-pub use params::{Energy, MultiresParams, Topology, param_specs};
+pub use params::{Energy, MultiresParams, Topology};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::triangle;

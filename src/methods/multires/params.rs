@@ -1,55 +1,114 @@
 //! Parameters of the multiresolution model, their ranges and their labels.
 
-use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
+use crate::methods::params::{choices, parameters};
+use crate::methods::{MethodError, ParamDefault, ParamScale, Parameters};
 use crate::remesh::EdgeBounds;
-use serde::{Deserialize, Serialize};
 
-/// Parameters of the multiresolution model. All can be changed during a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct MultiresParams {
-    /// ε_min, in units of the mesh: shorter edges of the deformed base are collapsed.
-    pub edge_min: f64,
-    /// ε_max, in units of the mesh: longer edges of the deformed base are split; more than twice `edge_min`.
-    pub edge_max: f64,
-    /// Maximum number of coarser meshes on which the membrane is solved first; 0 solves on the target resolution only.
-    pub levels: u32,
-    /// q: the factor, below 1, by which the edge bounds shrink from one level of the solver to the next finer one.
-    pub refine_factor: f64,
-    /// Maximum number of Gauss–Seidel iterations on each level when the membrane is solved; finer levels may end
-    /// earlier.
-    pub smoothing: u32,
-    /// Number of times that the operator D, which evens out the map T from the deformed base to M₀, is applied after
-    /// each solve of the membrane.
-    pub distribute: u32,
-    /// How often an edge of the deformed base may be halved, where the detail that is added to it needs more vertices.
-    pub supersample: u32,
+parameters! {
+    /// Parameters of the multiresolution model. All can be changed during a run.
+    #[serde(deny_unknown_fields)]
+    pub struct MultiresParams {
+        /// ε_min, in units of the mesh: shorter edges of the deformed base are collapsed.
+        pub edge_min: f64 = 0.0 => {
+            name: "edgeMin",
+            label: "Shortest edge",
+            help: "Shorter edges are collapsed; halving it quadruples the number of triangles.",
+            symbol: "ε_min",
+            default: ParamDefault::FromData,
+            range: 1e-9..=1e9,
+            scale: ParamScale::Log,
+        },
+        /// ε_max, in units of the mesh: longer edges of the deformed base are split; more than twice `edge_min`.
+        pub edge_max: f64 = 0.0 => {
+            name: "edgeMax",
+            label: "Longest edge",
+            help: "Longer edges are split; must be more than twice the shortest edge.",
+            symbol: "ε_max",
+            default: ParamDefault::FromData,
+            range: 1e-9..=1e9,
+            scale: ParamScale::Log,
+        },
+        /// Maximum number of coarser meshes on which the membrane is solved first; 0 solves on the target resolution
+        /// only.
+        pub levels: u32 = 2 => {
+            name: "levels",
+            label: "Coarse levels",
+            help: "Number of coarser meshes on which the membrane is solved first; they speed up large deformations.",
+            range: 0.0..=6.0,
+            step: 1.0,
+        },
+        /// q: the factor, below 1, by which the edge bounds shrink from one level of the solver to the next finer one.
+        pub refine_factor: f64 = 0.5 => {
+            name: "refineFactor",
+            label: "Refinement factor",
+            help: "Ratio of edge lengths between a level and the next coarser one.",
+            symbol: "q",
+            range: 0.3..=0.9,
+            step: 0.05,
+        },
+        /// Maximum number of Gauss–Seidel iterations on each level when the membrane is solved; finer levels may end
+        /// earlier.
+        pub smoothing: u32 = 10 => {
+            name: "smoothing",
+            label: "Iterations per level",
+            help: "Umbrella iterations per level; more make the membrane tighter.",
+            range: 1.0..=200.0,
+            step: 1.0,
+        },
+        /// Number of times that the operator D, which evens out the map T from the deformed base to M₀, is applied
+        /// after each solve of the membrane.
+        pub distribute: u32 = 3 => {
+            name: "distribute",
+            label: "Distribution passes",
+            help: "Passes that even out the map to the base; without them it folds.",
+            symbol: "D",
+            range: 0.0..=50.0,
+            step: 1.0,
+        },
+        /// How often an edge of the deformed base may be halved, where the detail that is added to it needs more
+        /// vertices.
+        pub supersample: u32 = 0 => {
+            name: "supersample",
+            label: "Super-sampling",
+            help: "Maximum number of edge halvings where the detail is finer than the base or stretched; the base itself is not changed.",
+            range: 0.0..=4.0,
+            step: 1.0,
+        },
+        /// The energy that the deformed base minimises where it spans between the ellipsoids.
+        pub energy: Energy = Energy::Membrane => {
+            name: "energy",
+            label: "Surface energy",
+            help: "A membrane minimises area, like a soap film; a thin plate minimises bending, like sheet metal.",
+        },
+        /// Which topology changes the deformed base may undergo: cuts of thin necks, joins of parts in contact.
+        pub topology: Topology = Topology::Split => {
+            name: "topology",
+            label: "Necks and contacts",
+            help: "Whether thin necks are cut, and whether parts in contact are joined.",
+        },
+    }
+}
+
+choices! {
     /// The energy that the deformed base minimises where it spans between the ellipsoids.
-    pub energy: Energy,
+    pub enum Energy {
+        /// The deformed base minimises its area, like a soap film.
+        Membrane = "membrane",
+        /// The deformed base minimises its bending, like a thin plate, so that it leaves an ellipsoid smoothly.
+        ThinPlate = "thin-plate",
+    }
+}
+
+choices! {
     /// Which topology changes the deformed base may undergo: cuts of thin necks, joins of parts in contact.
-    pub topology: Topology,
-}
-
-/// The energy that the deformed base minimises where it spans between the ellipsoids.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Energy {
-    /// The deformed base minimises its area, like a soap film.
-    Membrane,
-    /// The deformed base minimises its bending, like a thin plate, so that it leaves an ellipsoid smoothly.
-    ThinPlate,
-}
-
-/// Which topology changes the deformed base may undergo: cuts of thin necks, joins of parts in contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Topology {
-    /// No topology changes, as in Kobbelt, Bareuther & Seidel: thin necks stay and parts in contact are not joined.
-    Never,
-    /// Necks too thin for the shortest edge, ε_min, are cut.
-    Split,
-    /// Necks too thin for the shortest edge, ε_min, are cut, and parts in contact are joined.
-    SplitAndJoin,
+    pub enum Topology {
+        /// No topology changes, as in Kobbelt, Bareuther & Seidel: thin necks stay and parts in contact are not joined.
+        Never = "never",
+        /// Necks too thin for the shortest edge, ε_min, are cut.
+        Split = "split",
+        /// Necks too thin for the shortest edge, ε_min, are cut, and parts in contact are joined.
+        SplitAndJoin = "split-and-join",
+    }
 }
 
 /// Default ε_min as a share of the target edge. With the default ratio of the two bounds, 2.23, splits of long edges
@@ -58,39 +117,13 @@ const MIN_SHARE: f64 = 0.65;
 /// Default ε_max as a share of the target edge.
 const MAX_SHARE: f64 = 1.45;
 
-impl Default for MultiresParams {
-    fn default() -> Self {
-        Self {
-            edge_min: 0.0,
-            edge_max: 0.0,
-            levels: 2,
-            refine_factor: 0.5,
-            smoothing: 10,
-            distribute: 3,
-            supersample: 0,
-            energy: Energy::Membrane,
-            topology: Topology::Split,
-        }
-    }
-}
-
 impl MultiresParams {
     /// Checks that every parameter is in its range, and that ε_max > 2 ε_min.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted, and its range.
     pub fn validate(&self) -> Result<(), MethodError> {
-        let numbers = [
-            self.edge_min,
-            self.edge_max,
-            f64::from(self.levels),
-            self.refine_factor,
-            f64::from(self.smoothing),
-            f64::from(self.distribute),
-            f64::from(self.supersample),
-        ];
-        let specs = SPECS.iter().filter(|spec| spec.kind != ParamKind::Choice);
-        specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))?;
+        self.check_ranges()?;
         if self.edge_max > 2.0 * self.edge_min {
             return Ok(());
         }
@@ -120,106 +153,6 @@ impl MultiresParams {
         0.5 * (self.edge_min + self.edge_max) / (0.5 * (MIN_SHARE + MAX_SHARE))
     }
 }
-
-/// Returns the descriptions of the parameters, in the order in which a user interface should show them.
-pub fn param_specs() -> Vec<ParamSpec> {
-    SPECS.to_vec()
-}
-
-const EDGE: ParamSpec = ParamSpec {
-    default: ParamDefault::FromData,
-    min: Some(1e-9),
-    max: Some(1e9),
-    scale: Some(ParamScale::Log),
-    ..ParamSpec::NUMBER
-};
-
-const COUNT: ParamSpec = ParamSpec { kind: ParamKind::Integer, step: Some(1.0), ..ParamSpec::NUMBER };
-
-const SPECS: [ParamSpec; 9] = [
-    ParamSpec {
-        name: "edgeMin",
-        label: "Shortest edge",
-        help: "Shorter edges are collapsed; halving it quadruples the number of triangles.",
-        symbol: Some("ε_min"),
-        ..EDGE
-    },
-    ParamSpec {
-        name: "edgeMax",
-        label: "Longest edge",
-        help: "Longer edges are split; must be more than twice the shortest edge.",
-        symbol: Some("ε_max"),
-        ..EDGE
-    },
-    ParamSpec {
-        name: "levels",
-        label: "Coarse levels",
-        help: "Number of coarser meshes on which the membrane is solved first; they speed up large deformations.",
-        default: ParamDefault::Number(2.0),
-        min: Some(0.0),
-        max: Some(6.0),
-        ..COUNT
-    },
-    ParamSpec {
-        name: "refineFactor",
-        label: "Refinement factor",
-        help: "Ratio of edge lengths between a level and the next coarser one.",
-        symbol: Some("q"),
-        default: ParamDefault::Number(0.5),
-        min: Some(0.3),
-        max: Some(0.9),
-        step: Some(0.05),
-        ..ParamSpec::NUMBER
-    },
-    ParamSpec {
-        name: "smoothing",
-        label: "Iterations per level",
-        help: "Umbrella iterations per level; more make the membrane tighter.",
-        default: ParamDefault::Number(10.0),
-        min: Some(1.0),
-        max: Some(200.0),
-        ..COUNT
-    },
-    ParamSpec {
-        name: "distribute",
-        label: "Distribution passes",
-        help: "Passes that even out the map to the base; without them it folds.",
-        symbol: Some("D"),
-        default: ParamDefault::Number(3.0),
-        min: Some(0.0),
-        max: Some(50.0),
-        ..COUNT
-    },
-    ParamSpec {
-        name: "supersample",
-        label: "Super-sampling",
-        help: "Maximum number of edge halvings where the detail is finer than the base or stretched; the base itself is not changed.",
-        default: ParamDefault::Number(0.0),
-        min: Some(0.0),
-        max: Some(4.0),
-        ..COUNT
-    },
-    ParamSpec {
-        name: "energy",
-        label: "Surface energy",
-        help: "A membrane minimises area, like a soap film; a thin plate minimises bending, like sheet metal.",
-        kind: ParamKind::Choice,
-        default: ParamDefault::Choice("membrane"),
-        scale: None,
-        choices: Some(&["membrane", "thin-plate"]),
-        ..ParamSpec::NUMBER
-    },
-    ParamSpec {
-        name: "topology",
-        label: "Necks and contacts",
-        help: "Whether thin necks are cut, and whether parts in contact are joined.",
-        kind: ParamKind::Choice,
-        default: ParamDefault::Choice("split"),
-        scale: None,
-        choices: Some(&["never", "split", "split-and-join"]),
-        ..ParamSpec::NUMBER
-    },
-];
 
 #[cfg(test)]
 mod tests {

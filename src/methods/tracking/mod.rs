@@ -31,7 +31,7 @@ mod state;
 mod vote;
 
 pub use frame_tracker::FrameStatistics;
-pub use params::{TrackingParams, param_specs};
+pub use params::{TrackingParams};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
