@@ -3,20 +3,18 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use js_sys::{Float32Array, Float64Array, Uint8Array};
+use js_sys::{Float32Array, Float64Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, now, points, to_js, with_overrides};
+use super::convert::{doubles, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{LiveSurface, MeshKind, RawMesh};
+use super::mesh::RawMesh;
+use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use crate::math::DVec3;
-use crate::mesh::TriangleMesh;
-use crate::methods::Parameters;
 use crate::methods::deformable::{
-    Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing,
-    Start,
+    Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
 
 /// The raw handle of a start surface, from which a deformable model begins.
@@ -61,23 +59,11 @@ impl RawStart {
     }
 }
 
-impl LiveSurface for DeformableModel {
-    fn surface(&self) -> TriangleMesh {
-        self.surface()
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        [self.mesh().vertex_count(), self.mesh().triangle_count()]
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        [self.mesh().topology_version(), self.mesh().geometry_version()]
-    }
-}
-
 /// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
+
+method_bindings!(RawDeformable, DeformableModel, deformableParamSpecs);
 
 #[wasm_bindgen]
 impl RawDeformable {
@@ -95,31 +81,12 @@ impl RawDeformable {
     ) -> Result<RawDeformable, JsValue> {
         let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
         let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
-        let mut model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
-        model.set_clock(now);
-        Ok(RawDeformable(Rc::new(RefCell::new(model))))
+        Ok(RawDeformable(shared(DeformableModel::new(&volume.0, options))?))
     }
 
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(MeshKind::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
-    }
-
-    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step, with
-    /// the events of all these steps.
-    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-        let mut model = self.0.borrow_mut();
-        let mut report = model.step().map_err(Failure::from)?;
-        let mut events = report.events;
-        for _ in 1..iterations {
-            if report.done {
-                break;
-            }
-            report = model.step().map_err(Failure::from)?;
-            events += report.events;
-        }
-        report.events = events;
-        Ok(to_js(&report)?)
+        RawMesh::live(&self.0)
     }
 
     /// Adds the parts of the iso-surface at π_I of the current pyramid level that the model's surface lacks, unless its
@@ -135,21 +102,6 @@ impl RawDeformable {
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
         let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
         Ok(RawCoverageSurvey(Some(survey)))
-    }
-
-    /// Returns the current values of all parameters of the model, as a plain object.
-    pub fn params(&self) -> Result<JsValue, JsValue> {
-        Ok(to_js(self.0.borrow().params())?)
-    }
-
-    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
-    /// together before any is changed.
-    #[wasm_bindgen(js_name = setParams)]
-    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-        let mut model = self.0.borrow_mut();
-        let params = with_overrides(model.params(), params)?;
-        model.set_params(params).map_err(Failure::from)?;
-        Ok(())
     }
 
     /// Replaces the attractors, points that pull the surface: five numbers each, which are x, y and z in world space,
@@ -182,18 +134,6 @@ impl RawDeformable {
     /// in the order of the mesh's arrays.
     pub fn speeds(&self) -> Vec<f32> {
         self.0.borrow().speeds()
-    }
-
-    /// Returns the state of the run as bytes, without the volume, from which `restore` continues it.
-    pub fn save(&self) -> Vec<u8> {
-        self.0.borrow().save()
-    }
-
-    /// Replaces the run by one that `save` returned, if this model has the same volume, frame and number of levels,
-    /// else fails; the run then continues with the same results, bit for bit.
-    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
-        self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
-        Ok(())
     }
 }
 
@@ -244,10 +184,4 @@ impl From<Coverage> for CoverageResult {
         });
         Self { recall, precision, uncovered: parts.collect() }
     }
-}
-
-/// Returns the specifications of the model's parameters, from which user interfaces build their controls.
-#[wasm_bindgen(js_name = deformableParamSpecs)]
-pub fn deformable_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&DeformableParams::specs())?)
 }

@@ -7,16 +7,13 @@ use js_sys::{Float32Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, floats, now, packed, points, to_js, with_overrides};
+use super::convert::{bytes, floats, packed, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{LiveSurface, MeshKind, RawMesh};
+use super::mesh::{MeshKind, RawMesh};
+use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use crate::math::Vec3;
-use crate::mesh::TriangleMesh;
-use crate::methods::Parameters;
-use crate::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
-};
+use crate::methods::implicit::{Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits};
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
 #[wasm_bindgen]
@@ -48,23 +45,11 @@ impl RawCameras {
     }
 }
 
-impl LiveSurface for ImplicitSurface {
-    fn surface(&self) -> TriangleMesh {
-        self.surface().clone()
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        [self.surface().positions.len(), self.surface().triangles.len()]
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        [self.version(); 2]
-    }
-}
-
 /// The raw handle of the TypeScript class `ImplicitSurface`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
+
+method_bindings!(RawImplicit, ImplicitSurface, implicitParamSpecs);
 
 #[wasm_bindgen]
 impl RawImplicit {
@@ -102,14 +87,12 @@ impl RawImplicit {
             keep_components,
             params: with_overrides(&ImplicitParams::default(), params)?,
         };
-        let mut surface = ImplicitSurface::new(cloud, options).map_err(Failure::from)?;
-        surface.set_clock(now);
-        Ok(RawImplicit(Rc::new(RefCell::new(surface))))
+        Ok(RawImplicit(shared(ImplicitSurface::new(cloud, options))?))
     }
 
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(MeshKind::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
+        RawMesh::live(&self.0)
     }
 
     /// Returns a copy of the surface while it is made: the part extracted so far, or all of it while it is being
@@ -117,34 +100,6 @@ impl RawImplicit {
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
         Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
-    }
-
-    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step.
-    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-        let mut surface = self.0.borrow_mut();
-        let mut report = surface.step().map_err(Failure::from)?;
-        for _ in 1..iterations {
-            if report.done {
-                break;
-            }
-            report = surface.step().map_err(Failure::from)?;
-        }
-        Ok(to_js(&report)?)
-    }
-
-    /// Returns the current values of all parameters of the model, as a plain object.
-    pub fn params(&self) -> Result<JsValue, JsValue> {
-        Ok(to_js(self.0.borrow().params())?)
-    }
-
-    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
-    /// together before any is changed.
-    #[wasm_bindgen(js_name = setParams)]
-    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-        let mut surface = self.0.borrow_mut();
-        let params = with_overrides(surface.params(), params)?;
-        surface.set_params(params).map_err(Failure::from)?;
-        Ok(())
     }
 
     /// Replaces all manual edits of the input points: the positions of added points and of exterior points (known to be
@@ -231,18 +186,6 @@ impl RawImplicit {
             warning: surface.params().warning(),
         })?)
     }
-
-    /// Returns the state of the run as bytes, without the points and other options, from which `restore` continues it.
-    pub fn save(&self) -> Vec<u8> {
-        self.0.borrow().save()
-    }
-
-    /// Replaces the run by one that `save` returned, if this model was made of the same points and options, except
-    /// parameters, else fails; the run then continues with the same results, bit for bit.
-    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
-        self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
-        Ok(())
-    }
 }
 
 #[derive(Serialize)]
@@ -254,10 +197,4 @@ struct Statistics {
     spurious_components: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<&'static str>,
-}
-
-/// Returns the specifications of the implicit surface's parameters, from which user interfaces build their controls.
-#[wasm_bindgen(js_name = implicitParamSpecs)]
-pub fn implicit_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&ImplicitParams::specs())?)
 }

@@ -16,6 +16,7 @@ use crate::math::{DVec3, Vec3};
 use crate::mesh::{
     Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic_distances, measure, report,
 };
+use crate::methods::LiveSurface;
 use crate::remesh::{
     Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
 };
@@ -32,18 +33,6 @@ pub(super) enum MeshKind {
     Live(Rc<RefCell<dyn LiveSurface>>),
 }
 
-/// A model whose current surface a JavaScript `Mesh` can show live.
-pub(super) trait LiveSurface {
-    /// Returns a copy of the current surface.
-    fn surface(&self) -> TriangleMesh;
-    /// Returns the numbers of vertices and triangles of the current surface.
-    fn counts(&self) -> [usize; 2];
-    /// Returns the topology version, which increases when connectivity changes, and the geometry version, which
-    /// increases when a vertex moves or connectivity changes. Those of an implicit surface are one number, which
-    /// increases with every new surface.
-    fn versions(&self) -> [u32; 2];
-}
-
 /// The raw handle of the TypeScript class `Mesh`: an editable mesh, a list of triangles, or the live surface of a
 /// model.
 #[wasm_bindgen]
@@ -52,6 +41,14 @@ pub struct RawMesh(pub(super) MeshKind);
 /// A snapshot of a mesh's arrays, from which each can be copied to JavaScript.
 #[wasm_bindgen]
 pub struct RawArrays(Rc<TriangleMesh>);
+
+impl RawMesh {
+    /// Returns the live surface of a model.
+    pub(super) fn live(model: &Rc<RefCell<impl LiveSurface + 'static>>) -> Self {
+        let model: Rc<RefCell<dyn LiveSurface>> = Rc::clone(model) as _;
+        Self(MeshKind::Live(model))
+    }
+}
 
 #[wasm_bindgen]
 impl RawMesh {

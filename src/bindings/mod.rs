@@ -15,6 +15,7 @@ mod implicit;
 #[cfg(feature = "import")]
 mod import;
 mod mesh;
+mod method;
 #[cfg(feature = "multires")]
 mod multires;
 #[cfg(feature = "tracking")]

@@ -3,59 +3,47 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use js_sys::{Float64Array, Uint8Array};
+use js_sys::Float64Array;
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, now, to_js, with_overrides};
+use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{LiveSurface, MeshKind, RawMesh, TriangleCopy};
+use super::mesh::{MeshKind, RawMesh, TriangleCopy};
+use super::method::{method_bindings, shared};
 use crate::mesh::TriangleMesh;
-use crate::methods::Parameters;
-use crate::methods::multires::{
-    ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel,
-};
+use crate::methods::LiveSurface;
+use crate::methods::multires::{ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel};
 
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
 /// surfaces.
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
-/// One of the three surfaces of a multiresolution model, as the content of a live mesh.
-struct LiveView {
+method_bindings!(RawMultires, MultiresolutionModel, multiresParamSpecs);
+
+/// A surface of a multiresolution model besides the detailed one, as the content of a live mesh: the deformed base, or the
+/// link mesh, which has the triangles of the deformed base with each vertex at its position on the undeformed base (the
+/// map T).
+struct BaseView {
     model: Rc<RefCell<MultiresolutionModel>>,
-    surface: Surface,
+    is_link: bool,
 }
 
-/// The surfaces of a model that have a live mesh: the detailed surface, the deformed base, and the link mesh, which has
-/// the triangles of the deformed base with each vertex at its position on the undeformed base (the map T).
-#[derive(Clone, Copy)]
-enum Surface {
-    Detailed,
-    Base,
-    Link,
-}
-
-impl LiveSurface for LiveView {
+impl LiveSurface for BaseView {
     fn surface(&self) -> TriangleMesh {
         let model = self.model.borrow();
-        match self.surface {
-            Surface::Detailed => model.surface(),
-            Surface::Base => model.base_mesh().to_triangles(),
-            Surface::Link => model.link_mesh(),
-        }
+        if self.is_link { model.link_mesh() } else { model.base_mesh().to_triangles() }
     }
 
     fn counts(&self) -> [usize; 2] {
         let model = self.model.borrow();
-        let mesh = if let Surface::Detailed = self.surface { model.mesh() } else { model.base_mesh() };
-        [mesh.vertex_count(), mesh.triangle_count()]
+        [model.base_mesh().vertex_count(), model.base_mesh().triangle_count()]
     }
 
     fn versions(&self) -> [u32; 2] {
         let model = self.model.borrow();
-        let mesh = if let Surface::Detailed = self.surface { model.mesh() } else { model.base_mesh() };
-        [mesh.topology_version(), mesh.geometry_version()]
+        [model.base_mesh().topology_version(), model.base_mesh().geometry_version()]
     }
 }
 
@@ -77,19 +65,15 @@ impl RawMultires {
             ellipsoids: unpacked(ellipsoids)?,
             params: with_overrides(&MultiresParams::default(), params)?,
         };
-        let mut model = MultiresolutionModel::new(options).map_err(Failure::from)?;
-        model.set_clock(now);
-        Ok(RawMultires(Rc::new(RefCell::new(model))))
+        Ok(RawMultires(shared(MultiresolutionModel::new(options))?))
     }
 
     /// Returns a live mesh of the model: the detailed surface (0), the deformed base (1) or the link mesh (2).
     pub fn mesh(&self, which: u32) -> RawMesh {
-        let surface = match which {
-            0 => Surface::Detailed,
-            1 => Surface::Base,
-            _ => Surface::Link,
-        };
-        RawMesh(MeshKind::Live(Rc::new(RefCell::new(LiveView { model: Rc::clone(&self.0), surface }))))
+        if which == 0 {
+            return RawMesh::live(&self.0);
+        }
+        RawMesh::live(&Rc::new(RefCell::new(BaseView { model: Rc::clone(&self.0), is_link: which > 1 })))
     }
 
     /// Returns the membrane as solved for the current ellipsoids on each level of the multi-level solver, one mesh
@@ -98,22 +82,6 @@ impl RawMultires {
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
         levels.into_iter().map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh)))).collect()
-    }
-
-    /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last step, with
-    /// the events of all these steps.
-    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-        let mut model = self.0.borrow_mut();
-        let mut report = model.step().map_err(Failure::from)?;
-        for _ in 1..iterations {
-            if report.done {
-                break;
-            }
-            let events = report.events;
-            report = model.step().map_err(Failure::from)?;
-            report.events += events;
-        }
-        Ok(to_js(&report)?)
     }
 
     /// Sets the target ellipsoids, towards which the model moves its current ellipsoids: twelve numbers each, the
@@ -145,21 +113,6 @@ impl RawMultires {
         values.into_iter().map(|value| value as f32).collect()
     }
 
-    /// Returns the current values of all parameters of the model, as a plain object.
-    pub fn params(&self) -> Result<JsValue, JsValue> {
-        Ok(to_js(self.0.borrow().params())?)
-    }
-
-    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
-    /// together before any is changed.
-    #[wasm_bindgen(js_name = setParams)]
-    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-        let mut model = self.0.borrow_mut();
-        let params = with_overrides(model.params(), params)?;
-        model.set_params(params).map_err(Failure::from)?;
-        Ok(())
-    }
-
     /// Returns further counts about the model: surfaces in the decomposition, including the base; folded triangles of
     /// the map T; and, in the last reconstruction of detail, vertices whose normal missed the finer surface, and
     /// vertices held back to avoid self-intersections.
@@ -172,19 +125,6 @@ impl RawMultires {
             unmatched_vertices,
             held_vertices,
         })?)
-    }
-
-    /// Returns the state of the run as bytes, without the surfaces that the model was made of, from which `restore`
-    /// continues it.
-    pub fn save(&self) -> Vec<u8> {
-        self.0.borrow().save()
-    }
-
-    /// Replaces the run by one that `save` returned, if this model has the same surfaces, given or derived, else fails;
-    /// the run then continues with the same results, bit for bit.
-    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
-        self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
-        Ok(())
     }
 }
 
@@ -212,10 +152,4 @@ fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
 /// Converts ellipsoids to an array of twelve numbers each: the centre and three semi-axis vectors.
 fn packed(all: &[ControlEllipsoid]) -> Vec<f64> {
     all.iter().flat_map(|e| e.center.into_iter().chain(e.axes.into_iter().flatten())).collect()
-}
-
-/// Returns the specifications of the model's parameters, from which user interfaces build their controls.
-#[wasm_bindgen(js_name = multiresParamSpecs)]
-pub fn multires_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&MultiresParams::specs())?)
 }

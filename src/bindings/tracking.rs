@@ -3,18 +3,17 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use js_sys::{Float64Array, Uint8Array};
+use js_sys::Float64Array;
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, now, to_js, with_overrides};
+use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{LiveSurface, MeshKind, RawMesh, TriangleCopy};
+use super::mesh::{MeshKind, RawMesh, TriangleCopy};
+use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use crate::io::write_animation;
 use crate::math::DVec3;
-use crate::mesh::TriangleMesh;
-use crate::methods::Parameters;
 use crate::methods::tracking::{
     Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams,
 };
@@ -23,24 +22,7 @@ use crate::methods::tracking::{
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
-/// The surface of a tracker in its newest finished frame, as the content of a live mesh.
-struct CurrentFrame(Rc<RefCell<SurfaceTracker>>);
-
-impl LiveSurface for CurrentFrame {
-    fn surface(&self) -> TriangleMesh {
-        self.0.borrow().mesh().to_triangles()
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        let tracker = self.0.borrow();
-        [tracker.mesh().vertex_count(), tracker.mesh().triangle_count()]
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        let tracker = self.0.borrow();
-        [tracker.mesh().topology_version(), tracker.mesh().geometry_version()]
-    }
-}
+method_bindings!(RawTracker, SurfaceTracker, trackingParamSpecs);
 
 #[wasm_bindgen]
 impl RawTracker {
@@ -69,15 +51,13 @@ impl RawTracker {
             start: start.map(|mesh| mesh.0),
             params: with_overrides(&TrackingParams::default(), params)?,
         };
-        let mut tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
-        tracker.set_clock(now);
-        Ok(RawTracker(Rc::new(RefCell::new(tracker))))
+        Ok(RawTracker(shared(SurfaceTracker::new(options))?))
     }
 
     /// Returns a live mesh of the surface in the newest finished frame; before the first one is finished, of the start
     /// surface if there is one, else empty.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(MeshKind::Live(Rc::new(RefCell::new(CurrentFrame(Rc::clone(&self.0))))))
+        RawMesh::live(&self.0)
     }
 
     /// Returns the surface of a finished frame; undefined for other frames.
@@ -85,22 +65,6 @@ impl RawTracker {
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
         let tracker = self.0.borrow();
         tracker.meshes().get(frame).map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh.clone()))))
-    }
-
-    /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step,
-    /// with the events of all these steps.
-    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-        let mut tracker = self.0.borrow_mut();
-        let mut report = tracker.step().map_err(Failure::from)?;
-        for _ in 1..iterations {
-            if report.done {
-                break;
-            }
-            let events = report.events;
-            report = tracker.step().map_err(Failure::from)?;
-            report.events += events;
-        }
-        Ok(to_js(&report)?)
     }
 
     /// Returns the index of the frame that the live mesh shows, the newest finished one; 0 before the first one is
@@ -145,33 +109,6 @@ impl RawTracker {
         let tracker = self.0.borrow();
         Ok(write_animation(tracker.meshes(), frame_seconds).map_err(Failure::from)?)
     }
-
-    /// Returns the current values of all parameters of the tracker, as a plain object.
-    pub fn params(&self) -> Result<JsValue, JsValue> {
-        Ok(to_js(self.0.borrow().params())?)
-    }
-
-    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
-    /// together before any is changed.
-    #[wasm_bindgen(js_name = setParams)]
-    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-        let mut tracker = self.0.borrow_mut();
-        let params = with_overrides(tracker.params(), params)?;
-        tracker.set_params(params).map_err(Failure::from)?;
-        Ok(())
-    }
-
-    /// Returns the state of the run as bytes, without the volume and other input, from which `restore` continues it.
-    pub fn save(&self) -> Vec<u8> {
-        self.0.borrow().save()
-    }
-
-    /// Replaces the run by one that `save` returned, if this tracker has the same volume, box, component and start,
-    /// else fails; the run then continues with the same results, bit for bit.
-    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
-        self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
-        Ok(())
-    }
 }
 
 #[derive(Serialize)]
@@ -181,10 +118,4 @@ struct Statistics<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     cycle_closure_error: Option<f64>,
     frames: &'a [FrameStatistics],
-}
-
-/// Returns the specifications of the tracker's parameters, from which user interfaces build their controls.
-#[wasm_bindgen(js_name = trackingParamSpecs)]
-pub fn tracking_param_specs() -> Result<JsValue, JsValue> {
-    Ok(to_js(&TrackingParams::specs())?)
 }

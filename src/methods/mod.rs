@@ -6,6 +6,7 @@ pub mod deformable;
 mod error;
 #[cfg(feature = "implicit")]
 pub mod implicit;
+mod method;
 #[cfg(feature = "multires")]
 pub mod multires;
 mod params;
@@ -16,6 +17,7 @@ mod step;
 pub mod tracking;
 
 pub use error::MethodError;
+pub use method::{LiveSurface, Method};
 pub use params::Parameters;
 pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};
 pub use step::{StepReport, Times};

@@ -63,7 +63,8 @@ pub use coverage::{Coverage, CoverageSurvey, Missing, UncoveredRegion};
 pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology};
 pub use start::Start;
 
-use super::{MethodError, StepReport, Times};
+use super::method::method;
+use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
@@ -187,6 +188,22 @@ pub struct DeformableModel {
     speed: SpeedSummary,
     components: u32,
     clock: fn() -> f64,
+}
+
+method!(DeformableModel, DeformableParams);
+
+impl LiveSurface for DeformableModel {
+    fn surface(&self) -> TriangleMesh {
+        self.surface()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.mesh().topology_version(), self.mesh().geometry_version()]
+    }
 }
 
 impl DeformableModel {

@@ -59,7 +59,8 @@ pub use edits::PointEdits;
 pub use measure::Fitness;
 pub use params::{ImplicitParams, IsoValue, KernelKind};
 
-use super::{MethodError, StepReport, Times};
+use super::method::method;
+use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
@@ -190,6 +191,22 @@ struct ColoringState {
     camera: usize,
     /// Interpolation of the colours of the input points, used if no camera sees the surface; `None` before that.
     points: Option<PointColors>,
+}
+
+method!(ImplicitSurface, ImplicitParams);
+
+impl LiveSurface for ImplicitSurface {
+    fn surface(&self) -> TriangleMesh {
+        self.surface().clone()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh.positions.len(), self.mesh.triangles.len()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.version(); 2]
+    }
 }
 
 impl ImplicitSurface {

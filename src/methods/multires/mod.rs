@@ -35,7 +35,8 @@ pub use distortion::Distortion;
 pub use ellipsoid::ControlEllipsoid;
 pub use params::{Energy, MultiresParams, Topology};
 
-use super::{MethodError, StepReport, Times};
+use super::method::method;
+use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::triangle;
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::{Changes, Embedding, restructure};
@@ -90,6 +91,22 @@ pub struct MultiresolutionModel {
     refreshed_frames: u32,
     residual: f64,
     clock: fn() -> f64,
+}
+
+method!(MultiresolutionModel, MultiresParams);
+
+impl LiveSurface for MultiresolutionModel {
+    fn surface(&self) -> TriangleMesh {
+        self.surface()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.mesh().topology_version(), self.mesh().geometry_version()]
+    }
 }
 
 impl MultiresolutionModel {

@@ -31,9 +31,10 @@ mod state;
 mod vote;
 
 pub use frame_tracker::FrameStatistics;
-pub use params::{TrackingParams};
+pub use params::TrackingParams;
 
-use super::{MethodError, StepReport, Times};
+use super::method::method;
+use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
@@ -126,6 +127,22 @@ struct ImageStatistics {
     noise: f64,
     /// The difference between the largest and the smallest intensity in the processed box, without outliers.
     range: f64,
+}
+
+method!(SurfaceTracker, TrackingParams);
+
+impl LiveSurface for SurfaceTracker {
+    fn surface(&self) -> TriangleMesh {
+        self.mesh().to_triangles()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.mesh().topology_version(), self.mesh().geometry_version()]
+    }
 }
 
 impl SurfaceTracker {
