@@ -3,13 +3,13 @@
 
 use js_sys::{Float32Array, Float64Array, Reflect, Uint8Array, Uint32Array};
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_wasm_bindgen::Serializer;
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use crate::math::{DVec3, Vec2, Vec3};
+use crate::methods::{ParamInput, ParamSpec, Parameters};
 
 #[wasm_bindgen]
 extern "C" {
@@ -83,52 +83,55 @@ pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
         .map_err(|error| Failure::invalid("result", &error.to_string()))
 }
 
-/// Returns a copy of `current` in which the properties of the JavaScript object `given` replace those of the same
-/// names; used to set parameters.
+/// Returns a copy of `current` in which the properties of the JavaScript object `given` replace the parameters of the same
+/// names.
 ///
 /// Properties that are `undefined` are ignored.
 ///
 /// # Errors
-/// `invalid-argument` with the name of the property, if `current` has none of that name or its value has the wrong
+/// `invalid-argument` with the name of the property, if there is no parameter of that name or its value has the wrong
 /// type.
-pub fn with_overrides<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
-    let all = to_js(current)?;
-    for name in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {
-        let value = property(given, &name);
-        if value.is_undefined() {
-            continue;
+pub fn with_overrides<P: Parameters>(current: &P, given: &JsValue) -> Result<P, Failure> {
+    let mut params = current.clone();
+    for key in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {
+        let value = Reflect::get(given, &key).unwrap_or(JsValue::UNDEFINED);
+        let name = key.as_string().unwrap_or_default();
+        if !value.is_undefined() && !params.set(&name, &input(&value)) {
+            return Err(refusal(&name, &value, &P::specs()));
         }
-        let parameter = name.as_string().unwrap_or_default();
-        if !js_sys::Object::has_own(all.unchecked_ref::<js_sys::Object>(), &name) {
-            return Err(unknown(&parameter, &all));
-        }
-        // One at a time, so that the error about a value of the wrong type has its name.
-        let alone = to_js(current)?;
-        Reflect::set(&alone, &name, &value).ok();
-        read::<T>(&parameter, &alone)?;
-        Reflect::set(&all, &name, &value).ok();
     }
-    read("params", &all)
+    Ok(params)
 }
 
-/// Returns a property of a JavaScript object; undefined if it cannot be read.
-fn property(object: &JsValue, name: &JsValue) -> JsValue {
-    Reflect::get(object, name).unwrap_or(JsValue::UNDEFINED)
+/// Converts a JavaScript value given for a parameter.
+fn input(value: &JsValue) -> ParamInput {
+    if let Some(number) = value.as_f64() {
+        ParamInput::Number(number)
+    } else if let Some(word) = value.as_string() {
+        ParamInput::Word(word)
+    } else {
+        value.as_bool().map_or(ParamInput::Other, ParamInput::Boolean)
+    }
 }
 
-/// Deserialises a JavaScript object to a Rust value; a failure, as for a value of the wrong type, is reported as one of
-/// the argument `parameter`.
-fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Failure> {
-    serde_wasm_bindgen::from_value(object.clone()).map_err(|error| {
-        let problem = error.to_string().replace("f64", "a number");
-        Failure::invalid(parameter, problem.trim_start_matches("Error: "))
-    })
-}
-
-/// Returns the failure about a parameter that does not exist; its message lists the names of `all`, the object of those
-/// that do.
-fn unknown(parameter: &str, all: &JsValue) -> Failure {
-    let names = js_sys::Object::keys(all.unchecked_ref::<js_sys::Object>());
-    let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();
-    Failure::invalid(parameter, &format!("unknown parameter; must be one of {}", names.join(", ")))
+/// Returns the failure about a value of the wrong type, or about a parameter that is not among those that `specs`
+/// describes; the message lists the names of these.
+fn refusal(name: &str, value: &JsValue, specs: &[ParamSpec]) -> Failure {
+    let problem = match specs.iter().find(|spec| spec.name == name) {
+        Some(spec) => {
+            let shown = match input(value) {
+                ParamInput::Number(number) => number.to_string(),
+                ParamInput::Word(word) => format!("\"{word}\""),
+                ParamInput::Boolean(on) => on.to_string(),
+                ParamInput::Other if value.is_null() => "null".into(),
+                ParamInput::Other => value.js_typeof().as_string().unwrap_or_default(),
+            };
+            format!("must be {}, got {shown}", spec.expected())
+        }
+        None => {
+            let names: Vec<&str> = specs.iter().map(|spec| spec.name).collect();
+            format!("unknown parameter; must be one of {}", names.join(", "))
+        }
+    };
+    Failure::invalid(name, &problem)
 }

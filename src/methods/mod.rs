@@ -1,4 +1,4 @@
-//! Methods that fit surfaces to data, each in a module of its own, and the stepping interface common to all.
+//! Methods that fit surfaces to data, each in a module of its own, and the interface common to all, [`Method`].
 
 mod caller_mesh;
 #[cfg(feature = "deformable")]
@@ -18,6 +18,6 @@ pub mod tracking;
 
 pub use error::MethodError;
 pub use method::{LiveSurface, Method};
-pub use params::Parameters;
+pub use params::{ParamInput, Parameters};
 pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};
 pub use step::{StepReport, Times};

@@ -15,6 +15,10 @@ pub trait Parameters: Clone + Default + PartialEq + Serialize + DeserializeOwned
     /// Returns the value of each parameter as a number, in the order of [`Self::specs`]; `None` for words and Booleans.
     fn numbers(&self) -> Vec<Option<f64>>;
 
+    /// Sets the parameter whose name in JavaScript is `name`, without checking its range; returns whether there is one and
+    /// the value has its type.
+    fn set(&mut self, name: &str, value: &ParamInput) -> bool;
+
     /// Checks every numerical parameter against its accepted range.
     ///
     /// # Errors
@@ -38,13 +42,29 @@ pub trait Parameters: Clone + Default + PartialEq + Serialize + DeserializeOwned
     }
 }
 
+/// A value given for a parameter, before it is known whether it has the parameter's type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParamInput {
+    /// A number, which an integer is given as, too.
+    Number(f64),
+    /// A word, for a choice.
+    Word(String),
+    /// A Boolean.
+    Boolean(bool),
+    /// A value of a type that no parameter has.
+    Other,
+}
+
 /// A type of parameters: a number, a Boolean, or an enum declared by [`choices!`].
-pub(super) trait ParamType {
+pub(super) trait ParamType: Sized {
     /// The type as user interfaces know it.
     const KIND: ParamKind;
 
     /// The words that the type accepts, if it is a choice.
     const CHOICES: Option<&'static [&'static str]> = None;
+
+    /// Converts a given value; `None` if it has another type.
+    fn from_input(value: &ParamInput) -> Option<Self>;
 
     /// Returns the value as the default of a parameter.
     fn as_default(&self) -> ParamDefault;
@@ -58,6 +78,10 @@ pub(super) trait ParamType {
 impl ParamType for f64 {
     const KIND: ParamKind = ParamKind::Number;
 
+    fn from_input(value: &ParamInput) -> Option<Self> {
+        if let ParamInput::Number(number) = value { Some(*number) } else { None }
+    }
+
     fn as_default(&self) -> ParamDefault {
         ParamDefault::Number(*self)
     }
@@ -70,6 +94,11 @@ impl ParamType for f64 {
 impl ParamType for u32 {
     const KIND: ParamKind = ParamKind::Integer;
 
+    fn from_input(value: &ParamInput) -> Option<Self> {
+        let number = f64::from_input(value)?;
+        (number.fract() == 0.0 && (0.0..=f64::from(Self::MAX)).contains(&number)).then_some(number as Self)
+    }
+
     fn as_default(&self) -> ParamDefault {
         ParamDefault::Number(f64::from(*self))
     }
@@ -81,6 +110,10 @@ impl ParamType for u32 {
 
 impl ParamType for bool {
     const KIND: ParamKind = ParamKind::Boolean;
+
+    fn from_input(value: &ParamInput) -> Option<Self> {
+        if let ParamInput::Boolean(on) = value { Some(*on) } else { None }
+    }
 
     fn as_default(&self) -> ParamDefault {
         ParamDefault::Boolean(*self)
@@ -141,6 +174,15 @@ macro_rules! parameters {
             fn numbers(&self) -> Vec<Option<f64>> {
                 vec![$($crate::methods::params::ParamType::number(&self.$field),)*]
             }
+
+            fn set(&mut self, name: &str, value: &$crate::methods::ParamInput) -> bool {
+                match name {
+                    $($name => $crate::methods::params::ParamType::from_input(value)
+                        .map(|value| self.$field = value)
+                        .is_some(),)*
+                    _ => false,
+                }
+            }
         }
     };
 }
@@ -171,6 +213,13 @@ macro_rules! choices {
 
             const CHOICES: Option<&'static [&'static str]> = Some(&[$($word),*]);
 
+            fn from_input(value: &$crate::methods::ParamInput) -> Option<Self> {
+                match value {
+                    $($crate::methods::ParamInput::Word(word) if word == $word => Some(Self::$Variant),)*
+                    _ => None,
+                }
+            }
+
             fn as_default(&self) -> $crate::methods::ParamDefault {
                 $crate::methods::ParamDefault::Choice(match self {
                     $(Self::$Variant => $word,)*
@@ -181,3 +230,110 @@ macro_rules! choices {
 }
 
 pub(super) use {choices, parameters};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Returns a value of the type that `spec` describes, which is in its range, and is not the default if there is
+    /// another.
+    fn another(spec: &ParamSpec) -> ParamInput {
+        match (spec.kind, spec.choices, spec.default) {
+            (ParamKind::Choice, Some(words), _) => ParamInput::Word(words[words.len() - 1].into()),
+            (ParamKind::Boolean, _, ParamDefault::Boolean(on)) => ParamInput::Boolean(!on),
+            _ => ParamInput::Number(spec.max.unwrap_or(7.0)),
+        }
+    }
+
+    /// Returns whether the JSON of parameters has the given value under the given name.
+    fn has(params: &impl Serialize, name: &str, value: &ParamInput) -> bool {
+        let json = serde_json::to_value(params).unwrap();
+        let found = &json[name];
+        match value {
+            ParamInput::Number(number) => found.as_f64() == Some(*number),
+            ParamInput::Word(word) => found.as_str() == Some(word.as_str()),
+            ParamInput::Boolean(on) => found.as_bool() == Some(*on),
+            ParamInput::Other => false,
+        }
+    }
+
+    /// Asserts that descriptions, defaults, names, words and ranges of the parameters agree with each other.
+    fn check<P: Parameters + std::fmt::Debug>() {
+        let defaults = P::default();
+        let json = serde_json::to_value(&defaults).unwrap();
+        assert_eq!(json.as_object().unwrap().len(), P::specs().len());
+        for spec in P::specs() {
+            let name = spec.name;
+            let default = match spec.default {
+                ParamDefault::Number(number) => ParamInput::Number(number),
+                ParamDefault::Choice(word) => ParamInput::Word(word.into()),
+                ParamDefault::Boolean(on) => ParamInput::Boolean(on),
+                ParamDefault::FromData => ParamInput::Number(0.0),
+            };
+            assert!(has(&defaults, name, &default), "{name}: {default:?}");
+            let words = spec.choices.unwrap_or_default().iter().map(|&word| ParamInput::Word(word.into()));
+            for value in words.chain([another(&spec), default]) {
+                let mut params = defaults.clone();
+                assert!(params.set(name, &value), "{name}: {value:?}");
+                assert!(has(&params, name, &value), "{name}: {value:?}");
+                let read: P = serde_json::from_value(serde_json::to_value(&params).unwrap()).unwrap();
+                assert_eq!(read, params, "{name}");
+                let is_from_data = |spec: &ParamSpec| spec.default == ParamDefault::FromData;
+                assert_eq!(
+                    params.check_ranges_if(|spec, _| !is_from_data(spec)),
+                    Ok(()),
+                    "{name}: {value:?}"
+                );
+            }
+            for beyond in [spec.min.map(|min| min - 1.0), spec.max.map(|max| 2.0 * max + 1.0)] {
+                let mut params = defaults.clone();
+                if beyond.is_some_and(|number| params.set(name, &ParamInput::Number(number))) {
+                    let error = params.check_ranges_if(|checked, _| checked.name == name).unwrap_err();
+                    assert!(
+                        error.to_string().starts_with(&format!("{name}: must be a number from ")),
+                        "{error}"
+                    );
+                }
+            }
+            let mut params = defaults.clone();
+            for wrong in [ParamInput::Word("colour".into()), ParamInput::Other] {
+                assert!(!params.set(name, &wrong), "{name}: {wrong:?}");
+            }
+            assert_eq!(params, defaults, "{name}");
+        }
+        assert!(!P::default().set("colour", &ParamInput::Number(1.0)));
+    }
+
+    #[test]
+    #[cfg(feature = "deformable")]
+    fn those_of_the_deformable_model_agree_with_their_descriptions() {
+        check::<crate::methods::deformable::DeformableParams>();
+    }
+
+    #[test]
+    #[cfg(feature = "implicit")]
+    fn those_of_the_implicit_surface_agree_with_their_descriptions() {
+        check::<crate::methods::implicit::ImplicitParams>();
+    }
+
+    #[test]
+    #[cfg(feature = "tracking")]
+    fn those_of_the_tracker_agree_with_their_descriptions() {
+        check::<crate::methods::tracking::TrackingParams>();
+    }
+
+    #[test]
+    #[cfg(feature = "multires")]
+    fn those_of_the_multiresolution_model_agree_with_their_descriptions() {
+        check::<crate::methods::multires::MultiresParams>();
+    }
+
+    #[test]
+    fn integers_have_no_fraction_and_no_sign() {
+        for (number, expected) in [(3.0, Some(3)), (2.5, None), (-1.0, None), (5e9, None), (f64::NAN, None)] {
+            assert_eq!(u32::from_input(&ParamInput::Number(number)), expected, "{number}");
+        }
+    }
+}

@@ -108,6 +108,19 @@ impl ParamSpec {
         Self { choices: Some(choices), ..self }
     }
 
+    /// Returns the type of the parameter's values in words, for messages: "a number", or the words to choose from.
+    pub fn expected(&self) -> String {
+        match (self.kind, self.choices) {
+            (ParamKind::Number, _) => "a number".into(),
+            (ParamKind::Integer, _) => "a whole number".into(),
+            (ParamKind::Boolean, _) => "true or false".into(),
+            (ParamKind::Choice, words) => {
+                let number = if self.min.is_some() { ", or a number" } else { "" };
+                format!("one of {}{number}", words.unwrap_or_default().join(", "))
+            }
+        }
+    }
+
     /// Checks that a numerical value of the parameter is finite and within the accepted range, ends included.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Parameters of the deformable model, with their ranges, labels and help texts.
 
 use crate::methods::params::{ParamType, choices, parameters};
-use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, Parameters};
+use crate::methods::{MethodError, ParamDefault, ParamInput, ParamKind, ParamScale, Parameters};
 use crate::volume::Volume;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -281,6 +281,14 @@ impl ParamType for RestLength {
     const KIND: ParamKind = ParamKind::Choice;
 
     const CHOICES: Option<&'static [&'static str]> = RestWord::CHOICES;
+
+    fn from_input(value: &ParamInput) -> Option<Self> {
+        match RestWord::from_input(value) {
+            Some(RestWord::Zero) => Some(Self::Zero),
+            Some(RestWord::Mean) => Some(Self::Mean),
+            None => f64::from_input(value).map(Self::Given),
+        }
+    }
 
     fn as_default(&self) -> ParamDefault {
         match self {
