@@ -6,6 +6,8 @@ pub mod bytes;
 pub mod edits;
 pub mod memory;
 pub mod meshes;
+// The test of the targets has this file a second time, with its own helpers.
+#[allow(clippy::duplicate_mod, reason = "two programs share one file")]
 #[path = "../../tests/common/random.rs"]
 mod random;
 pub mod states;
