@@ -62,6 +62,7 @@ fn chain_from_bubbles() {
     the_chain_is_two_rings(160, options);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn menger_sponge_of_depth_two() {
     let volume = scenes::menger(2);
@@ -412,6 +413,7 @@ fn errors_name_the_option_and_what_is_accepted() {
     assert!(matches!(error, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn flat_and_tiny_volumes_have_an_enclosing_start() {
     for dims in [[64, 64, 6], [5, 5, 5], [2, 2, 2], [1, 1, 1], [100, 3, 3], [90, 40, 1], [3, 30, 70]] {

@@ -35,6 +35,7 @@ fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
 
 /// The result must not depend on which vertices are checked: an embedding that has followed the mesh from the start and
 /// a new one apply the same displacements.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_mesh_moved_at_random_never_intersects_itself() {
     for seed in 0..12 {

@@ -119,6 +119,7 @@ fn two_components_stay_separate() {
 }
 
 /// Outward directions are found even from few points far apart.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn few_points_are_enough() {
     let shapes: [(&str, Shape, usize, &[i64]); 3] =
@@ -477,6 +478,7 @@ fn invalid_edits_are_refused_by_name_and_change_nothing() {
 }
 
 /// The system that edits revise is not saved, but assembled again.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_restored_run_continues_bit_for_bit_through_edits() {
     let (points, edits) = edited();
@@ -659,6 +661,7 @@ fn given_exterior_points_are_used() {
     assert!(matches!(failed, MethodError::InvalidArgument { parameter: "exterior", .. }), "{failed}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn scaled_and_shifted_points_give_the_same_shape() {
     let points = noisy(torus, 800, 0.0, 6);

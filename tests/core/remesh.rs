@@ -55,6 +55,7 @@ fn distance(a: &TriangleMesh, b: &TriangleMesh, aim: f32) -> f64 {
     surface_distance(a, b).unwrap().hausdorff / f64::from(aim)
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn assorted_shapes_at_three_sizes() {
     let mut sharpest = Vec::new();
@@ -149,6 +150,7 @@ fn self_intersecting_meshes_are_remeshed() {
 }
 
 /// Flat, tiny, huge and elongated meshes: remeshing terminates, and the invariants hold.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn degenerate_meshes_stay_valid() {
     for size in HOSTILE_SCALES {

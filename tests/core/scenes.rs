@@ -90,6 +90,7 @@ fn chain_from_nine_more_radii() {
 }
 
 /// With edges of one voxel the rings are accurate to a tenth of a voxel.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_chain_is_accurate() {
     let volume = scenes::chain();
@@ -150,6 +151,7 @@ fn noisy_ball() -> Volume {
     })
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn rigidity_removes_noise_from_marching_cubes() {
     let volume = noisy_ball();
@@ -183,6 +185,7 @@ fn noise_without_rigidity(steps: usize) {
     assert!(model.mesh().vertex_count() > 1000);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn marching_cubes_of_noise_without_rigidity_stay_valid() {
     noise_without_rigidity(25);
@@ -195,6 +198,7 @@ fn marching_cubes_of_noise_without_rigidity_stay_valid_for_long() {
 }
 
 /// A model restored from a state saved in the middle of a merge continues with the same bits.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_run_restored_during_a_merge_continues_bit_for_bit() {
     let volume = scenes::chain();

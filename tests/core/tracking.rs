@@ -131,6 +131,7 @@ fn a_given_mesh_is_tracked_and_the_component_is_chosen() {
     assert!(measure(&chosen.meshes()[2]).volume > 0.5 * measure(&given.meshes()[2]).volume);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     let fine = DVec3::splat(1.4);
@@ -152,6 +153,7 @@ fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     assert_area_and_ejection(&cine, &tracker, &[3, 4]);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn gaps_that_open_faster_than_the_boundary_attracts_are_filled() {
     // Thick slices, and a beat in eight frames: gaps close and open by several voxels from one frame to the next.

@@ -99,6 +99,7 @@ fn track(options: TrackingOptions) -> Result<usize, MethodError> {
     Ok(tracker.meshes().len())
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn every_tracked_frame_is_one_closed_surface() {
     let (mut tracked, mut all_frames) = (0, 0);

@@ -112,6 +112,7 @@ mod tests {
     }
 
     /// Motion bounds save tests and change no result: the same vertices are held back as by a check of the whole mesh.
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     #[test]
     fn motion_bounds_change_no_result() {
         let mut all_held = 0;
@@ -190,6 +191,7 @@ mod tests {
     }
 
     /// Lengths are tried at which squares are rounded to few digits or to 0, or are infinite.
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     #[test]
     fn no_triangles_intersect_in_any_unit() {
         for power in (-44..=36).step_by(2) {

@@ -269,6 +269,7 @@ mod tests {
         intersecting
     }
 
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     #[test]
     fn intersections_are_those_found_by_testing_all_pairs() {
         let (mut separate, mut intersecting) = (0, 0);
