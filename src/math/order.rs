@@ -1,13 +1,18 @@
 //! Sorting by numbers.
 //!
 //! The standard sort, instantiated for an element type, adds 5 to 30 kB to the WebAssembly module, several hundred in
-//! all. Elements of all types are therefore sorted as pairs of an integer rank and an index, by a single instance of
-//! the sort.
+//! all. Elements of all types are therefore sorted as integers: as ranks of 64 bits, as pairs of such a rank and an
+//! index, or as indices; positions, as pairs of three integers and an index.
 
 /// Returns the rank of a number for sorting: an integer whose order is that of `f32::total_cmp`.
 pub fn rank_f32(x: f32) -> u32 {
     let bits = x.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+/// Returns the number with the given rank, see [`rank_f32`].
+fn ranked_f32(rank: u32) -> f32 {
+    f32::from_bits(if rank >> 31 == 1 { rank & !(1 << 31) } else { !rank })
 }
 
 /// Returns the rank of a number for sorting: an integer whose order is that of `f64::total_cmp`.
@@ -21,11 +26,42 @@ pub fn combined_rank(first: u32, second: u32) -> u64 {
     u64::from(first) << 32 | u64::from(second)
 }
 
+/// Sorts numbers, such as indices, in ascending order and removes duplicates. Never inlined, so that the WebAssembly
+/// module contains one instance of the sort.
+#[inline(never)]
+pub fn sort_distinct(numbers: &mut Vec<u32>) {
+    numbers.sort_unstable();
+    numbers.dedup();
+}
+
+/// Sorts ranks in ascending order. Never inlined, as [`sort_distinct`].
+#[inline(never)]
+pub fn sort_ranks(ranks: &mut [u64]) {
+    ranks.sort_unstable();
+}
+
+/// Sorts pairs of a rank and an index in ascending order, by rank first. Never inlined, as [`sort_distinct`].
+#[inline(never)]
+pub fn sort_pairs(pairs: &mut [(u64, u32)]) {
+    pairs.sort_unstable();
+}
+
+/// Returns the median of numbers in the order of `f32::total_cmp`, the upper one of two; `None` without numbers.
+pub fn median(numbers: impl Iterator<Item = f32>) -> Option<f32> {
+    let mut ranks: Vec<u64> = numbers.map(|x| rank_f32(x).into()).collect();
+    if ranks.is_empty() {
+        return None;
+    }
+    let middle = ranks.len() / 2;
+    let (_, &mut rank, _) = ranks.select_nth_unstable(middle);
+    Some(ranked_f32(rank as u32))
+}
+
 /// Sorts items in ascending order of the integer that `rank` returns for each; items of equal rank keep their order. At
 /// most 2³² items.
 pub fn sort_by_rank<T: Copy>(items: &mut [T], rank: impl Fn(&T) -> u64) {
     let mut order: Vec<(u64, u32)> = items.iter().map(rank).zip(0..).collect();
-    order.sort_unstable();
+    sort_pairs(&mut order);
     let before = items.to_vec();
     for (item, (_, i)) in items.iter_mut().zip(order) {
         *item = before[i as usize];
@@ -55,6 +91,27 @@ mod tests {
         assert!(
             combined_rank(1, u32::MAX) < combined_rank(2, 0) && combined_rank(2, 0) < combined_rank(2, 1)
         );
+    }
+
+    #[test]
+    fn medians_are_those_of_the_sorted_numbers() {
+        let all: Vec<f32> = NUMBERS.iter().map(|&x| x as f32).chain([f32::NAN, -f32::NAN]).collect();
+        for (count, shift) in
+            (0..=all.len()).flat_map(|count| (0..all.len()).map(move |shift| (count, shift)))
+        {
+            let some: Vec<f32> = all.iter().cycle().skip(shift).take(count).copied().collect();
+            let mut sorted = some.clone();
+            sorted.sort_by(f32::total_cmp);
+            let expected = sorted.get(count / 2).map(|x| x.to_bits());
+            assert_eq!(median(some.into_iter()).map(f32::to_bits), expected, "{count} from {shift}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_sorted_and_distinct() {
+        let mut numbers: Vec<u32> = (0..100).map(|i| i * 37 % 50).collect();
+        sort_distinct(&mut numbers);
+        assert_eq!(numbers, (0..50).collect::<Vec<_>>());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Handles of the vertices of a dynamic mesh.
 
+use crate::math::order;
 use serde::{Deserialize, Serialize};
 
 /// A handle of a vertex of a [`Mesh`](super::Mesh).
@@ -22,4 +23,12 @@ impl VertexId {
     pub fn from_index(index: usize) -> Self {
         Self(index as u32)
     }
+}
+
+/// Sorts vertices by id and removes duplicates.
+pub fn sort_distinct(vertices: &mut Vec<VertexId>) {
+    // As numbers, which other sorts use too; both conversions reuse the memory.
+    let mut ids: Vec<u32> = std::mem::take(vertices).into_iter().map(|v| v.0).collect();
+    order::sort_distinct(&mut ids);
+    *vertices = ids.into_iter().map(VertexId).collect();
 }

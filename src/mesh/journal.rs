@@ -2,6 +2,7 @@
 
 use super::{Mesh, Ring, VertexId};
 use crate::math::Vec3;
+use crate::math::order::{combined_rank, sort_pairs};
 use smallvec::SmallVec;
 
 /// The undo log of the edits since [`Mesh::begin`]: the state of each vertex slot before its first change.
@@ -101,19 +102,17 @@ impl Mesh {
     /// Returns the triangles that edits since [`Mesh::begin`] created or moved, each once, for the tests of collision
     /// handling.
     pub fn changed_triangles(&self) -> TriangleCorners {
-        let mut found = TriangleCorners::new();
+        let mut found = TriangleRanks::new();
         for was in &self.journal.touched {
             let ring = self.ring(was.vertex);
             let all = was.ring.is_empty() || was.position != self.position(was.vertex);
             let pairs = ring.pairs().filter(|&(a, b)| all || was.ring.after(a) != Some(b));
-            found.extend(pairs.map(|(a, b)| from_lowest([was.vertex, a, b])));
+            found.extend(pairs.map(|(a, b)| rank([was.vertex, a, b])));
         }
         for v in (self.journal.slots..self.slots()).map(VertexId::from_index) {
-            found.extend(self.ring(v).pairs().map(|(a, b)| from_lowest([v, a, b])));
+            found.extend(self.ring(v).pairs().map(|(a, b)| rank([v, a, b])));
         }
-        found.sort_unstable();
-        found.dedup();
-        found
+        sorted_distinct(found)
     }
 
     /// Records the state of vertex `v` in the undo log if edits are being recorded; must be called before its slot is
@@ -157,22 +156,27 @@ impl Mesh {
 
     /// Returns the triangles that have a corner in `vertices`, each once, sorted by vertex ids.
     pub fn triangles_at(&self, vertices: &[VertexId]) -> TriangleCorners {
-        let mut found: TriangleCorners = vertices
-            .iter()
-            .flat_map(|&v| self.ring(v).pairs().map(move |(a, b)| from_lowest([v, a, b])))
-            .collect();
-        found.sort_unstable();
-        found.dedup();
-        found
+        let at = |v: VertexId| self.ring(v).pairs().map(move |(a, b)| rank([v, a, b]));
+        sorted_distinct(vertices.iter().flat_map(|&v| at(v)).collect())
     }
 }
 
-fn from_lowest([a, b, c]: [VertexId; 3]) -> [VertexId; 3] {
-    if a < b && a < c {
+/// The ranks by which [`TriangleCorners`] are sorted: the ids of the corners, from the lowest on.
+type TriangleRanks = SmallVec<[(u64, u32); 16]>;
+
+fn rank([a, b, c]: [VertexId; 3]) -> (u64, u32) {
+    let [VertexId(a), VertexId(b), VertexId(c)] = if a < b && a < c {
         [a, b, c]
     } else if b < c {
         [b, c, a]
     } else {
         [c, a, b]
-    }
+    };
+    (combined_rank(a, b), c)
+}
+
+fn sorted_distinct(mut ranks: TriangleRanks) -> TriangleCorners {
+    sort_pairs(&mut ranks);
+    ranks.dedup();
+    ranks.into_iter().map(|(ab, c)| [(ab >> 32) as u32, ab as u32, c].map(VertexId)).collect()
 }

@@ -45,6 +45,7 @@ pub use edits::OppositeVertices;
 pub use error::{EditError, MeshError};
 pub use geodesic::geodesic_distances;
 pub use ids::VertexId;
+pub(crate) use ids::sort_distinct;
 pub use journal::TriangleCorners;
 pub use measure::{Measures, measure};
 pub use report::{MeshReport, report};
@@ -170,6 +171,14 @@ impl Mesh {
     #[inline]
     pub fn ring(&self, v: VertexId) -> &Ring {
         &self.rings[v.index()]
+    }
+
+    /// Adds to `vertices` their neighbours; afterwards they are sorted by id, each once.
+    pub fn add_neighbours(&self, vertices: &mut Vec<VertexId>) {
+        for k in 0..vertices.len() {
+            vertices.extend_from_slice(self.ring(vertices[k]).as_slice());
+        }
+        sort_distinct(vertices);
     }
 
     /// Returns the one-rings of all slots, indexed by slot, for loops over the whole mesh.

@@ -4,7 +4,7 @@ use super::disjoint_sets::DisjointSets;
 use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use super::self_intersections::count_self_intersections;
 use super::{MeshError, TriangleMesh};
-use crate::math::order::{combined_rank, sort_by_rank};
+use crate::math::order::{combined_rank, sort_by_rank, sort_pairs};
 use crate::math::predicates::collinear;
 
 /// The result of validating a mesh by [`report`]; see [`Self::is_healthy`].
@@ -108,7 +108,7 @@ fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
 fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
     let mut ends: Vec<(u64, u32)> =
         link.iter().zip(0..).flat_map(|(edge, i)| [(edge.from.into(), i), (edge.to.into(), i)]).collect();
-    ends.sort_unstable();
+    sort_pairs(&mut ends);
     let mut groups = DisjointSets::new(link.len());
     let mut valence_ok = true;
     for at_vertex in ends.chunk_by(|a, b| a.0 == b.0) {

@@ -1,6 +1,7 @@
 //! Self-intersections of triangle meshes: pairs found by a bounding volume hierarchy, decided by exact predicates.
 
 use super::TriangleMesh;
+use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::predicates::{
     collinear, triangles_intersect, triangles_intersect_sharing_vertex, triangles_overlap_sharing_edge,
 };
@@ -15,9 +16,9 @@ use crate::math::{Bounds, BoxTree, Vec3};
 /// [`count_self_intersections`] only counts.
 pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
-    for_each_intersecting_pair(mesh, |s, t| pairs.push([s, t]));
-    pairs.sort_unstable();
-    pairs
+    for_each_intersecting_pair(mesh, |s, t| pairs.push(combined_rank(s, t)));
+    sort_ranks(&mut pairs);
+    pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
 }
 
 /// Returns the number of self-intersections: the length of [`intersecting_pairs`], without storing the pairs.

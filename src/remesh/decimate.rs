@@ -167,12 +167,16 @@ impl<'a> Decimation<'a> {
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
         let least = quadric.minimizer().map(|position| position + self.origin);
         let positions = least.into_iter().chain([0.5 * (p + q), p, q]).map(DVec3::as_vec3);
-        let rated = positions.map(|position| (quadric.evaluate(position.as_dvec3() - self.origin), position));
-        // Only the minimiser can be out of range.
-        let mut positions: SmallVec<[RatedPosition; 4]> =
-            rated.filter(|(error, position)| error.is_finite() && position.is_finite()).collect();
-        positions.sort_by(|a, b| a.0.total_cmp(&b.0));
-        positions
+        let mut rated: SmallVec<[RatedPosition; 4]> = SmallVec::new();
+        for position in positions {
+            let error = quadric.evaluate(position.as_dvec3() - self.origin);
+            // Only the minimiser can be out of range.
+            if error.is_finite() && position.is_finite() {
+                let larger = rated.iter().position(|other| other.0.total_cmp(&error).is_gt());
+                rated.insert(larger.unwrap_or(rated.len()), (error, position));
+            }
+        }
+        rated
     }
 
     /// Returns whether collapsing the edge `uv` into `position` turns no triangle by more than 78°, degenerates none

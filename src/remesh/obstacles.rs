@@ -1,6 +1,7 @@
 //! Intersection tests for decimation: new triangles against the rest of the surface, by a bounding volume hierarchy
 //! that is updated with the edits.
 
+use crate::math::order::sort_pairs;
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_intersect};
 
@@ -201,7 +202,7 @@ fn in_curve_order(mesh: &Mesh) -> Vec<VertexId> {
             (spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2, v.0)
         })
         .collect();
-    keyed.sort_unstable();
+    sort_pairs(&mut keyed);
     keyed.into_iter().map(|(_, v)| VertexId(v)).collect()
 }
 

@@ -1,7 +1,7 @@
 //! A hashed grid of points for neighbour queries; points can be inserted between queries.
 
 use crate::math::Vec3;
-use crate::math::order::combined_rank;
+use crate::math::order::{combined_rank, sort_ranks};
 
 /// Marks the end of a linked list of points, of which each hash bucket has one.
 const NONE: u32 = u32::MAX;
@@ -109,7 +109,7 @@ impl PointGrid {
             ranked.select_nth_unstable(count);
             ranked.truncate(count);
         }
-        ranked.sort_unstable();
+        sort_ranks(&mut ranked);
         // Bits of non-negative numbers are ordered like the numbers.
         ranked.into_iter().map(|rank| (f32::from_bits((rank >> 32) as u32), rank as u32)).collect()
     }

@@ -7,7 +7,7 @@
 //! once.
 
 use super::vertex_grid::{Proximity, VertexBall};
-use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
+use crate::math::order::{combined_rank, median, rank_f32, sort_by_rank, sort_ranks};
 
 /// The radius bound of the first size class of balls, as a multiple of the median radius. If smaller, the few long
 /// edges of an ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
@@ -54,12 +54,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
 /// Returns the median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
 /// normal number, and 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
-    let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.radius).collect();
-    let half = sizes.len() / 2;
-    if sizes.is_empty() {
-        return 1.0;
-    }
-    let middle = *sizes.select_nth_unstable_by(half, f32::total_cmp).1;
+    let middle = median(balls.iter().map(|ball| ball.radius)).unwrap_or(1.0);
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
@@ -163,7 +158,7 @@ impl Columns {
             by_height.clear();
             by_height
                 .extend(column.iter().map(|&i| combined_rank(rank_f32(balls[i as usize].position.z), i)));
-            by_height.sort_unstable();
+            sort_ranks(&mut by_height);
             column.iter_mut().zip(&by_height).for_each(|(i, &ranked)| *i = ranked as u32);
         }
         let mut columns: Vec<([i32; 2], usize)> = Vec::new();

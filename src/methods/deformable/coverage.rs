@@ -3,6 +3,7 @@
 
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour};
+use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::{DAffine3, DVec3, Vec3, triangle};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
@@ -191,7 +192,7 @@ impl CoverageSurvey {
             Some(UncoveredRegion { position, area: *area, kind })
         });
         let mut parts: Vec<UncoveredRegion> = found.collect();
-        parts.sort_by(|a, b| b.area.total_cmp(&a.area));
+        sort_by_rank(&mut parts, |part| !rank_f64(part.area));
         parts
     }
 

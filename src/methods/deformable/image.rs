@@ -4,6 +4,7 @@
 //! the volume's affine transform maps it to world space.
 
 use crate::math::Vec3;
+use crate::math::order::median;
 use crate::methods::MethodError;
 use crate::volume::{CellCache, Grid, VectorGrid, Volume};
 
@@ -103,11 +104,7 @@ impl LevelImage {
     pub(super) fn median_steepness(&self, iso: f32) -> f32 {
         let mut differences = Vec::new();
         self.for_each_iso_crossing(iso, |difference| differences.push(difference.abs()));
-        let middle = differences.len() / 2;
-        if differences.is_empty() {
-            return 0.0;
-        }
-        *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
+        median(differences.into_iter()).map_or(0.0, |difference| difference * self.voxels_per_unit())
     }
 
     /// Calls `visit` with the signed difference of intensity of each pair of voxels that share a face and are on

@@ -2,7 +2,7 @@
 //! minimum spanning tree (Hoppe, DeRose, Duchamp, McDonald & Stuetzle, *Surface reconstruction from unorganized
 //! points*, 1992).
 
-use crate::math::order::{rank_f64, sort_by_rank};
+use crate::math::order::{rank_f64, sort_by_rank, sort_distinct};
 use crate::math::{DMat3, DVec3, Vec3, symmetric};
 use crate::spatial::PointGrid;
 use std::cmp::Reverse;
@@ -124,8 +124,7 @@ fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec
         }
     }
     for ids in &mut graph {
-        ids.sort_unstable();
-        ids.dedup();
+        sort_distinct(ids);
     }
     graph
 }

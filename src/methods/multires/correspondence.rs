@@ -200,9 +200,7 @@ pub(super) fn unfold(
     for _ in 0..UNFOLDINGS {
         let folded = mesh.triangles().filter(|&corners| is_folded(corners, base, normals, correspondence));
         let mut neighbourhood: Vec<VertexId> = folded.flatten().collect();
-        neighbourhood.extend(neighbourhood.clone().iter().flat_map(|&v| mesh.ring(v).as_slice()));
-        neighbourhood.sort_unstable();
-        neighbourhood.dedup();
+        mesh.add_neighbours(&mut neighbourhood);
         if neighbourhood.is_empty() {
             return;
         }

@@ -6,6 +6,7 @@ use super::labelling::{VoxelBox, label_bright, label_bright_by_level};
 use super::region::Region;
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
+use crate::math::order::sort_distinct;
 use std::cell::OnceCell;
 
 impl Region {
@@ -132,8 +133,7 @@ impl Region {
                 }
             }
         }
-        voxels.sort_unstable();
-        voxels.dedup();
+        sort_distinct(&mut voxels);
         voxels
     }
 }

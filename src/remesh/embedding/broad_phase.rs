@@ -4,7 +4,8 @@
 use super::motion_bound::Check;
 use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
 use crate::math::Bounds;
-use crate::mesh::{Mesh, VertexId};
+use crate::math::order::{combined_rank, sort_ranks};
+use crate::mesh::{Mesh, VertexId, sort_distinct};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
 /// The whole mesh is swept for near vertices if at least one vertex in this many has a pending search for its
@@ -64,18 +65,19 @@ impl Embedding {
     pub(super) fn search(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
         let proximity = self.proximity();
         let searched = dirty.iter().filter(|&&v| self.is_searched_around(v));
-        let mut searched: Vec<(u32, VertexId)> = searched.map(|&v| (self.grid.cell_key(v), v)).collect();
-        searched.sort_unstable();
+        let mut searched: Vec<u64> = searched.map(|&v| combined_rank(self.grid.cell_key(v), v.0)).collect();
+        sort_ranks(&mut searched);
+        let vertex = |&rank: &u64| VertexId(rank as u32);
         let mut near = Vec::new();
-        for cell in searched.chunk_by(|a, b| a.0 == b.0) {
+        for cell in searched.chunk_by(|a, b| a >> 32 == b >> 32) {
             let mut bounds = Bounds::EMPTY;
             let mut longest = 0.0f32;
-            for ball in cell.iter().map(|&(_, v)| self.grid.ball(v)) {
+            for ball in cell.iter().map(|rank| self.grid.ball(vertex(rank))) {
                 bounds = bounds.union(&Bounds::from_points(&[ball.position]));
                 longest = if ball.radius > longest { ball.radius } else { longest };
             }
             self.grid.near_balls(&bounds, longest, proximity, &mut near);
-            for &(_, v) in cell {
+            for v in cell.iter().map(vertex) {
                 self.add_pairs_of(mesh, &self.grid.ball(v), &near, proximity);
             }
         }
@@ -134,7 +136,7 @@ impl Embedding {
         let mut found = Vec::new();
         self.grid.near_box(bounds, 0.0, |v| found.push(v));
         found.retain(|&v| bounds.contains(mesh.position(v)));
-        found.sort_unstable();
+        sort_distinct(&mut found);
         found
     }
 

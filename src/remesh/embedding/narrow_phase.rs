@@ -8,7 +8,7 @@ use super::one_ring::{
 };
 use super::{Embedding, Nearby};
 use crate::math::higher;
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Mesh, VertexId, sort_distinct};
 
 /// The clearance of a pair, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
@@ -57,8 +57,7 @@ impl Embedding {
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
         self.dirty = dirty;
         self.dirty.clear();
-        intersecting.sort_unstable();
-        intersecting.dedup();
+        sort_distinct(&mut intersecting);
         intersecting
     }
 

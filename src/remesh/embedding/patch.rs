@@ -5,7 +5,7 @@ use super::one_ring::{changes_intersect_around, flat_clearance, longest_edge};
 use super::output::{OutputSpace, bounds, exact_below, intersect};
 use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
-use crate::mesh::{Facet, Mesh, VertexId};
+use crate::mesh::{Facet, Mesh, VertexId, sort_distinct};
 
 /// Number of changed triangles per which the work of an edit is counted once more: with n of them, the nearby vertices
 /// visited count 1 + ⌊n / this⌋ times. Most edits change fewer than this.
@@ -45,8 +45,7 @@ impl Embedding {
     /// which it has a common corner.
     fn any_one_ring_intersects(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
-        hubs.sort_unstable();
-        hubs.dedup();
+        sort_distinct(&mut hubs);
         hubs.into_iter().any(|hub| {
             let longest = longest_edge(mesh, hub);
             flat_clearance(mesh, hub, longest) <= self.exact_below()

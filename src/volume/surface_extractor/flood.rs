@@ -9,6 +9,7 @@ use super::super::error::VolumeError;
 use super::Lattice;
 use super::batch::Batch;
 use super::blocks::{ABSENT, Blocks, Node};
+use crate::math::order::sort_distinct;
 
 /// The six faces of a cell: axis, whether it is the far face along it, and the face's corners as a mask of the bits of
 /// a marching cubes case.
@@ -80,8 +81,7 @@ impl Flood {
         self.requested.clear();
         self.requested.extend(corners.filter(|&slot| blocks.is_unknown(slot)));
         // Sorted by block and node, so that neighbouring points are adjacent.
-        self.requested.sort_unstable();
-        self.requested.dedup();
+        sort_distinct(&mut self.requested);
         batch.extend(self.requested.iter().map(|&slot| lattice.position(blocks.node(slot))));
         Ok(!self.wave.is_empty())
     }
@@ -130,8 +130,7 @@ impl Flood {
 
     /// Queues the neighbours of those seed cells in or next to which no surface was found.
     fn queue_seed_neighbours(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
-        self.unresolved_seeds.sort_unstable();
-        self.unresolved_seeds.dedup();
+        sort_distinct(&mut self.unresolved_seeds);
         self.unresolved_seeds
             .retain(|&cell| !around(cell, blocks).iter().any(|&near| is_crossed(near, blocks)));
         while let Some(&cell) = self.unresolved_seeds.last() {

@@ -83,9 +83,8 @@ impl Scan {
     /// padding.
     pub fn new(stride: usize, blocks: &Blocks) -> Result<Self, VolumeError> {
         let axes = blocks.cells().map(|end| {
-            let mut axis: Vec<usize> = (1..end).step_by(stride).collect();
-            axis.extend([0, end - 1, end]);
-            axis.sort_unstable();
+            let mut axis: Vec<usize> = [0].into_iter().chain((1..end).step_by(stride)).collect();
+            axis.extend([end - 1, end]);
             axis.dedup();
             axis
         });

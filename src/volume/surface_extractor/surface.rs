@@ -9,6 +9,7 @@ use super::blocks::{Blocks, next};
 use super::flood::CrossedCell;
 use super::root::Root;
 use crate::math::DVec3;
+use crate::math::order::sort_pairs;
 use crate::mesh::TriangleMesh;
 
 const NONE: u32 = u32::MAX;
@@ -46,7 +47,7 @@ impl Surface {
     pub fn new(crossed: &[CrossedCell], blocks: &Blocks) -> Result<Self, VolumeError> {
         let (mut order, mut cells) = (reserve(crossed.len())?, reserve(crossed.len())?);
         order.extend(crossed.iter().map(|cell| blocks.rank(cell.slot)).zip(0_u32..));
-        order.sort_unstable();
+        sort_pairs(&mut order);
         cells.extend(order.iter().map(|&(_, i)| crossed[i as usize]));
         let count = cells.iter().map(|cell| crossed_near_edges(cell.case).count_ones() as usize).sum();
         let (mut vertices, mut first, mut index) =

@@ -12,6 +12,7 @@ mod translate;
 
 use super::field::Field;
 use crate::math::DVec3;
+use crate::math::order::{sort_distinct, sort_pairs};
 use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{CubeSymmetries, Translations};
 
@@ -185,10 +186,9 @@ impl FastField {
     fn choose_levels(&mut self) {
         for depth in 0..=MAX_LEVELS {
             self.levels.push(Level::new(1 << depth));
-            let mut cubes: Vec<CubeCoords> =
-                self.terms.iter().map(|(c, _)| self.cube_of(*c, depth)).collect();
-            cubes.sort_unstable();
-            cubes.dedup();
+            let index = |c: DVec3| self.levels[depth].index(self.cube_of(c, depth)).unwrap_or(0) as u32;
+            let mut cubes: Vec<u32> = self.terms.iter().map(|(c, _)| index(*c)).collect();
+            sort_distinct(&mut cubes);
             if depth >= 2 && self.terms.len() <= TERMS_A_CUBE * cubes.len() {
                 break;
             }
@@ -203,7 +203,7 @@ impl FastField {
         let index =
             |i: u32| self.levels[finest].index(self.cube_of(self.terms[i as usize].0, finest)).unwrap_or(0);
         let mut keyed: Vec<(u64, u32)> = (0..self.terms.len() as u32).map(|i| (index(i) as u64, i)).collect();
-        keyed.sort_unstable();
+        sort_pairs(&mut keyed);
         self.terms = keyed.iter().map(|&(_, i)| self.terms[i as usize]).collect();
         let mut start = 0;
         for same in keyed.chunk_by(|a, b| a.0 == b.0) {

@@ -2,7 +2,7 @@
 //! predicted from its nearest predecessors, in an order from coarse to fine (Vecchia's approximation; Schäfer, Katzfuss
 //! & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler minimization*, 2021).
 
-use crate::math::order::rank_f64;
+use crate::math::order::{rank_f64, sort_pairs};
 use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
@@ -140,7 +140,7 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
         found.select_nth_unstable(NEIGHBOURS);
         found.truncate(NEIGHBOURS);
     }
-    found.sort_unstable();
+    sort_pairs(&mut found);
     found.into_iter().map(|(_, i)| i).collect()
 }
 
