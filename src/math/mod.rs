@@ -1,17 +1,25 @@
 //! Geometry and numerics shared by all layers: vector types, bounding boxes, triangles, exact predicates, quadric
-//! errors, eigenvectors of symmetric matrices, sorting and random numbers.
+//! errors, eigenvectors of symmetric matrices, linear systems, sorting, grouping and
+//! random numbers.
 
 mod bounds;
+mod conjugate_gradients;
+mod groups;
 mod min_max;
 pub mod order;
+mod position_index;
 pub mod predicates;
 mod quadric;
 mod random;
 pub mod symmetric;
 pub mod triangle;
+pub mod vectors;
 
 pub use bounds::{Bounds, BoxTree, Ray};
+pub use conjugate_gradients::ConjugateGradients;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
+pub use groups::Groups;
 pub use min_max::{higher, lower};
+pub use position_index::PositionIndex;
 pub use quadric::Quadric;
 pub use random::Random;

@@ -1,4 +1,5 @@
-//! Measures of a triangle, its closest point to a given one, and its intersection with a line; computed in `f64`.
+//! Measures of a triangle, its closest point to a given one, and its intersection with a line; computed in `f64`,
+//! but for the length of an edge.
 
 use super::{DVec3, Vec3};
 
@@ -14,6 +15,12 @@ pub fn area_vector([a, b, c]: [Vec3; 3]) -> DVec3 {
 #[inline]
 pub fn area(triangle: [Vec3; 3]) -> f64 {
     0.5 * area_vector(triangle).length()
+}
+
+/// Returns the squared length of the longest edge of the triangle, in `f32`.
+#[inline]
+pub fn longest_edge_squared([a, b, c]: [Vec3; 3]) -> f32 {
+    a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a))
 }
 
 /// Returns the solid angle of the triangle seen from `p`, in steradians, from −2π to 2π; positive if `p` is behind the

@@ -19,15 +19,14 @@ impl Mesh {
     /// 4096 triangles.
     pub fn from_triangles(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         check_indices(mesh)?;
-        let corners = Links::sort(mesh);
+        let links = mesh.opposite_edges();
         let mut rings = Vec::with_capacity(mesh.positions.len());
         let mut new_ids = vec![VertexId(u32::MAX); mesh.positions.len()];
         let mut positions = Vec::with_capacity(mesh.positions.len());
         for (v, &position) in mesh.positions.iter().enumerate() {
-            let links = corners.of(v);
-            if !links.is_empty() {
+            if !links.of(v).is_empty() {
                 new_ids[v] = VertexId::from_index(rings.len());
-                rings.push(ring_from_links(v, links)?);
+                rings.push(ring_from_links(v, links.of(v))?);
                 positions.push(position);
             }
         }
@@ -95,7 +94,7 @@ impl Mesh {
         for v in self.vertices() {
             new_ids[v.index()] = positions.len() as u32;
             positions.push(self.position(v));
-            normals.push(self.area_normal(v).normalize_or_zero());
+            normals.push(self.unit_normal(v));
         }
         let triangles = self.triangles().map(|corners| corners.map(|v| new_ids[v.index()])).collect();
         TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
@@ -159,58 +158,26 @@ fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// For every vertex of a triangle list, its links, from which its one-ring is built: the edges (a, b) opposite it in
-/// its triangles.
-struct Links {
-    starts: Vec<usize>,
-    links: Vec<(u32, u32)>,
-}
-
-impl Links {
-    fn sort(mesh: &TriangleMesh) -> Self {
-        let mut starts = vec![0; mesh.positions.len() + 1];
-        for &i in mesh.triangles.iter().flatten() {
-            starts[i as usize + 1] += 1;
-        }
-        for i in 1..starts.len() {
-            starts[i] += starts[i - 1];
-        }
-        let mut next = starts.clone();
-        let mut links = vec![(0, 0); mesh.triangles.len() * 3];
-        for &[a, b, c] in &mesh.triangles {
-            for (corner, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
-                links[next[corner as usize]] = (from, to);
-                next[corner as usize] += 1;
-            }
-        }
-        Self { starts, links }
-    }
-
-    fn of(&self, v: usize) -> &[(u32, u32)] {
-        &self.links[self.starts[v]..self.starts[v + 1]]
-    }
-}
-
 /// Orders the links of vertex `v`, the edges opposite it in its triangles, into its one-ring, or reports why they are
 /// not a single cycle of 3 to [`LARGEST_VALENCE`] edges.
-fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
+fn ring_from_links(v: usize, links: &[[u32; 2]]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
         return fail(&format!("more than {LARGEST_VALENCE} triangles meet"));
     }
-    if links.iter().any(|&(a, b)| a == b || a as usize == v || b as usize == v) {
+    if links.iter().any(|&[a, b]| a == b || a as usize == v || b as usize == v) {
         return fail("a triangle has two equal corners");
     }
     let mut ring = Vec::with_capacity(links.len());
-    let (first, mut here) = links[0];
+    let [first, mut here] = links[0];
     ring.push(VertexId(first));
     while here != first {
         if ring.contains(&VertexId(here)) {
             return fail("an edge with more than two triangles, or inconsistent orientation,");
         }
         ring.push(VertexId(here));
-        match links.iter().find(|&&(a, _)| a == here) {
-            Some(&(_, next)) => here = next,
+        match links.iter().find(|&&[a, _]| a == here) {
+            Some(&[_, next]) => here = next,
             None => return fail("a boundary, or inconsistent orientation,"),
         }
     }

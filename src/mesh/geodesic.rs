@@ -38,9 +38,10 @@ pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, Me
         let problem = format!("must be below the number of vertices ({vertices}), got {from}");
         return Err(MeshError::InvalidArgument { parameter: "fromVertex", problem });
     }
+    let opposite_edges = mesh.opposite_edges();
     let mut front = Front::new(mesh, from as usize);
     while let Some(v) = front.pop() {
-        front.propagate(v);
+        front.propagate(v, opposite_edges.of(v));
     }
     Ok(front.distances)
 }
@@ -49,7 +50,6 @@ pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, Me
 /// of vertices whose distance is to be propagated.
 struct Front<'a> {
     positions: &'a [Vec3],
-    links: Links,
     origin: DVec3,
     distances: Vec<f64>,
     /// By vertex, how often its distance has been propagated.
@@ -67,7 +67,6 @@ impl<'a> Front<'a> {
         distances[from] = 0.0;
         Self {
             positions,
-            links: Links::new(mesh),
             origin: positions[from].as_dvec3(),
             distances,
             propagations: vec![0; positions.len()],
@@ -89,11 +88,11 @@ impl<'a> Front<'a> {
         None
     }
 
-    /// Propagates the distance of `v` to the other corners of the triangles around it, and queues those whose distance
-    /// decreases.
-    fn propagate(&mut self, v: usize) {
-        for k in self.links.range(v) {
-            let [a, b] = self.links.edges[k].map(|w| w as usize);
+    /// Propagates the distance of `v` to the other corners of the triangles around it, the ends of its
+    /// `opposite_edges`, and queues those whose distance decreases.
+    fn propagate(&mut self, v: usize, opposite_edges: &[[u32; 2]]) {
+        for edge in opposite_edges {
+            let [a, b] = edge.map(|w| w as usize);
             self.relax(a, self.path_length(v, b, a));
             self.relax(b, self.path_length(v, a, b));
         }
@@ -138,36 +137,6 @@ fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64
     let crossing = source_x * height + x * source_depth;
     let enters = crossing >= 0.0 && crossing <= base * depth;
     enters.then(|| ((x - source_x) * (x - source_x) + depth * depth).sqrt())
-}
-
-/// For each vertex of a triangle list, the edges opposite it in its triangles.
-struct Links {
-    starts: Vec<u32>,
-    edges: Vec<[u32; 2]>,
-}
-
-impl Links {
-    fn new(mesh: &TriangleMesh) -> Self {
-        let mut starts = vec![0; mesh.positions.len() + 1];
-        for &v in mesh.triangles.as_flattened() {
-            starts[v as usize + 1] += 1;
-        }
-        (1..starts.len()).for_each(|v| starts[v] += starts[v - 1]);
-        let mut next = starts.clone();
-        let mut edges = vec![[0; 2]; 3 * mesh.triangles.len()];
-        for &[a, b, c] in &mesh.triangles {
-            for (corner, edge) in [(a, [b, c]), (b, [c, a]), (c, [a, b])] {
-                let slot = &mut next[corner as usize];
-                edges[*slot as usize] = edge;
-                *slot += 1;
-            }
-        }
-        Self { starts, edges }
-    }
-
-    fn range(&self, v: usize) -> std::ops::Range<usize> {
-        self.starts[v] as usize..self.starts[v + 1] as usize
-    }
 }
 
 #[cfg(test)]

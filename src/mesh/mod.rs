@@ -293,6 +293,18 @@ impl Mesh {
         sum
     }
 
+    /// Returns the area-weighted outward unit normal at `v`; zero if the triangles around it have no area in sum, or if
+    /// its slot is free.
+    #[inline]
+    pub fn unit_normal(&self, v: VertexId) -> Vec3 {
+        self.area_normal(v).normalize_or_zero()
+    }
+
+    /// Returns the unit normals of all vertices, see [`Self::unit_normal`], by slot.
+    pub fn unit_normals(&self) -> Vec<Vec3> {
+        (0..self.slots()).map(|slot| self.unit_normal(VertexId::from_index(slot))).collect()
+    }
+
     /// Returns the vertices adjacent to both `u` and `v`, in the order of the ring of `u`.
     pub fn common_neighbours(&self, u: VertexId, v: VertexId) -> smallvec::SmallVec<[VertexId; 4]> {
         let other = self.ring(v);

@@ -1,6 +1,7 @@
 //! The oriented one-ring of a vertex.
 
 use super::VertexId;
+use crate::math::Vec3;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
@@ -82,6 +83,15 @@ impl Ring {
         let n = self.0.len();
         let count = (end + n - start - 1) % n;
         (1..=count).map(|k| self.0[(start + k) % n]).collect()
+    }
+
+    /// Returns the mean over the neighbours of `values`, which are indexed by vertex slot; NaN for an empty ring.
+    ///
+    /// Of their positions, this is the umbrella operator: the position of the vertex with the least membrane energy,
+    /// and, less its own position, its Laplacian.
+    #[inline]
+    pub fn mean(&self, values: &[Vec3]) -> Vec3 {
+        self.0.iter().fold(Vec3::ZERO, |sum, w| sum + values[w.index()]) * (1.0 / self.0.len() as f32)
     }
 
     pub(super) fn replace(&mut self, old: VertexId, new: VertexId) {

@@ -3,7 +3,7 @@
 use super::disjoint_sets::DisjointSets;
 use super::edge_table::sorted_half_edges;
 use super::{MeshError, Texture};
-use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
+use crate::math::{DAffine3, DVec3, Groups, Vec2, Vec3, triangle};
 use std::sync::Arc;
 
 /// An indexed triangle list with optional normals, texture coordinates and colours. It need not be closed or manifold.
@@ -176,6 +176,13 @@ impl TriangleMesh {
             uvs[v as usize] = uv;
         }
         Some(uvs)
+    }
+
+    /// Returns for each vertex the edges opposite it in its triangles, in the order of the triangles; each is directed
+    /// as in its triangle.
+    pub(super) fn opposite_edges(&self) -> Groups<[u32; 2]> {
+        let around = |&[a, b, c]: &[u32; 3]| [(a, [b, c]), (b, [c, a]), (c, [a, b])];
+        Groups::new(self.positions.len(), self.triangles.iter().flat_map(around))
     }
 
     /// Returns the mesh with vertices on texture seams duplicated, one per distinct texture coordinate, so that `uvs`

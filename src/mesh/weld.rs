@@ -1,7 +1,7 @@
 //! Vertex welding: merges vertices at the same position, which files often repeat per triangle or along texture seams.
 
 use super::TriangleMesh;
-use crate::math::{Vec2, Vec3};
+use crate::math::{PositionIndex, Vec2, Vec3};
 
 impl TriangleMesh {
     /// Returns the mesh with vertices at exactly the same position merged (−0 equals 0), numbered in the order of their
@@ -32,12 +32,10 @@ impl TriangleMesh {
 
     /// Returns for each vertex the lowest index of a vertex at exactly the same position.
     fn representatives(&self) -> Vec<usize> {
-        let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
-        let mut order: Vec<([u32; 3], u32)> = self.positions.iter().map(key).zip(0..).collect();
-        order.sort_unstable();
         let mut representatives = vec![0; self.positions.len()];
-        for same in order.chunk_by(|a, b| a.0 == b.0) {
-            same.iter().for_each(|&(_, v)| representatives[v as usize] = same[0].1 as usize);
+        for equal in PositionIndex::new(&self.positions).distinct() {
+            let lowest = equal.clone().next().map_or(0, |v| v as usize);
+            equal.for_each(|v| representatives[v as usize] = lowest);
         }
         representatives
     }

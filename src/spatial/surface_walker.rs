@@ -2,7 +2,7 @@
 //! *Multiresolution shape deformations for meshes with dynamic vertex connectivity*, section 8).
 
 use super::{SurfacePoint, TriangleTree};
-use crate::math::{DVec3, Vec3, triangle};
+use crate::math::{DVec3, Groups, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh};
 use std::cell::OnceCell;
 
@@ -155,11 +155,10 @@ struct TrianglePoint {
 /// # Errors
 /// [`MeshError::NotClosed`] if there is no triangle across an edge.
 fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
-    let (first, half_edges) = half_edges_by_start(mesh);
-    let across = |from: u32, to: u32| {
-        let around = &half_edges[first[from as usize] as usize..first[from as usize + 1] as usize];
-        around.iter().find(|side| side.0 == to).map(|side| side.1)
-    };
+    let sides = |(&[a, b, c], t): (&[u32; 3], u32)| [(a, (b, t)), (b, (c, t)), (c, (a, t))];
+    let half_edges = Groups::new(mesh.positions.len(), mesh.triangles.iter().zip(0..).flat_map(sides));
+    let across =
+        |from: u32, to: u32| half_edges.of(from as usize).iter().find(|side| side.0 == to).map(|side| side.1);
     let all = mesh.triangles.iter().map(|&[a, b, c]| {
         let beyond = [across(c, b), across(a, c), across(b, a)];
         let [Some(x), Some(y), Some(z)] = beyond else {
@@ -169,25 +168,6 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
         Ok([x, y, z])
     });
     all.collect()
-}
-
-/// Returns the half-edges sorted by start vertex, in which the triangle across an edge is looked up: the index of the
-/// first half-edge of each vertex, and for each half-edge its end vertex and triangle.
-fn half_edges_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
-    let mut first = vec![0_u32; mesh.positions.len() + 1];
-    mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
-    for v in 0..mesh.positions.len() {
-        first[v + 1] += first[v];
-    }
-    let mut next = first.clone();
-    let mut half_edges = vec![(0, 0); 3 * mesh.triangles.len()];
-    for (&[a, b, c], triangle) in mesh.triangles.iter().zip(0..) {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            half_edges[next[from as usize] as usize] = (to, triangle);
-            next[from as usize] += 1;
-        }
-    }
-    (first, half_edges)
 }
 
 #[cfg(test)]

@@ -190,8 +190,7 @@ impl Forces {
     /// as the surface settles; the length of its normal part is at most `limit`.
     #[inline]
     fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, limit: f32) -> Vec3 {
-        let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
-        let bending = self.laplacian[v] - sum * (1.0 / ring.valence() as f32);
+        let bending = self.laplacian[v] - ring.mean(&self.laplacian);
         let normal = self.normal[v];
         let along_normal = bending.dot(normal);
         let across = normal * along_normal;

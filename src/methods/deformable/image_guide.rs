@@ -64,7 +64,7 @@ impl<'a> ImageGuide<'a> {
     /// is 0 in uniform object or background; at the contour it makes up for vertices that have settled off it.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
-            let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
+            let (p, half) = (mesh.position(v), mesh.unit_normal(v) * 0.5);
             let [inside, here, outside] = [p - half, p, p + half].map(|p| self.depth(p));
             // In a slit or a thin wall both sides have like intensities, and their difference tells nothing: each half
             // counts separately.
@@ -90,7 +90,7 @@ impl TopologyGuide for ImageGuide<'_> {
     /// vertices that do not face each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let (p, offset) = (mesh.position(u), mesh.position(v) - mesh.position(u));
-        let [m, n] = [u, v].map(|w| offset.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
+        let [m, n] = [u, v].map(|w| offset.normalize_or_zero().dot(mesh.unit_normal(w)));
         let is_gap = match (m, n) {
             (m, n) if m > FACING && n < -FACING => true,
             (m, n) if m < -FACING && n > FACING => false,
@@ -104,8 +104,7 @@ impl TopologyGuide for ImageGuide<'_> {
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
-        let outwards: f32 =
-            (0..3).map(|k| mesh.area_normal(ring[k]).normalize_or_zero().dot(corners[k] - middle)).sum();
+        let outwards: f32 = (0..3).map(|k| mesh.unit_normal(ring[k]).dot(corners[k] - middle)).sum();
         let is_strand = outwards > 0.0;
         self.are_all(!is_strand, &[middle], self.tolerance(mesh, &ring))
     }
@@ -113,7 +112,7 @@ impl TopologyGuide for ImageGuide<'_> {
     /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
     /// sheets would merge there, and at a rim the next pair of vertices would follow.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
-        let [m, n] = [u, v].map(|w| mesh.area_normal(w).normalize_or_zero());
+        let [m, n] = [u, v].map(|w| mesh.unit_normal(w));
         if m.dot(n) >= -FACING {
             return true;
         }
@@ -124,7 +123,7 @@ impl TopologyGuide for ImageGuide<'_> {
 
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool {
         let side = if is_solid { -SAMPLE_DEPTH } else { SAMPLE_DEPTH };
-        let sample_point = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * side;
+        let sample_point = |&w: &VertexId| mesh.position(w) + mesh.unit_normal(w) * side;
         let depth: f32 = members.iter().map(|w| self.depth(sample_point(w))).sum();
         if is_solid { depth > 0.0 } else { depth < 0.0 }
     }

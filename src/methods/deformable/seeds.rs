@@ -9,7 +9,7 @@ use super::contour::{ObjectIs, contour, placed};
 use super::coverage::Missing;
 use super::image::LevelImage;
 use super::{DeformableModel, Topology};
-use crate::math::Vec3;
+use crate::math::{Vec3, triangle};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
@@ -303,11 +303,7 @@ impl Mean {
 }
 
 fn longest_edge(surface: &TriangleMesh) -> f32 {
-    let longest = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|v| surface.positions[v as usize]);
-        a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a))
-    };
-    surface.triangles.iter().map(longest).fold(0.0, f32::max).sqrt()
+    surface.corners().map(triangle::longest_edge_squared).fold(0.0, f32::max).sqrt()
 }
 
 /// Converts the index of a voxel in a grid of `dims` voxels to its indices along the three axes.

@@ -99,7 +99,7 @@ impl DeformableModel {
     /// Returns the size, a factor on δ, at which the contact distance equals the thickness of the wall or gap at a
     /// vertex; infinite if none is found.
     fn size_by_thickness(&self, v: VertexId) -> f32 {
-        let normal = self.mesh.area_normal(v).normalize_or_zero();
+        let normal = self.mesh.unit_normal(v);
         let contact = Sampling::new(self.model_delta()).contact();
         let is_opposite = |k: i32| {
             let distance = f32::from(k as i16) * STRIDE;
@@ -135,7 +135,7 @@ impl DeformableModel {
     fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
         for &v in members {
-            let normal = self.mesh.area_normal(v).normalize_or_zero();
+            let normal = self.mesh.unit_normal(v);
             offsets[v.index()] = self.offset_from_contour(self.mesh.position(v), normal);
         }
         offsets
@@ -146,7 +146,7 @@ impl DeformableModel {
     /// above 1, else 1; infinite if the edge is straight. `offsets` are those of its ends from the contour, in voxels.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
-        let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
+        let [m, n] = ends.map(|w| self.mesh.unit_normal(w));
         let middle = self.offset_from_contour((p + q) * 0.5, (m + n).normalize_or_zero());
         let sagitta = (middle - (offsets[0] + offsets[1]) * 0.5).abs();
         let length = p.distance(q) / (MEAN_EDGE * self.model_delta());
@@ -215,7 +215,7 @@ mod tests {
         let moved: Vec<(VertexId, Vec3)> = model
             .mesh
             .vertices()
-            .map(|v| (v, model.mesh.position(v) + model.mesh.area_normal(v).normalize_or_zero() * 0.3))
+            .map(|v| (v, model.mesh.position(v) + model.mesh.unit_normal(v) * 0.3))
             .collect();
         moved.into_iter().for_each(|(v, p)| model.mesh.set_position(v, p));
         let off_contour = mean(&model);

@@ -1,8 +1,8 @@
 //! Input points of an implicit surface: validation, scaling into the normalised box, in which their longest side is 2,
 //! removal of duplicates, and clustering against outliers (Dinh, Turk & Slabaugh, section VI-D).
 
-use crate::math::order::sort_by_rank;
-use crate::math::{Bounds, DAffine3, DMat3, DVec3, Vec3, symmetric};
+use crate::math::order::{sort_by_rank, sort_distinct};
+use crate::math::{Bounds, DAffine3, DMat3, DVec3, PositionIndex, Vec3, symmetric};
 use crate::methods::MethodError;
 
 /// A point cloud near a surface, with optional normals, confidences and colours; the input of an implicit surface.
@@ -83,11 +83,9 @@ impl Cloud {
     /// Returns the cloud without duplicates: of each set of points with equal positions, the first is kept with its
     /// attributes; the order is unchanged.
     pub fn distinct(&self) -> Self {
-        let bits = |i: u32| self.points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
-        let mut order: Vec<([u32; 3], u32)> = (0..self.len() as u32).map(|i| (bits(i), i)).collect();
-        order.sort_unstable();
-        let mut first: Vec<u32> = order.chunk_by(|a, b| a.0 == b.0).map(|same| same[0].1).collect();
-        first.sort_unstable();
+        let index = PositionIndex::new(&self.points);
+        let mut first: Vec<u32> = index.distinct().filter_map(|mut equal| equal.next()).collect();
+        sort_distinct(&mut first);
         if first.len() == self.len() { self.clone() } else { self.select(&first) }
     }
 
@@ -269,7 +267,7 @@ pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
     sort_by_rank(&mut largest, |cluster| (points.len() - cluster.len()) as u64);
     let mut kept = largest[..keep.min(largest.len())].concat();
-    kept.sort_unstable();
+    sort_distinct(&mut kept);
     kept
 }
 

@@ -9,7 +9,8 @@
 //! has hardly any weight. Vertices that no camera sees are filled in from their neighbours.
 
 use super::camera::{Camera, ColorMean, Projected};
-use crate::math::{DVec3, Vec3};
+use crate::math::order::sort_distinct;
+use crate::math::{DVec3, Groups, Vec3};
 use crate::mesh::TriangleMesh;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -105,7 +106,7 @@ impl Coloring {
         let mean = |g: &WeightedColor| (g.weight > 0.0).then(|| g.color / g.weight);
         let mut colors: Vec<Option<Vec3>> = self.gathered.iter().map(mean).collect();
         let overall = mean_of(colors.iter().flatten().copied())?;
-        fill_unseen(&mut colors, &Neighbours::of(surface));
+        fill_unseen(&mut colors, &neighbours(surface));
         Some(colors.into_iter().map(|color| color.unwrap_or(overall)).collect())
     }
 }
@@ -117,51 +118,24 @@ fn mean_of(colors: impl Iterator<Item = Vec3>) -> Option<Vec3> {
 
 /// Fills in vertices without a colour that are connected to coloured ones, ring by ring, with the mean of their
 /// neighbours.
-fn fill_unseen(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
-    let mut front: Vec<usize> = (0..colors.len()).filter(|&v| colors[v].is_some()).collect();
+fn fill_unseen(colors: &mut [Option<Vec3>], neighbours: &Groups<u32>) {
+    let mut front: Vec<u32> = (0..colors.len() as u32).filter(|&v| colors[v as usize].is_some()).collect();
     while !front.is_empty() {
-        let around = front.iter().flat_map(|&v| neighbours.around(v));
-        let mut ring: Vec<usize> = around.copied().filter(|&v| colors[v].is_none()).collect();
-        ring.sort_unstable();
-        ring.dedup();
-        let mean = |&v: &usize| mean_of(neighbours.around(v).iter().filter_map(|&n| colors[n]));
+        let around = front.iter().flat_map(|&v| neighbours.of(v as usize));
+        let mut ring: Vec<u32> = around.copied().filter(|&v| colors[v as usize].is_none()).collect();
+        sort_distinct(&mut ring);
+        let mean = |&v: &u32| mean_of(neighbours.of(v as usize).iter().filter_map(|&n| colors[n as usize]));
         let means: Vec<Option<Vec3>> = ring.iter().map(mean).collect();
-        ring.iter().zip(means).for_each(|(&v, mean)| colors[v] = mean);
+        ring.iter().zip(means).for_each(|(&v, mean)| colors[v as usize] = mean);
         front = ring;
     }
 }
 
-/// The neighbours of all vertices, from which unseen vertices take their colours. Each neighbour is listed once for
-/// every triangle that has both vertices: on a closed surface, all equally often, so that means are not biased.
-struct Neighbours {
-    starts: Vec<usize>,
-    all: Vec<usize>,
-}
-
-impl Neighbours {
-    fn of(surface: &TriangleMesh) -> Self {
-        let sides = || {
-            let around = |t: &[u32; 3]| {
-                let [a, b, c] = t.map(|v| v as usize);
-                [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]
-            };
-            surface.triangles.iter().flat_map(around)
-        };
-        let mut starts = vec![0; surface.positions.len() + 1];
-        sides().for_each(|(from, _)| starts[from + 1] += 1);
-        (1..starts.len()).for_each(|v| starts[v] += starts[v - 1]);
-        let mut next = starts.clone();
-        let mut all = vec![0; 6 * surface.triangles.len()];
-        for (from, to) in sides() {
-            all[next[from]] = to;
-            next[from] += 1;
-        }
-        Self { starts, all }
-    }
-
-    fn around(&self, v: usize) -> &[usize] {
-        &self.all[self.starts[v]..self.starts[v + 1]]
-    }
+/// Returns the neighbours of each vertex, from which unseen vertices take their colours. Each neighbour is listed once
+/// for every triangle that has both vertices: on a closed surface, all equally often, so that means are not biased.
+fn neighbours(surface: &TriangleMesh) -> Groups<u32> {
+    let sides = |&[a, b, c]: &[u32; 3]| [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)];
+    Groups::new(surface.positions.len(), surface.triangles.iter().flat_map(sides))
 }
 
 /// Depth buffer of one camera, to decide which vertices of the surface the camera sees.

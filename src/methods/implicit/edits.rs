@@ -3,8 +3,8 @@
 use super::cloud::{BoxMap, Cloud, check_finite, check_max_count};
 use super::exterior::Exterior;
 use super::sampling::Samples;
-use super::solve::{Constraints, PositionIndex};
-use crate::math::Vec3;
+use super::solve::Constraints;
+use crate::math::{PositionIndex, Vec3};
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Low-rank approximation of matrix blocks that hold a kernel between the points of two separated clusters, by adaptive
 //! cross approximation with partial pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
 
-use super::vectors::{MatrixScalar, dot};
+use crate::math::vectors::{MatrixScalar, dot};
 
 /// A matrix block approximated as a sum of outer products, Σ uₖ vₖᵀ, which takes less memory and time than all its
 /// entries.

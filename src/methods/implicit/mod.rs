@@ -51,7 +51,6 @@ mod queries;
 mod sampling;
 mod solve;
 mod state;
-mod vectors;
 
 pub use camera::Camera;
 pub use cloud::Cloud;
@@ -61,7 +60,7 @@ pub use params::{ImplicitParams, IsoValue, KernelKind};
 
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
-use crate::math::Vec3;
+use crate::math::{PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
@@ -72,7 +71,7 @@ use field::Field;
 use kernel::{Kernel, KernelTable};
 use point_colors::PointColors;
 use sampling::{Samples, Sampling};
-use solve::{Constraints, PositionIndex, Solution, Solver};
+use solve::{Constraints, Solution, Solver};
 
 /// Options of an [`ImplicitSurface`], given to [`ImplicitSurface::new`] together with its points.
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@
 use super::correspondence::{BasePoint, Correspondence, UNSET, normal_at};
 use super::prisms::PrismLookup;
 use crate::math::Vec3;
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId};
 use crate::remesh::Embedding;
 use crate::spatial::SurfaceWalker;
@@ -176,7 +177,7 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
     for k in 0..bands.lookups.len() {
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for v in mesh.vertices() {
-            let normal = if k == 0 { normals[v.index()] } else { mesh.area_normal(v).normalize_or_zero() };
+            let normal = if k == 0 { normals[v.index()] } else { mesh.unit_normal(v) };
             displacements[v.index()] = normal * detail[v.index()].lambdas[k];
         }
         guard.sync_with_edge(&mesh, super::typical_edge(&mesh));
@@ -212,9 +213,7 @@ fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId,
     let went = missing.clone();
     let mut neighbourhood: Vec<VertexId> = held_back.iter().map(|&(v, _)| v).collect();
     for _ in 0..SOFT_RINGS {
-        neighbourhood.extend(neighbourhood.clone().iter().flat_map(|&v| mesh.ring(v).as_slice()));
-        neighbourhood.sort_unstable();
-        neighbourhood.dedup();
+        mesh.add_neighbours(&mut neighbourhood);
         let mean = |v: VertexId| {
             let ring = mesh.ring(v).as_slice();
             ring.iter().map(|w| missing[w.index()]).sum::<f32>() / ring.len() as f32
@@ -243,7 +242,7 @@ const MAX_DEVIATION: f32 = 0.04;
 impl DetailSamples {
     fn new(surface: &Mesh, correspondence: &Correspondence, bands: &Bands) -> Self {
         let ids = (0..surface.slots()).map(VertexId::from_index);
-        let normals = ids.clone().map(|v| surface.area_normal(v).normalize_or_zero()).collect();
+        let normals = surface.unit_normals();
         let detail = ids.map(|v| match surface.is_live(v) {
             true => bands.detail_at(&correspondence[v.index()]),
             false => NOTHING,
@@ -269,18 +268,21 @@ impl DetailSamples {
     /// Splits edges at their midpoint, longest first: those that are longer than `longest` once displaced by their
     /// detail, and those whose displaced midpoint deviates as described at [`MAX_DEVIATION`].
     fn refine(&mut self, bands: &Bands, longest: f32) {
-        let mut splits: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
+        let (mut splits, mut middles) = (Vec::new(), Vec::new());
         for (u, v) in self.mesh.edges() {
             let (p, q) = (self.detailed_position(u), self.detailed_position(v));
             let middle = self.middle(bands, u, v);
             let deviation =
                 self.position_with(middle.position, middle.normal, &middle.detail).distance((p + q) * 0.5);
             if p.distance(q) > longest || deviation > MAX_DEVIATION * longest {
-                splits.push((p.distance_squared(q), u, v, middle));
+                splits.push((p.distance_squared(q), (u, v), middles.len()));
+                middles.push(middle);
             }
         }
-        splits.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        for (_, u, v, middle) in splits {
+        sort_by_rank(&mut splits, |&(_, (u, v), _)| combined_rank(u.0, v.0));
+        sort_by_rank(&mut splits, |&(square, ..)| (!rank_f32(square)).into());
+        for (_, (u, v), k) in splits {
+            let middle: &Sample = &middles[k];
             let Ok(w) = self.mesh.split(u, v, middle.position) else { continue };
             self.correspondence.resize(self.mesh.slots(), UNSET);
             self.normals.resize(self.mesh.slots(), Vec3::ZERO);

@@ -111,20 +111,14 @@ fn sweep(mesh: &Mesh, positions: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: 
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Returns the position of vertex `v` with the least energy, with all other vertices fixed at `positions`.
+/// Returns the position of vertex `v` with the least energy, with all other vertices fixed at `positions`: for
+/// [`Energy::Membrane`] the mean of its neighbours, by the umbrella operator p ← Σ pᵢ / n (Kobbelt, Bareuther & Seidel,
+/// equation 2).
 fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
     match energy {
-        Energy::Membrane => neighbour_mean(mesh, positions, v),
+        Energy::Membrane => mesh.ring(v).mean(positions),
         Energy::ThinPlate => min_bending_position(mesh, positions, v),
     }
-}
-
-/// Returns the mean position of the neighbours of `v`, where its energy is least for [`Energy::Membrane`], by the
-/// umbrella operator p ← Σ pᵢ / n (Kobbelt, Bareuther & Seidel, equation 2).
-#[inline]
-fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
-    let ring = mesh.ring(v).as_slice();
-    ring.iter().fold(Vec3::ZERO, |sum, w| sum + positions[w.index()]) * (1.0 / ring.len() as f32)
 }
 
 /// Returns the position of `v` with the least bending energy, all others fixed, for [`Energy::ThinPlate`]: p ← p −
@@ -132,7 +126,7 @@ fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
 /// neighbours pᵢ of p, and nᵢ that of pᵢ (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*,
 /// 1998).
 fn min_bending_position(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
-    let umbrella = |w: VertexId| neighbour_mean(mesh, positions, w) - positions[w.index()];
+    let umbrella = |w: VertexId| mesh.ring(w).mean(positions) - positions[w.index()];
     let ring = mesh.ring(v).as_slice();
     let share = 1.0 / ring.len() as f32;
     let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
@@ -156,7 +150,7 @@ pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) ->
     let mut sum = 0.0;
     for v in mesh.vertices() {
         let displacement = pushed(ellipsoids, minimiser(mesh, positions, energy, v)) - mesh.position(v);
-        let along = f64::from(displacement.dot(mesh.area_normal(v).normalize_or_zero()));
+        let along = f64::from(displacement.dot(mesh.unit_normal(v)));
         sum += along * along;
     }
     (sum / mesh.vertex_count().max(1) as f64).sqrt()

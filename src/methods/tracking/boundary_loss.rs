@@ -3,7 +3,7 @@
 //! a sheet without volume, which causes folds, so it is collapsed. Where a gap opens, the bright region advances faster
 //! than boundary points can attract the surface, so the surface grows into it.
 
-use super::frame_tracker::{FrameContext, FrameStatistics, FrameTracker, Support, neighbour_mean};
+use super::frame_tracker::{FrameContext, FrameStatistics, FrameTracker, Support};
 use super::project::Onto;
 use crate::math::Vec3;
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
@@ -89,12 +89,11 @@ impl FrameTracker {
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         let mut grown = Vec::new();
         for &(v, support) in &without_boundary {
-            let to_mean = neighbour_mean(mesh, v) - mesh.position(v);
+            let to_mean = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
             let grows = support == Support::Bright && sheets.binary_search(&v).is_err();
             displacements[v.index()] = to_mean;
             if grows {
-                displacements[v.index()] =
-                    mesh.area_normal(v).normalize_or_zero() * voxel + to_mean * SMOOTHING;
+                displacements[v.index()] = mesh.unit_normal(v) * voxel + to_mean * SMOOTHING;
                 grown.push(v);
             }
         }
@@ -136,8 +135,7 @@ fn without_boundary(mesh: &Mesh, context: &FrameContext) -> Vec<(VertexId, Suppo
 fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &FrameContext) -> Vec<VertexId> {
     let thickness = (THICKNESS * context.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();
-    let normals: Vec<Vec3> =
-        without_boundary.iter().map(|&(v, _)| mesh.area_normal(v).normalize_or_zero()).collect();
+    let normals: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.unit_normal(v)).collect();
     let grid = PointGrid::of(&positions, thickness);
     let has_opposite = |i: usize| {
         let mut found = false;

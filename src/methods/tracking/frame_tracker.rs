@@ -186,7 +186,7 @@ impl FrameTracker {
         let bends = curvature(&mesh.to_triangles()).mean;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for (v, bend) in mesh.vertices().zip(bends) {
-            displacements[v.index()] = mesh.area_normal(v).normalize_or_zero() * (spread * bend as f32);
+            displacements[v.index()] = mesh.unit_normal(v) * (spread * bend as f32);
         }
         displacements =
             (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements));
@@ -206,7 +206,7 @@ impl FrameTracker {
             }
             let mut displacements = vec![Vec3::ZERO; mesh.slots()];
             for v in folds.into_iter().flatten() {
-                displacements[v.index()] = neighbour_mean(mesh, v) - mesh.position(v);
+                displacements[v.index()] = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
             }
             self.move_vertices(mesh, displacements);
             folds = folded(mesh);
@@ -290,16 +290,11 @@ fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<V
 fn tangential_displacements(mesh: &Mesh) -> Vec<Vec3> {
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
-        let normal = mesh.area_normal(v).normalize_or_zero();
-        let displacement = neighbour_mean(mesh, v) - mesh.position(v);
+        let normal = mesh.unit_normal(v);
+        let displacement = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
         displacements[v.index()] = (displacement - normal * normal.dot(displacement)) * SPACING;
     }
     displacements
-}
-
-pub(super) fn neighbour_mean(mesh: &Mesh, v: VertexId) -> Vec3 {
-    let ring = mesh.ring(v).as_slice();
-    ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }
 
 /// Returns for each vertex the mean of its neighbours' displacements, indexed by vertex slot, to smooth displacements
@@ -307,9 +302,7 @@ pub(super) fn neighbour_mean(mesh: &Mesh, v: VertexId) -> Vec3 {
 fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; displacements.len()];
     for v in mesh.vertices() {
-        let ring = mesh.ring(v).as_slice();
-        out[v.index()] =
-            ring.iter().fold(Vec3::ZERO, |sum, w| sum + displacements[w.index()]) * (1.0 / ring.len() as f32);
+        out[v.index()] = mesh.ring(v).mean(displacements);
     }
     out
 }

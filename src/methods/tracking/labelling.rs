@@ -9,6 +9,7 @@
 
 use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
+use crate::math::ConjugateGradients;
 
 /// Smallest weight of a face between two voxels, the share of windows that vote for it, with which the face counts as
 /// part of a wall between bright and dark.
@@ -131,32 +132,22 @@ fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) ->
 /// Solves the Poisson equation of the labelling for the image whose graph Laplacian, see [`laplacian`], is `source`, by
 /// conjugate gradients.
 fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let mut solution = vec![0.0; source.len()];
-    let mut residual = source;
-    let mut direction = residual.clone();
-    let mut square = dot(&residual, &residual);
-    let enough = TOLERANCE * TOLERANCE * square;
-    let mut product = vec![0.0; direction.len()];
+    // Without a preconditioner.
+    let same = |residual: &mut [f64]| residual.to_vec();
+    let mut gradients = ConjugateGradients::new(vec![0.0; source.len()], source, same);
+    let enough = TOLERANCE * TOLERANCE * gradients.energy();
     for _ in 0..ITERATIONS {
-        if square <= enough {
+        if gradients.energy() <= enough || !gradients.iterate(|x| laplacian(dims, x), same) {
             break;
         }
-        laplacian(dims, &direction, &mut product);
-        let step = square / dot(&direction, &product);
-        solution.iter_mut().zip(&direction).for_each(|(x, p)| *x += step * p);
-        residual.iter_mut().zip(&product).for_each(|(r, q)| *r -= step * q);
-        let next = dot(&residual, &residual);
-        direction.iter_mut().zip(&residual).for_each(|(p, r)| *p = r + next / square * *p);
-        square = next;
     }
-    solution
+    gradients.into_solution()
 }
 
-/// Writes for each voxel of a box to `out` the sum of its differences from its neighbours, its own entry in `values`
-/// minus theirs: the graph Laplacian.
-fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
-    out.fill(0.0);
+/// Returns for each voxel of a box the sum of its differences from its neighbours, its own entry in `values` minus
+/// theirs: the graph Laplacian.
+fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; values.len()];
     let mut add = |i: usize, j: usize| {
         let difference = values[i] - values[j];
         out[i] += difference;
@@ -174,6 +165,7 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
             }
         }
     }
+    out
 }
 
 /// Extends values that are known at some voxels of a box to all: each voxel takes the value of the known voxel fewest

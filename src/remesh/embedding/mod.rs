@@ -26,7 +26,7 @@ mod patch;
 mod refine;
 mod separate;
 
-use crate::math::{Bounds, DAffine3, Vec3, higher};
+use crate::math::{Bounds, DAffine3, Vec3, higher, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
@@ -309,9 +309,7 @@ impl Embedding {
         }
         // Edges of the neighbours of moved vertices may have become longer.
         for corners in changed {
-            let [a, b, c] = corners.map(|v| mesh.position(v));
-            let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-            let edge = square.sqrt();
+            let edge = triangle::longest_edge_squared(corners.map(|v| mesh.position(v))).sqrt();
             for &v in corners {
                 self.forget(v);
                 let longest = &mut self.longest[v.index()];

@@ -40,7 +40,7 @@ impl Embedding {
     /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet. Returns whether one
     /// of these succeeded.
     fn separate_cluster(&mut self, mesh: &mut Mesh, cluster: &[VertexId]) -> bool {
-        let normal = |v: VertexId| mesh.area_normal(v).normalize_or_zero() * self.ordinary_edge;
+        let normal = |v: VertexId| mesh.unit_normal(v) * self.ordinary_edge;
         let all: Moves = cluster.iter().map(|&v| (v, normal(v))).collect();
         let facing = |displacement: Vec3| -> Moves {
             all.iter().copied().filter(|(_, normal)| normal.dot(displacement) > 0.0).collect()

@@ -41,7 +41,7 @@ impl<'a, E: EditPolicy> Session<'a, E> {
     pub fn new(surface: &'a Mesh, target_edge: f32, free: Vec<bool>, edits: E) -> Self {
         let slots = surface.slots();
         let anchors = (0..slots).map(VertexId::from_index).collect();
-        let normals = unit_normals(surface);
+        let normals = surface.unit_normals();
         Self {
             surface,
             normals,
@@ -177,11 +177,4 @@ impl<E: EditPolicy> EditPolicy for Session<'_, E> {
         self.anchors[new.index()] = self.anchors[u.index()];
         self.deviation[new.index()] = self.deviation[u.index()];
     }
-}
-
-/// Returns the unit vertex normals of a mesh, by slot; zero at vertices without area.
-fn unit_normals(surface: &Mesh) -> Vec<Vec3> {
-    (0..surface.slots())
-        .map(|slot| surface.area_normal(VertexId::from_index(slot)).normalize_or_zero())
-        .collect()
 }

@@ -5,7 +5,8 @@
 //! of Φ+Λ.
 
 use super::precondition::SparseInverse;
-use crate::methods::implicit::vectors::{add, dot};
+use crate::math::ConjugateGradients;
+use crate::math::vectors::{add, dot};
 
 /// The matrix B of the polynomials at the centres and its product MB with the preconditioner, both by columns; used to
 /// project weights onto those orthogonal to the polynomials.
@@ -49,23 +50,36 @@ impl Polynomials {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, preconditioned)).collect();
         self.inverse.chunks_exact(moments.len()).map(|row| dot(row, &moments)).collect()
     }
+
+    /// Changes the polynomials' `coefficients` such that the `residual` r is least in the norm of the preconditioner M,
+    /// given by its factor `inverse`. Returns Mr, which is then orthogonal to the polynomials.
+    fn project_residual(
+        &self,
+        residual: &mut [f64],
+        coefficients: &mut [f64],
+        inverse: &SparseInverse,
+    ) -> Vec<f64> {
+        let mut preconditioned = inverse.product(residual);
+        let more = self.coefficients(&preconditioned);
+        let columns = self.columns.iter().zip(&self.preconditioned);
+        for ((c, &extra), (column, column_image)) in coefficients.iter_mut().zip(&more).zip(columns) {
+            *c += extra;
+            add(-extra, column, residual);
+            add(-extra, column_image, &mut preconditioned);
+        }
+        preconditioned
+    }
 }
 
 /// The state of the conjugate gradient iteration for the weights and polynomial coefficients of an implicit function.
 #[derive(Clone, Debug)]
-pub struct ConjugateGradients {
-    /// The weights w found so far, one per row of the linear system.
-    pub weights: Vec<f64>,
+pub struct ProjectedGradients {
+    gradients: ConjugateGradients,
     /// The polynomial coefficients p found so far, one per polynomial.
     pub coefficients: Vec<f64>,
-    /// The residual y − (Φ+Λ)w − Bp of the linear system, one entry per row.
-    pub residual: Vec<f64>,
-    direction: Vec<f64>,
-    /// Squared norm of the residual r in the norm of the preconditioner M: rᵀMr.
-    energy: f64,
 }
 
-impl ConjugateGradients {
+impl ProjectedGradients {
     /// Starts the iteration from `weights`, which must be orthogonal to the polynomials; `residual` is y − (Φ+Λ)w for
     /// these weights.
     pub fn new(
@@ -74,12 +88,26 @@ impl ConjugateGradients {
         polynomials: &Polynomials,
         inverse: &SparseInverse,
     ) -> Self {
-        let coefficients = vec![0.0; polynomials.columns.len()];
-        let mut start = Self { weights, coefficients, residual, direction: Vec::new(), energy: 0.0 };
-        let preconditioned = start.project_residual(polynomials, inverse);
-        start.energy = dot(&start.residual, &preconditioned);
-        start.direction = preconditioned;
-        start
+        let mut coefficients = vec![0.0; polynomials.columns.len()];
+        let gradients = ConjugateGradients::new(weights, residual, |residual| {
+            polynomials.project_residual(residual, &mut coefficients, inverse)
+        });
+        Self { gradients, coefficients }
+    }
+
+    /// Returns the weights w found so far, one per row of the linear system.
+    pub fn weights(&self) -> &[f64] {
+        self.gradients.solution()
+    }
+
+    /// Returns the weights w found so far, and ends the iteration.
+    pub fn into_weights(self) -> Vec<f64> {
+        self.gradients.into_solution()
+    }
+
+    /// Returns the residual y − (Φ+Λ)w − Bp of the linear system, one entry per row.
+    pub fn residual(&self) -> &[f64] {
+        self.gradients.residual()
     }
 
     /// Does one iteration, which improves weights and coefficients; `product` multiplies a vector by Φ+Λ. Returns false
@@ -90,34 +118,8 @@ impl ConjugateGradients {
         polynomials: &Polynomials,
         inverse: &SparseInverse,
     ) -> bool {
-        let preconditioned = product(&self.direction);
-        let curvature = dot(&self.direction, &preconditioned);
-        if curvature <= 0.0 || self.energy <= 0.0 {
-            return false;
-        }
-        let step = self.energy / curvature;
-        add(step, &self.direction, &mut self.weights);
-        add(-step, &preconditioned, &mut self.residual);
-        let preconditioned = self.project_residual(polynomials, inverse);
-        let energy = dot(&self.residual, &preconditioned);
-        let ratio = energy / self.energy;
-        self.energy = energy;
-        self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + ratio * *d);
-        true
-    }
-
-    /// Changes the polynomials' coefficients such that the residual r is least in the norm of the preconditioner M.
-    /// Returns Mr, which is then orthogonal to the polynomials.
-    fn project_residual(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
-        let mut preconditioned = inverse.product(&self.residual);
-        let more = polynomials.coefficients(&preconditioned);
-        let columns = polynomials.columns.iter().zip(&polynomials.preconditioned);
-        for ((c, &extra), (column, column_image)) in self.coefficients.iter_mut().zip(&more).zip(columns) {
-            *c += extra;
-            add(-extra, column, &mut self.residual);
-            add(-extra, column_image, &mut preconditioned);
-        }
-        preconditioned
+        let Self { gradients, coefficients } = self;
+        gradients.iterate(product, |residual| polynomials.project_residual(residual, coefficients, inverse))
     }
 }
 

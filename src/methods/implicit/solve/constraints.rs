@@ -1,7 +1,7 @@
 //! Constraints on the implicit function: centres, prescribed values and regularisation λ.
 
 use super::Solution;
-use crate::math::{Bounds, Vec3};
+use crate::math::{Bounds, PositionIndex, Vec3};
 use crate::methods::implicit::cloud::Cloud;
 
 /// The constraints on the implicit function: its values at some centres, and how much each value may be missed.
@@ -51,9 +51,9 @@ impl Constraints {
     /// Returns a centre that two constraints share, or `None` if all centres are distinct, as the linear system
     /// requires.
     pub fn shared_centre(&self) -> Option<Vec3> {
-        let found = PositionIndex::new(&self.centres).0;
-        let shared = found.windows(2).find(|pair| pair[0].0 == pair[1].0);
-        shared.map(|pair| self.centres[pair[0].1 as usize])
+        let index = PositionIndex::new(&self.centres);
+        let shared = index.distinct().find(|constraints| constraints.len() > 1);
+        shared.and_then(|mut constraints| constraints.next()).map(|i| self.centres[i as usize])
     }
 
     /// Returns the radius of a ball that contains all centres, in units of the normalised box; some kernels depend on
@@ -74,27 +74,3 @@ impl Constraints {
 /// Number of surface constraints for which the usual values of λ are meant (Dinh, Turk & Slabaugh, section VI-B); with
 /// more constraints, λ is increased.
 const USUAL_POINTS: f64 = 3000.0;
-
-/// Points sorted by position, with their indices, to find the one that equals a given point.
-pub struct PositionIndex(Vec<([u32; 3], u32)>);
-
-impl PositionIndex {
-    /// Builds the index of `points` for [`Self::find`].
-    pub fn new(points: &[Vec3]) -> Self {
-        let mut all: Vec<([u32; 3], u32)> = points.iter().map(|&p| bits(p)).zip(0..).collect();
-        all.sort_unstable();
-        Self(all)
-    }
-
-    /// Returns the index, in the list given to [`Self::new`], of the first point that equals `p`; `None` if there is
-    /// none.
-    pub fn find(&self, p: Vec3) -> Option<usize> {
-        let at = self.0.partition_point(|(position, _)| *position < bits(p));
-        self.0.get(at).filter(|(position, _)| *position == bits(p)).map(|&(_, i)| i as usize)
-    }
-}
-
-/// Returns a key of a point for sorting that is the same for equal points; −0 equals 0.
-fn bits(p: Vec3) -> [u32; 3] {
-    p.to_array().map(|x| (x + 0.0).to_bits())
-}

@@ -3,9 +3,9 @@
 
 use super::clusters::{Cluster, ClusterTree};
 use crate::math::DVec3;
+use crate::math::vectors::{MatrixScalar, add, dot};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
-use crate::methods::implicit::vectors::{MatrixScalar, add, dot};
 use std::ops::Range;
 
 /// Admissibility: two clusters count as far, and their block of the matrix is approximated by low rank, if they do not

@@ -14,11 +14,11 @@ mod hierarchical;
 mod precondition;
 mod system;
 
-pub use constraints::{Constraints, PositionIndex};
+pub use constraints::Constraints;
 
 use super::kernel::Kernel;
-use super::vectors::norm;
-use conjugate::{ConjugateGradients, Polynomials};
+use crate::math::vectors::norm;
+use conjugate::{Polynomials, ProjectedGradients};
 use serde::{Deserialize, Serialize};
 use system::{System, WORK};
 
@@ -74,13 +74,13 @@ pub struct Solver {
 #[derive(Clone, Debug)]
 enum Stage {
     Build,
-    Iterate(Box<Polynomials>, ConjugateGradients),
+    Iterate(Box<Polynomials>, ProjectedGradients),
     /// Recomputing the residuals of some rows from the kernel, as an estimate for all rows; holds those of the rows
     /// done so far.
-    Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
+    Check(Box<Polynomials>, ProjectedGradients, Vec<f64>),
     /// Recomputing y − (Φ+Λ)w for all rows from the kernel; holds the entries of the rows done so far.
-    RecomputeResidual(Box<Polynomials>, ConjugateGradients, Vec<f64>),
-    Done(ConjugateGradients),
+    RecomputeResidual(Box<Polynomials>, ProjectedGradients, Vec<f64>),
+    Done(ProjectedGradients),
 }
 
 impl Solver {
@@ -158,7 +158,7 @@ impl Solver {
     /// Returns the solution of the linear system once [`Self::advance`] has returned true, `None` before.
     pub fn solution(&self) -> Option<Solution> {
         let Stage::Done(gradients) = &self.stage else { return None };
-        let weights = self.system.to_constraints(&gradients.weights);
+        let weights = self.system.to_constraints(gradients.weights());
         Some(Solution { weights, coefficients: gradients.coefficients.clone() })
     }
 
@@ -209,23 +209,23 @@ impl Solver {
         let start = polynomials.project(start);
         let mut residual = self.system.product(&start);
         residual.iter_mut().zip(self.system.values()).for_each(|(r, y)| *r = y - *r);
-        let gradients = ConjugateGradients::new(start, residual, &polynomials, self.system.inverse());
+        let gradients = ProjectedGradients::new(start, residual, &polynomials, self.system.inverse());
         Ok(Stage::Iterate(Box::new(polynomials), gradients))
     }
 
     fn iterate(
         &mut self,
         polynomials: Box<Polynomials>,
-        mut gradients: ConjugateGradients,
+        mut gradients: ProjectedGradients,
     ) -> Result<Stage, Singular> {
         let system = &self.system;
         let size = norm(system.values());
-        self.residual = norm(&gradients.residual) / size;
+        self.residual = norm(gradients.residual()) / size;
         if self.residual > ITERATE_TO * self.tolerance && self.iterations < MAX_ITERATIONS * (self.rounds + 1)
         {
             let moved = gradients.iterate(|x| system.product(x), &polynomials, system.inverse());
             self.iterations += 1;
-            self.residual = norm(&gradients.residual) / size;
+            self.residual = norm(gradients.residual()) / size;
             if !self.residual.is_finite() {
                 return Err(Singular);
             }
@@ -239,7 +239,7 @@ impl Solver {
     fn check(
         &mut self,
         polynomials: Box<Polynomials>,
-        gradients: ConjugateGradients,
+        gradients: ProjectedGradients,
         mut found: Vec<f64>,
     ) -> Result<Stage, Singular> {
         let count = self.system.len();
@@ -247,7 +247,7 @@ impl Solver {
         let total = rows.len();
         for i in rows.skip(found.len()).take(WORK / count + 1) {
             let polynomial = polynomials.value(i, &gradients.coefficients);
-            found.push(self.system.row_residual(i, &gradients.weights) - polynomial);
+            found.push(self.system.row_residual(i, gradients.weights()) - polynomial);
         }
         if found.len() < total {
             return Ok(Stage::Check(polynomials, gradients, found));
@@ -270,17 +270,17 @@ impl Solver {
     fn recompute_residual(
         &mut self,
         polynomials: Box<Polynomials>,
-        gradients: ConjugateGradients,
+        gradients: ProjectedGradients,
         mut found: Vec<f64>,
     ) -> Stage {
         let count = self.system.len();
         let rows = (found.len()..count).take(WORK / count + 1);
-        found.extend(rows.map(|i| self.system.row_residual(i, &gradients.weights)));
+        found.extend(rows.map(|i| self.system.row_residual(i, gradients.weights())));
         if found.len() < count {
             return Stage::RecomputeResidual(polynomials, gradients, found);
         }
         let inverse = self.system.inverse();
-        let gradients = ConjugateGradients::new(gradients.weights, found, &polynomials, inverse);
+        let gradients = ProjectedGradients::new(gradients.into_weights(), found, &polynomials, inverse);
         Stage::Iterate(polynomials, gradients)
     }
 }
@@ -298,7 +298,7 @@ pub struct SolverPosition {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DVec3, Random, Vec3};
+    use crate::math::{DVec3, PositionIndex, Random, Vec3};
     use crate::methods::implicit::cloud::Cloud;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;

@@ -1,12 +1,12 @@
 //! The matrix of the linear system and its preconditioner, and their revision for a few changed constraints.
 
 use super::clusters::ClusterTree;
-use super::constraints::{Constraints, PositionIndex};
+use super::constraints::Constraints;
 use super::hierarchical::HierarchicalMatrix;
 use super::precondition::SparseInverse;
-use crate::math::{DVec3, Random, Vec3};
+use crate::math::vectors::{add, dot};
+use crate::math::{DVec3, PositionIndex, Random, Vec3};
 use crate::methods::implicit::kernel::{Kernel, KernelTable};
-use crate::methods::implicit::vectors::{add, dot};
 
 /// Amount of work that the solver does in one slice, in evaluations of the kernel or their equivalent: about ten
 /// milliseconds.
