@@ -146,7 +146,7 @@ pub enum ParamKind {
     Number,
     /// An integer from [`ParamSpec::min`] to [`ParamSpec::max`].
     Integer,
-    /// One of the words in [`ParamSpec::choices`], or a number if [`ParamSpec::min`] is set.
+    /// One of the words in [`choices`](field@ParamSpec::choices), or a number if [`ParamSpec::min`] is set.
     Choice,
     /// On or off, as a Boolean.
     Boolean,
@@ -158,7 +158,7 @@ pub enum ParamKind {
 pub enum ParamDefault {
     /// The default of a numerical parameter.
     Number(f64),
-    /// The default of a choice, one of the words in [`ParamSpec::choices`].
+    /// The default of a choice, one of the words in [`choices`](field@ParamSpec::choices).
     Choice(&'static str),
     /// The default of a parameter that is on or off.
     Boolean(bool),
