@@ -527,7 +527,7 @@ describe('a link', () => {
     await app.page.evaluate(() => {
       location.hash = '#reconstruct?example=nowhere';
     });
-    await expect.poll(() => text('.banner')).toContain('no example “nope”');
+    await expect.poll(() => text('.banner')).toContain('no example “nowhere”');
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');
   });
 
