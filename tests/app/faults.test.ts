@@ -1,7 +1,7 @@
 import { gzipSync } from 'node:zlib';
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { randomNumbers } from '../js/random.mjs';
+import { randomNumbers } from '../../bench/random.mjs';
 import {
   type App,
   anotherPage,
