@@ -66,17 +66,20 @@ async function titleOf(folder: string, address = ''): Promise<void> {
   }
 }
 
-test('Vite', async () => {
+/** Entry points with the deformable model, which the pages run. */
+const ENTRIES = ['vesicle', 'vesicle/deformable'];
+
+test.each(ENTRIES)('Vite, %s', async (entry) => {
   await write('index.html', page('<script type="module" src="./main.js"></script>'));
-  await write('main.js', main('vesicle'));
+  await write('main.js', main(entry));
   const { build } = await import('vite');
   const target = { target: 'es2022', outDir: join(project, 'dist/vite') };
   await build({ root: project, configFile: false, logLevel: 'error', build: target });
   await titleOf('dist/vite');
 });
 
-test('webpack', async () => {
-  await write('main.js', main('vesicle'));
+test.each(ENTRIES)('webpack, %s', async (entry) => {
+  await write('main.js', main(entry));
   const { default: webpack } = await import('webpack');
   const output = { path: join(project, 'dist/webpack'), publicPath: '', filename: 'main.js' };
   const compiler = webpack({
@@ -124,8 +127,8 @@ test('esbuild with the module inside, without an address', async () => {
   await titleOf('dist/esbuild-inline');
 });
 
-test('a plain page without a bundler', async () => {
-  await write('plain.html', page(`<script type="module">${main('./node_modules/vesicle/index.js')}</script>`));
+test.each(['', 'deformable/'])('a plain page without a bundler, %sindex.js', async (folder) => {
+  await write('plain.html', page(`<script type="module">${main(`./node_modules/vesicle/${folder}index.js`)}</script>`));
   await titleOf('.', 'plain.html');
 });
 
