@@ -7,6 +7,7 @@ export async function bundle(name, entry, plugins, minify) {
   // Imported here because set-up installs it: on a fresh machine there is no Vite when this file is read.
   const { build } = await import('vite');
   const outDir = at('target', name);
+  const { NODE_ENV } = process.env;
   await build({
     ...{ configFile: false, logLevel: 'warn', publicDir: false, plugins },
     build: {
@@ -14,5 +15,7 @@ export async function bundle(name, entry, plugins, minify) {
       lib: { entry: at(entry), formats: ['es'], fileName: () => `${name}.js` },
     },
   });
+  // Vite sets it to `production`, also for all programs that this process starts later.
+  if (NODE_ENV === undefined) delete process.env.NODE_ENV;
   await copyFile(at('target', name, `${name}.js`), at('pkg', `${name}.js`));
 }
