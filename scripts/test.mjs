@@ -115,7 +115,21 @@ const LONG = [
   [
     [
       ['features', works(checkFeatures), 120],
-      ['scenes', cargoTests('--release', '--test', 'core', 'scenes::', '--', '--ignored', '--show-output'), 900],
+      [
+        'slow',
+        cargoTests(
+          '--release',
+          '--test',
+          'core',
+          '--',
+          'scenes::',
+          'tracking::',
+          'fuzz::',
+          '--ignored',
+          '--show-output',
+        ),
+        900,
+      ],
       ['slow wasm', cargoTests('--lib', '--tests', ...WASM, '--', '--ignored'), 900],
     ],
   ],

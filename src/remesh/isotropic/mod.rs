@@ -55,14 +55,18 @@ const INPUT_TEST_RUN: usize = 1;
 ///
 /// Edges become about √(min max) long. Vertices lie on the input surface, except for midpoints of edges split last, and
 /// for vertices moved to separate sheets, by up to a fifth of `max` along their normals or to the mean of their
-/// neighbours. No self-intersections are added; if the input has some, edges may stay out of bounds. Attributes are
-/// blended by collapses and splits; moves do not change them.
+/// neighbours. No self-intersections are added; if the input has some, edges may stay out of bounds, and a mesh collapsed
+/// to one point stays unchanged. Attributes are blended by collapses and splits; moves do not change them.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
 /// [`MeshError::TooLarge`] if more than eight million vertices would be needed. The mesh is unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
+    // A mesh collapsed to one point has no surface; every edit would be tested against all its triangles.
+    if is_one_point(mesh) {
+        return Ok(Changes::default());
+    }
     let before = mesh.clone();
     // Scaled to edges of about 1, whose squares neither over- nor underflow; by a power of two, which is exact.
     let (_, exponent) = libm::frexpf(bounds.max);
@@ -77,6 +81,13 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     mesh.reorder();
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
     Ok(changes)
+}
+
+/// Returns whether all vertices of a mesh have the same position, or there are none.
+fn is_one_point(mesh: &Mesh) -> bool {
+    let mut positions = mesh.vertices().map(|v| mesh.position(v));
+    let first = positions.next();
+    positions.all(|position| Some(position) == first)
 }
 
 /// The largest exponent of two by which lengths are scaled before remeshing and back afterwards, so that both factors
