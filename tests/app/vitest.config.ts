@@ -3,8 +3,8 @@ import { defineConfig } from 'vitest/config';
 
 const at = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 
-/** Tests that count frames, or measure how soon a page responds. */
-const ALONE = ['frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
+/** Tests that count frames, measure how soon a page responds, or pause a run that takes a second. */
+const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
 
 export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
