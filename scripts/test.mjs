@@ -89,14 +89,14 @@ const GROUPS = [
         15,
       ],
       // Shows the tests' measurements in the log.
-      ['native', cargoTests('--', '--show-output'), 240],
+      ['native', cargoTests('--', '--show-output'), 300],
     ],
   ],
   [
     // Has one thread only.
-    [['wasm', cargoTests('--lib', '--tests', ...WASM), 420]],
+    [['wasm', cargoTests('--lib', '--tests', ...WASM), 540]],
     [
-      ['build', works(build), 360],
+      ['build', works(build), 600],
       ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
       ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
@@ -107,7 +107,7 @@ const GROUPS = [
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
     ],
   ],
-  [[['app', vitest('tests/app'), 420]]],
+  [[['app', vitest('tests/app'), 480]]],
 ];
 
 /** Stages that only `npm run test:all` runs: too long for every change. */
