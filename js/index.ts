@@ -12,34 +12,10 @@ import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingP
 export * from './common.js';
 export { default } from './common.js';
 export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';
-export {
-  type Attractor,
-  DeformableModel,
-  type DeformableOptions,
-  type DeformableParams,
-  type DeformableStart,
-} from './deformable.js';
-export {
-  type Camera,
-  type Fitness,
-  type ImplicitOptions,
-  type ImplicitParams,
-  ImplicitSurface,
-  type PointEdits,
-  parsePoints,
-} from './implicit.js';
-export {
-  type ControlEllipsoid,
-  type MultiresOptions,
-  MultiresolutionModel,
-  type MultiresParams,
-} from './multires.js';
-export {
-  type FrameStatistics,
-  SurfaceTracker,
-  type TrackingOptions,
-  type TrackingParams,
-} from './tracking.js';
+export * from './deformable.js';
+export * from './implicit.js';
+export * from './multires.js';
+export * from './tracking.js';
 
 const specsOf = paramSpecsOf({
   deformable: deformableParamSpecs,

@@ -5,7 +5,7 @@ import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { makeElement } from './element.mjs';
-import { ENTRIES, makeEntries } from './entries.mjs';
+import { METHODS, makeEntries } from './entries.mjs';
 import { makeInline } from './inline.mjs';
 import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
@@ -26,8 +26,8 @@ const only = (method, target) => ({ target, name: `${method}/vesicle_bg`, featur
 
 /** Modules by lane; the lanes are compiled in parallel, since each module is linked by one thread. */
 const LANES = [
-  [WHOLE, ...ENTRIES.slice(0, 2).map((method) => only(method, 'target'))],
-  [PLAIN, ...ENTRIES.slice(2).map((method) => only(method, 'target/methods'))],
+  [WHOLE, ...METHODS.slice(0, 2).map((method) => only(method, 'target'))],
+  [PLAIN, ...METHODS.slice(2).map((method) => only(method, 'target/methods'))],
 ];
 
 const MODULES = LANES.flat();
@@ -133,7 +133,7 @@ async function manifest() {
     types: './index.d.ts',
     exports: {
       '.': { types: './index.d.ts', default: './index.js' },
-      ...Object.fromEntries(ENTRIES.flatMap(entry)),
+      ...Object.fromEntries(METHODS.flatMap(entry)),
       './inline': { types: './index.d.ts', default: './inline.js' },
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },

@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { at } from './shell.mjs';
 
 /** The methods, each of which has an entry point. */
-export const ENTRIES = ['deformable', 'implicit', 'tracking', 'multires'];
+export const METHODS = ['deformable', 'implicit', 'tracking', 'multires'];
 
 /**
  * Returns a plugin that takes the glue and the location of the module from the entry point's own files, and the classes
@@ -49,6 +49,6 @@ async function makeEntry(method, glue) {
 
 /** Writes `pkg/<method>` for all methods; needs the compiled TypeScript. `glueOf` returns the folder of a method's glue. */
 export async function makeEntries(glueOf) {
-  for (const method of ENTRIES) await makeEntry(method, glueOf(method));
+  for (const method of METHODS) await makeEntry(method, glueOf(method));
   await rm(at('pkg/entries'), { recursive: true });
 }

@@ -2,7 +2,7 @@
 // with.
 import { readFile, writeFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
-import { ENTRIES as METHODS } from './entries.mjs';
+import { METHODS } from './entries.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
 const MODULES = ['vesicle_bg.wasm', 'vesicle_plain_bg.wasm', ...METHODS.map((method) => `${method}/vesicle_bg.wasm`)];

@@ -110,26 +110,15 @@ const GROUPS = [
   [[['app', vitest('tests/app'), 480]]],
 ];
 
+/** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
+const SLOW = ['scenes::', 'tracking::', 'fuzz::'];
+
 /** Stages that only `npm run test:all` runs: too long for every change. */
 const LONG = [
   [
     [
       ['features', works(checkFeatures), 120],
-      [
-        'slow',
-        cargoTests(
-          '--release',
-          '--test',
-          'core',
-          '--',
-          'scenes::',
-          'tracking::',
-          'fuzz::',
-          '--ignored',
-          '--show-output',
-        ),
-        900,
-      ],
+      ['slow', cargoTests(...['--release', '--test', 'core', '--', '--ignored', '--show-output', ...SLOW]), 900],
       ['slow wasm', cargoTests('--lib', '--tests', ...WASM, '--', '--ignored'), 900],
     ],
   ],

@@ -13,13 +13,7 @@ import { deformableParamSpecs } from '../vesicle.js';
 export * from '../common.js';
 export { default } from '../common.js';
 export type { Coverage, CoverageOptions, UncoveredRegion } from '../coverage.js';
-export {
-  type Attractor,
-  DeformableModel,
-  type DeformableOptions,
-  type DeformableParams,
-  type DeformableStart,
-} from '../deformable.js';
+export * from '../deformable.js';
 
 const specsOf = paramSpecsOf({ deformable: deformableParamSpecs });
 

@@ -12,15 +12,7 @@ import { implicitParamSpecs } from '../vesicle.js';
 
 export * from '../common.js';
 export { default } from '../common.js';
-export {
-  type Camera,
-  type Fitness,
-  type ImplicitOptions,
-  type ImplicitParams,
-  ImplicitSurface,
-  type PointEdits,
-  parsePoints,
-} from '../implicit.js';
+export * from '../implicit.js';
 
 const specsOf = paramSpecsOf({ implicit: implicitParamSpecs });
 

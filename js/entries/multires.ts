@@ -12,12 +12,7 @@ import { multiresParamSpecs } from '../vesicle.js';
 
 export * from '../common.js';
 export { default } from '../common.js';
-export {
-  type ControlEllipsoid,
-  type MultiresOptions,
-  MultiresolutionModel,
-  type MultiresParams,
-} from '../multires.js';
+export * from '../multires.js';
 
 const specsOf = paramSpecsOf({ multires: multiresParamSpecs });
 

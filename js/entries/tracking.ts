@@ -12,12 +12,7 @@ import { trackingParamSpecs } from '../vesicle.js';
 
 export * from '../common.js';
 export { default } from '../common.js';
-export {
-  type FrameStatistics,
-  SurfaceTracker,
-  type TrackingOptions,
-  type TrackingParams,
-} from '../tracking.js';
+export * from '../tracking.js';
 
 const specsOf = paramSpecsOf({ tracking: trackingParamSpecs });
 

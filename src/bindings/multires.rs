@@ -37,13 +37,11 @@ impl LiveSurface for BaseView {
     }
 
     fn counts(&self) -> [usize; 2] {
-        let model = self.model.borrow();
-        [model.base_mesh().vertex_count(), model.base_mesh().triangle_count()]
+        self.model.borrow().base_mesh().counts()
     }
 
     fn versions(&self) -> [u32; 2] {
-        let model = self.model.borrow();
-        [model.base_mesh().topology_version(), model.base_mesh().geometry_version()]
+        self.model.borrow().base_mesh().versions()
     }
 }
 

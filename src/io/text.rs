@@ -108,8 +108,8 @@ impl Field<'_> {
         value.ok_or_else(|| self.invalid(&format!("must be an integer of at least {least}")))
     }
 
-    /// Parses the field as a single non-negative integer, an offset into a file; one that cannot be addressed becomes
-    /// the largest `usize`, past the end of any file.
+    /// Parses the field as a single non-negative integer, an offset into a file; an offset beyond `usize` becomes the
+    /// largest `usize`, which is past the end of any file.
     ///
     /// # Errors
     /// Any other text.

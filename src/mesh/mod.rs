@@ -121,6 +121,16 @@ impl Mesh {
         self.geometry_version
     }
 
+    /// Returns the numbers of vertices and triangles.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.vertex_count(), self.triangle_count()]
+    }
+
+    /// Returns the topology version and the geometry version, by which caches tell whether they are out of date.
+    pub fn versions(&self) -> [u32; 2] {
+        [self.topology_version, self.geometry_version]
+    }
+
     /// Advances both version counters beyond those of `replaced`, the mesh that this one replaces, so that caches built
     /// for `replaced` are invalidated.
     pub fn advance_versions_past(&mut self, replaced: &Self) {

@@ -145,28 +145,14 @@ impl Image {
         for y in 0..(RADIUS).min(height) {
             sums.iter_mut().zip(row(y)).for_each(|(sum, v)| *sum += v);
         }
-        for (y, to) in out.values.chunks_exact_mut(width).enumerate() {
-            let entering = (y + RADIUS < height).then(|| row(y + RADIUS));
-            let leaving = (y > RADIUS).then(|| row(y - RADIUS - 1));
-            let columns = sums.iter_mut().zip(to);
-            match (entering, leaving) {
-                (Some(entering), Some(leaving)) => {
-                    for (((sum, to), entering), leaving) in columns.zip(entering).zip(leaving) {
-                        *sum += entering;
-                        *sum -= leaving;
-                        *to = *sum;
-                    }
-                }
-                (Some(entering), None) => columns.zip(entering).for_each(|((sum, to), v)| {
-                    *sum += v;
-                    *to = *sum;
-                }),
-                (None, Some(leaving)) => columns.zip(leaving).for_each(|((sum, to), v)| {
-                    *sum -= v;
-                    *to = *sum;
-                }),
-                (None, None) => columns.for_each(|(sum, to)| *to = *sum),
+        for y in 0..height {
+            if y + RADIUS < height {
+                sums.iter_mut().zip(row(y + RADIUS)).for_each(|(sum, v)| *sum += v);
             }
+            if y > RADIUS {
+                sums.iter_mut().zip(row(y - RADIUS - 1)).for_each(|(sum, v)| *sum -= v);
+            }
+            out.values[y * width..][..width].copy_from_slice(&sums);
         }
         Ok(out)
     }

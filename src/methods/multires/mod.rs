@@ -101,11 +101,11 @@ impl LiveSurface for MultiresolutionModel {
     }
 
     fn counts(&self) -> [usize; 2] {
-        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+        self.mesh().counts()
     }
 
     fn versions(&self) -> [u32; 2] {
-        [self.mesh().topology_version(), self.mesh().geometry_version()]
+        self.mesh().versions()
     }
 }
 

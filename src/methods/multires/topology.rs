@@ -79,8 +79,8 @@ fn sampling(bounds: EdgeBounds) -> Sampling {
     Sampling::new(bounds.min)
 }
 
-/// Returns the vertices with an edge shorter than ε_min that cannot be collapsed, because it is on a neck or on an
-/// isolated tetrahedron: topology changes are tried around them.
+/// Returns the vertices of edges that are shorter than ε_min and cannot be collapsed, because they are on a neck or on
+/// an isolated tetrahedron. Topology changes are tried around them.
 fn pinched(mesh: &Mesh, bounds: EdgeBounds) -> Vec<VertexId> {
     let shortest = bounds.min * bounds.min;
     let is_pinched = |u: VertexId, v: VertexId| {

@@ -137,11 +137,11 @@ impl LiveSurface for SurfaceTracker {
     }
 
     fn counts(&self) -> [usize; 2] {
-        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+        self.mesh().counts()
     }
 
     fn versions(&self) -> [u32; 2] {
-        [self.mesh().topology_version(), self.mesh().geometry_version()]
+        self.mesh().versions()
     }
 }
 

@@ -18,7 +18,7 @@ const BLOCK: usize = SIDE * SIDE * SIDE;
 /// Largest number of allocated blocks: up to it, three vertices per node (one per edge) have distinct `u32` indices.
 const MAX_BLOCKS: usize = u32::MAX as usize / (3 * BLOCK);
 
-/// Slot of a node whose block is not allocated, and entry in the table of blocks where there is none.
+/// Slot number of a node whose block is not allocated; also marks such a block in the table of blocks.
 pub(super) const ABSENT: u32 = u32::MAX;
 
 /// Stored value of a node at which the function has not been evaluated.

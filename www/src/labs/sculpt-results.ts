@@ -18,7 +18,6 @@ export class SculptResults {
   readonly #history: History;
   readonly #follow: (frame: FrameEvent) => void;
   #frame: FrameEvent | undefined;
-  #framePending = false;
   #shownAt = 0;
   #more: Record<string, unknown> = {};
   /** Whether the undeformed meshes are displayed or were requested. */
@@ -63,13 +62,9 @@ export class SculptResults {
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
     if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
+    const isPending = this.#frame !== undefined;
     this.#frame = frame;
-    if (this.#framePending) return;
-    this.#framePending = true;
-    this.#ui.view.change(() => {
-      this.#framePending = false;
-      this.#showPending();
-    });
+    if (!isPending) this.#ui.view.change(() => this.#showPending());
   }
 
   #showPending(): void {

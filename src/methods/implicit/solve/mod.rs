@@ -469,8 +469,7 @@ mod tests {
         }
     }
 
-    /// With so many constraints, the matrix is stored in single precision, and iterations restart from the true
-    /// residual.
+    /// For 8,000 constraints the matrix is stored in single precision, and iterations restart from the true residual.
     #[cfg(not(target_arch = "wasm32"))]
     #[test]
     fn eight_thousand_constraints_to_many_digits() {
