@@ -10,49 +10,16 @@ import {
   typedArray,
   vec3,
 } from './check.js';
+import type { LengthUnit, Space, Vec3, VolumeInit } from './data.js';
 import { Handle } from './runtime.js';
 import { RawFrames, RawVolume } from './vesicle.js';
 
-/** Three numbers: a point, a direction, or one number for each of x, y and z. */
-export type Vec3 = [number, number, number];
+const INIT = [
+  ...['data', 'dims', 'affine', 'spacing', 'origin'],
+  ...['slope', 'intercept', 'frameSeconds', 'space', 'unit'],
+];
+const UNITS: readonly LengthUnit[] = ['m', 'mm', 'um'];
 
-/** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
-export type VoxelArray =
-  | Uint8Array
-  | Int8Array
-  | Uint16Array
-  | Int16Array
-  | Uint32Array
-  | Int32Array
-  | Float32Array
-  | Float64Array;
-
-/** Orientation of the world axes: right-anterior-superior, or left-posterior-superior. */
-export type Space = 'RAS' | 'LPS';
-
-/** Constructor options of a {@link Volume}. */
-export interface VolumeInit {
-  /** Stored value of each voxel: x fastest, then y, z, t. Copied once. */
-  data: VoxelArray;
-  /** Number of voxels along x, y, z, and the number of frames of a 4D volume. */
-  dims: Vec3 | [number, number, number, number];
-  /** Transform from voxel index to world: 16 numbers, column-major. Default from `spacing` and `origin`. */
-  affine?: ArrayLike<number>;
-  /** Voxel size, world units; default 1. Not together with `affine`. */
-  spacing?: Vec3;
-  /** World position of the centre of the first voxel; default 0. Not together with `affine`. */
-  origin?: Vec3;
-  /** Slope of intensity = stored value * slope + intercept. Default 1; not 0. */
-  slope?: number;
-  /** Intercept of intensity = stored value * slope + intercept. Default 0. */
-  intercept?: number;
-  /** Seconds from one frame to the next; 4D only. */
-  frameSeconds?: number;
-  /** Orientation of the world axes. Default RAS; meshes are returned in the same space. */
-  space?: Space;
-}
-
-const INIT = ['data', 'dims', 'affine', 'spacing', 'origin', 'slope', 'intercept', 'frameSeconds', 'space'];
 const ELEMENTS = [
   ...[Uint8Array, Int8Array, Uint16Array, Int16Array],
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
@@ -97,6 +64,8 @@ export class Volume {
    * Parses a volume file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage (`.mha`,
    * or `.mhd` and data), detected from the bytes. NIfTI files may be gzipped as a whole, the voxels of NRRD and
    * MetaImage compressed inside the file.
+   *
+   * Entry points with one method lack it: use `parseVolume` of `vesicle/import`.
    *
    * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
@@ -245,6 +214,8 @@ export class Volume {
    * Inserts in-between slices along the axis of the largest spacing, by symmetric optical flow between neighbouring
    * slices, in all frames. The original slices stay unchanged, at their positions; voxels keep their type.
    *
+   * Entry points with one method lack it, but for `vesicle/tracking`.
+   *
    * @param options - `factor`: number by which the distance between slices is divided, 1 to 16; default the integer
    *   that makes voxels closest to cubes; 1 changes nothing. `method`: `'linear'` interpolates linearly instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
@@ -274,11 +245,12 @@ function wrap(make: () => RawVolume): Volume {
 
 function fromInit(init: VolumeInit): RawVolume {
   const given = checkProperties('init', init, INIT);
-  const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
+  const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS', unit } = given;
+  if (unit !== undefined) choice('unit', unit, UNITS);
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
     throw invalid('data', `must be a typed array: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
   }
-  return new RawVolume(
+  const volume = new RawVolume(
     data,
     dims(given.dims),
     affine(given),
@@ -287,6 +259,7 @@ function fromInit(init: VolumeInit): RawVolume {
     frameSeconds === undefined ? 0 : positive('frameSeconds', frameSeconds),
     choice('space', space, ['RAS', 'LPS']),
   );
+  return unit === undefined ? volume : volume.withUnit(unit);
 }
 
 function dims(given: unknown): Uint32Array {

@@ -16,7 +16,12 @@
         feature = "import",
         feature = "enrich"
     )),
-    allow(dead_code, reason = "what some methods share is unused in a build without them")
+    allow(
+        dead_code,
+        unused_macros,
+        unused_imports,
+        reason = "what some methods share is unused without them"
+    )
 )]
 
 pub mod io;

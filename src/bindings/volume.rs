@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{copy_array, point};
+use super::convert::{UNITS, columns, copy_array, point, space_name};
 use super::error::Failure;
 use crate::io::write_nifti;
 use crate::math::DAffine3;
@@ -49,6 +49,13 @@ impl RawVolume {
         Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
     }
 
+    /// Returns the volume with the length of a world unit set to `m`, `mm` or `um`; anything else means unknown.
+    #[wasm_bindgen(js_name = withUnit)]
+    pub fn with_unit(self, unit: &str) -> RawVolume {
+        let (unit, _) = UNITS.into_iter().find(|&(_, name)| name == unit).unwrap_or_default();
+        RawVolume(self.0.with_unit(unit))
+    }
+
     /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if a dimension exceeds 32,767.
     #[wasm_bindgen(js_name = toNifti)]
     pub fn to_nifti(&self) -> Result<Vec<u8>, JsValue> {
@@ -73,20 +80,13 @@ impl RawVolume {
     /// Returns the transform from voxel indices to world space: the sixteen numbers of a 4 × 4 matrix, column by
     /// column.
     pub fn affine(&self) -> Vec<f64> {
-        let columns = self.0.affine().to_cols_array();
-        let (columns, _) = columns.as_chunks::<3>();
-        let last_row = [0.0, 0.0, 0.0, 1.0];
-        columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
+        columns(self.0.affine())
     }
 
     /// Returns which anatomical directions the axes of world space have: `RAS` (right, anterior, superior) or `LPS`
     /// (left, posterior, superior).
     pub fn space(&self) -> String {
-        match self.0.space() {
-            Space::Ras => "RAS",
-            Space::Lps => "LPS",
-        }
-        .to_owned()
+        space_name(self.0.space()).to_owned()
     }
 
     /// Returns the smallest and the largest finite intensity of all frames.

@@ -377,7 +377,7 @@ fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> 
     if furthest <= f64::from(f32::MAX) {
         return Ok(());
     }
-    let problem = format!("maps a corner of the volume to {furthest:e}, beyond the range of f32 (3.4e38)");
+    let problem = format!("maps a corner of the volume to {furthest}, beyond the range of f32 (3.4e38)");
     Err(VolumeError::invalid("affine", problem))
 }
 
@@ -395,11 +395,14 @@ fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 
         return Err(VolumeError::invalid("data", "at least one voxel must be finite"));
     };
     let ends = stored.map(|v| v * slope + intercept);
-    let range = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
-    if range.iter().all(|v| v.abs() <= f64::from(f32::MAX)) {
-        return Ok(range);
+    let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
+    if low.abs().max(high.abs()) <= f64::from(f32::MAX) {
+        return Ok([low, high]);
     }
-    Err(VolumeError::invalid("data", format!("intensities {range:?} exceed the range of f32 (3.4e38)")))
+    Err(VolumeError::invalid(
+        "data",
+        format!("intensities from {low} to {high} exceed the range of f32 (3.4e38)"),
+    ))
 }
 
 #[cfg(test)]
