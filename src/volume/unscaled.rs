@@ -63,6 +63,7 @@ mod tests {
         );
         let large = unscaled(Voxels::U32(vec![0, u32::MAX]), 1.0, 1.0);
         assert_eq!(large, Voxels::F64(vec![1.0, 4_294_967_296.0]));
+        assert_eq!(unscaled(Voxels::I32(vec![i32::MIN]), 1.0, 0.5), Voxels::F64(vec![-2_147_483_647.5]));
         assert!(matches!(unscaled(Voxels::F64(vec![0.1]), 1.0, 1e-9), Voxels::F64(v) if v[0] == 0.1 + 1e-9));
     }
 }
