@@ -20,7 +20,7 @@ export {
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
-export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
+export { type Space, type Vec3, Volume, type VolumeFormat, type VolumeInit, type VoxelArray } from './volume.js';
 
 /** Returns the version of the package. */
 export function version(): string {

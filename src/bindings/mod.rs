@@ -14,6 +14,7 @@ mod error;
 mod implicit;
 #[cfg(feature = "import")]
 mod import;
+mod labels;
 mod mesh;
 mod method;
 #[cfg(feature = "multires")]

@@ -10,7 +10,7 @@ const OFFSET_1: usize = SIZE_1 + 4;
 /// Size of a NIfTI-2 header in bytes with the extension flag after it, where the voxels start.
 const OFFSET_2: usize = SIZE_2 + 4;
 /// Largest error of an intensity, as a fraction of the step between the intensities of integer voxels, by which a file is
-/// written as NIfTI-1: invisible where intensities are measured, and labels are still told apart.
+/// written as NIfTI-1: invisible where intensities are measured, and far below the difference of two labels.
 const STEP_TOLERANCE: f64 = 0.01;
 
 /// Returns the volume as an uncompressed little-endian NIfTI file: voxels as stored, world space converted to RAS, and

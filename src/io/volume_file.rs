@@ -42,7 +42,7 @@ pub enum Compression {
 ///
 /// NIfTI stores voxels, slope and intercept as they are; NRRD and MetaImage have no slope and intercept: if these are not
 /// 1 and 0, intensities are stored, as 64-bit floats in place of 32-bit integers and 64-bit floats and as 32-bit floats in
-/// place of the other types. World space is RAS in NIfTI, LPS in MetaImage, and stays as it is in NRRD. MetaImage has no
+/// place of the other types. World space is RAS in NIfTI, LPS in MetaImage, and that of the volume in NRRD. MetaImage has no
 /// unit of time, so the time between frames is lost when the file is read by this library.
 ///
 /// # Errors

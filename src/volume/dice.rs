@@ -50,14 +50,14 @@ impl Volume {
     /// Sets, for the voxels from index `start` on, whether they are compared by [`Self::dice`], and returns for how many.
     fn mark(&self, start: usize, label: Option<f64>, inside: &mut [bool]) -> usize {
         each!(self.voxels.as_ref(), values => {
-            let (slope, intercept) = (self.slope, self.intercept);
             let rest = values.iter().skip(start).zip(inside);
-            rest.map(|(&v, inside)| {
-                let intensity = f64::from(v) * slope + intercept;
-                *inside = label.map_or(intensity != 0.0 && !intensity.is_nan(), |label| intensity == label);
-            })
-            .count()
+            rest.map(|(&v, inside)| *inside = self.is_compared(v, label)).count()
         })
+    }
+
+    fn is_compared<T: Into<f64>>(&self, stored: T, label: Option<f64>) -> bool {
+        let intensity = stored.into() * self.slope + self.intercept;
+        label.map_or(intensity != 0.0 && !intensity.is_nan(), |label| intensity == label)
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Volume;
 use super::error::{VolumeError, reserve};
 use super::voxels::Voxels;
+use crate::math::order::{rank_f64, sort_ranks};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -74,12 +75,14 @@ impl Volume {
     /// that are no label map, as [`labels`](Self::labels); [`VolumeError::TooLarge`].
     pub fn label(&self, values: &[f64]) -> Result<Volume, VolumeError> {
         let labels = self.stored_labels(0..self.voxels.len())?;
-        let mut wanted = values.to_vec();
-        wanted.sort_by(f64::total_cmp);
-        let is_wanted = |label: f64| wanted.binary_search_by(|value| value.total_cmp(&label)).is_ok();
-        check_wanted(&wanted, &labels)?;
-        let mut stored: Vec<i64> = labels.iter().filter(|l| is_wanted(l.label)).map(|l| l.stored).collect();
-        stored.sort_unstable();
+        check_wanted(values, &labels)?;
+        let mut wanted: Vec<u64> = values.iter().map(|&value| rank_f64(value)).collect();
+        sort_ranks(&mut wanted);
+        let is_wanted = |l: &&StoredLabel| wanted.binary_search(&rank_f64(l.label)).is_ok();
+        let mut stored: Vec<i64> = labels.iter().filter(is_wanted).map(|l| l.stored).collect();
+        if self.slope < 0.0 {
+            stored.reverse();
+        }
         let mask = each_integer!(self.voxels.as_ref(), values => mask_of(values, &stored))?;
         self.mask(mask)
     }
@@ -103,7 +106,9 @@ impl Volume {
         if labels.len() > MAX_LABELS {
             return Err(too_many());
         }
-        labels.sort_by(|a, b| a.label.total_cmp(&b.label));
+        if self.slope < 0.0 {
+            labels.reverse();
+        }
         Ok(labels)
     }
 
@@ -134,7 +139,7 @@ fn too_many() -> VolumeError {
     )
 }
 
-/// Returns an error unless there is at least one value, and each is one of the labels, which are sorted.
+/// Returns an error unless there is at least one value, and each is one of the labels, which are in ascending order.
 fn check_wanted(values: &[f64], labels: &[StoredLabel]) -> Result<(), VolumeError> {
     if values.is_empty() {
         return Err(VolumeError::invalid("value", "must be at least one label"));
@@ -199,7 +204,7 @@ fn runs<T: Copy + Ord + Into<i64>>(values: &[T]) -> impl Iterator<Item = (i64, u
     values.chunk_by(|a, b| a == b).map(|run| (run[0].into(), run.len()))
 }
 
-/// Returns 1 for each value that is one of `wanted`, which are sorted, and 0 for the others.
+/// Returns 1 for each value that is one of `wanted`, which ascend, and 0 for the others.
 fn mask_of<T: Copy + Ord + Into<i64>>(values: &[T], wanted: &[i64]) -> Result<Vec<u8>, VolumeError> {
     let mut mask = reserve(values.len())?;
     for (value, times) in runs(values) {

@@ -117,13 +117,22 @@ impl Volume {
         for frame in stored.chunks_exact(self.frame_len()) {
             out.extend(target.positions().map(|p| match how {
                 _ if target.limited && !covers(dims, p) => zero,
-                Interpolation::Linear => {
-                    T::nearest(trilinear(dims, p, |i| self.finite_stored(frame[i].into())))
-                }
+                Interpolation::Linear => T::nearest(self.interpolated(frame, p)),
                 Interpolation::Nearest => frame[nearest(dims, p)],
             }));
         }
         Ok(out)
+    }
+
+    /// Returns the stored value interpolated at a point, in continuous voxel indices, between the voxels of `frame`.
+    #[inline]
+    fn interpolated<T: VoxelNumber>(&self, frame: &[T], p: DVec3) -> f64 {
+        let value = trilinear(self.dims(), p, |i| frame[i].into());
+        // A voxel that is not finite gives a value that is not finite, whatever its weight.
+        if value.is_finite() {
+            return value;
+        }
+        trilinear(self.dims(), p, |i| self.finite_stored(frame[i].into()))
     }
 
     /// Returns a stored value as it is if finite, else the stored value of the intensity that [`Self::finite`] gives.

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 impl Volume {
     /// Returns voxels whose stored values are the intensities of this volume, in all frames: its own if the slope is 1
     /// and the intercept 0, else floats, of 64 bits in place of 32-bit integers and 64-bit floats, of 32 bits in place
-    /// of the others. NaN and infinite voxels stay as they are.
+    /// of the others. NaN and infinite voxels are kept.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].

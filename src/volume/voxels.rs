@@ -131,7 +131,7 @@ impl Voxels {
 
     /// Returns the number of finite stored values.
     pub(crate) fn finite_count(&self) -> usize {
-        each!(self, values => values.iter().filter(|&&v| f64::from(v).is_finite()).count())
+        each!(self, values => finite_count(values))
     }
 
     /// Returns whether any stored value equals `value`, which must be one that this type can store.
@@ -230,6 +230,10 @@ fn number_at<T: Copy + Into<f64>>(values: &[T], index: usize) -> Option<f64> {
     values.get(index).map(|&v| v.into())
 }
 
+fn finite_count<T: VoxelNumber>(values: &[T]) -> usize {
+    values.iter().filter(|&&v| v.into().is_finite()).count()
+}
+
 fn contains<T: VoxelNumber>(values: &[T], value: f64) -> bool {
     values.contains(&T::nearest(value))
 }
@@ -241,17 +245,14 @@ fn converted_like<T: VoxelNumber>(_stored: &[T], values: &[f64]) -> Result<Vec<T
     Ok(out)
 }
 
-fn finite_range<T: Copy + PartialOrd + Into<f64>>(values: &[T]) -> Option<[f64; 2]> {
-    let mut finite = values.iter().copied().filter(|&v| v.into().is_finite());
-    let first = finite.next()?;
+fn finite_range<T: VoxelNumber>(values: &[T]) -> Option<[f64; 2]> {
+    let is_finite = |v: T| v.into().is_finite();
+    let first = values.iter().copied().find(|&v| is_finite(v))?;
     let (mut low, mut high) = (first, first);
-    for v in finite {
-        if v < low {
-            low = v;
-        }
-        if v > high {
-            high = v;
-        }
+    // Without branches, which keeps the loop vectorisable.
+    for &v in values {
+        low = if is_finite(v) && v < low { v } else { low };
+        high = if is_finite(v) && v > high { v } else { high };
     }
     Some([low.into(), high.into()])
 }
