@@ -28,7 +28,7 @@ export {
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
-export { Volume } from './volume.js';
+export { Volume, type VolumeFormat } from './volume.js';
 
 /** Returns the version of the package. */
 export function version(): string {

@@ -86,6 +86,7 @@ export type {
   TrackingParams,
   UncoveredRegion,
   Vec3,
+  VolumeFormat,
   VolumeInit,
   VoxelArray,
 } from './index.js';

@@ -84,7 +84,18 @@ async function make(module) {
   if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === wanted) return;
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
-    ...['run', '--locked', '--quiet', '--package', 'xtask', '--', 'bindgen', compiled],
+    ...[
+      'run',
+      '--locked',
+      '--quiet',
+      '--target-dir',
+      at('target/xtask'),
+      '--package',
+      'xtask',
+      '--',
+      'bindgen',
+      compiled,
+    ],
     // A trap loses the instance; the reset function lets a page start a new one without reloading.
     ...[
       '--target',

@@ -127,7 +127,7 @@ const LONG = [
 
 /** Checks that each feature compiles alone, natively and for wasm32. */
 async function checkFeatures() {
-  for (const feature of ['', 'deformable', 'implicit', 'tracking', 'multires', 'import', 'enrich']) {
+  for (const feature of ['', 'deformable', 'implicit', 'tracking', 'multires', 'import', 'enrich', 'labels']) {
     for (const target of [[], WASM]) {
       const args = ['clippy', '--locked', '-p', 'vesicle', '--lib', '--no-default-features', '--features', feature];
       await must('cargo', [...args, ...target, ...DENY]);

@@ -5,7 +5,8 @@
 //! methods < bindings`; `io` uses only math, mesh and volume.
 //!
 //! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
-//! files to the bindings, `enrich` the interpolation of slices. All are on by default.
+//! files to the bindings, `enrich` the interpolation of slices, `labels` label maps and the writers of volume files.
+//! All are on by default.
 
 #![cfg_attr(
     not(all(
@@ -14,7 +15,8 @@
         feature = "tracking",
         feature = "multires",
         feature = "import",
-        feature = "enrich"
+        feature = "enrich",
+        feature = "labels"
     )),
     allow(
         dead_code,

@@ -17,6 +17,8 @@ mod files;
 mod implicit;
 #[cfg(all(feature = "import", feature = "processing"))]
 mod import;
+#[cfg(feature = "labels")]
+mod labels;
 #[cfg(feature = "processing")]
 mod mesh;
 #[cfg(feature = "processing")]

@@ -56,7 +56,7 @@ impl RawVolume {
         RawVolume(self.0.with_unit(unit))
     }
 
-    /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if a dimension exceeds 32,767.
+    /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if that cannot represent the volume.
     #[wasm_bindgen(js_name = toNifti)]
     pub fn to_nifti(&self) -> Result<Vec<u8>, JsValue> {
         Ok(write_nifti(&self.0).map_err(Failure::from)?)
@@ -158,7 +158,7 @@ impl RawFrames {
 }
 
 /// Copies a typed array of any element type that volumes support, without converting its values.
-fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
+pub(super) fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     macro_rules! of {
         ($($array:ty => $voxels:ident),*) => {
             $(if let Some(array) = data.dyn_ref::<$array>() {

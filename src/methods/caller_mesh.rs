@@ -30,7 +30,7 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {
-        let problem = format!("the mean edge length must be ≥ {MIN_MEAN_EDGE}, got {edge}");
+        let problem = "the mean edge length must be ≥ 1e-12: use a smaller unit of length";
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok(())

@@ -24,24 +24,36 @@
 
 mod binning;
 mod contour;
+mod crop;
 mod cube_cases;
+mod dice;
 mod enrich;
 mod error;
 mod flow;
 mod grid;
 mod inside;
+mod labels;
 mod pyramid;
+mod region;
+mod resample;
+mod same_grid;
 mod sampling;
 mod sequence;
 mod slices;
 mod surface_extractor;
+mod threshold;
+mod unscaled;
 mod voxels;
+mod write;
 
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::voxels_inside;
+pub use labels::LabelCount;
+pub use region::Region;
+pub use resample::{Interpolation, ResampleGrid};
 pub(crate) use sampling::trilinear;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
@@ -268,6 +280,25 @@ impl Volume {
         Ok(trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
     }
 
+    /// Returns the arguments of [`Volume::new`] for a volume with other voxels and everything else as in this one.
+    fn init_with(&self, voxels: Voxels) -> VolumeInit {
+        VolumeInit {
+            voxels,
+            dims: self.dims,
+            affine: self.affine,
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+        }
+    }
+
+    /// Returns the volume of the 0/1 mask `values`, one per voxel of all frames, on the grid of this volume.
+    fn mask(&self, values: Vec<u8>) -> Result<Volume, VolumeError> {
+        let init = VolumeInit { slope: 1.0, intercept: 0.0, ..self.init_with(Voxels::U8(values)) };
+        Ok(Volume::new(init)?.with_unit(self.unit))
+    }
+
     /// Returns the number of voxels in one frame.
     fn frame_len(&self) -> usize {
         self.dims[0] * self.dims[1] * self.dims[2]
@@ -394,6 +425,12 @@ fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 
     let Some(stored) = voxels.finite_range() else {
         return Err(VolumeError::invalid("data", "at least one voxel must be finite"));
     };
+    scaled_range(stored, slope, intercept)
+}
+
+/// Returns the intensities at the ends of a range of stored values, the lower one first; an error if `f32` cannot
+/// represent them.
+fn scaled_range(stored: [f64; 2], slope: f64, intercept: f64) -> Result<[f64; 2], VolumeError> {
     let ends = stored.map(|v| v * slope + intercept);
     let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
     if low.abs().max(high.abs()) <= f64::from(f32::MAX) {
