@@ -15,7 +15,7 @@ export const PARTS = [...METHODS, 'import'];
 const LACKING = /Entry points with one method lack it(?:, but for `vesicle\/(\w+)`)?/;
 
 /** A documented member of a class, in code or declarations: up to the line that ends it, which has its indentation. */
-const MEMBER = /\n {4}\/\*\*(?:(?!\*\/)[\s\S])*\*\/\n {4}(?:\S.*;|\S[\s\S]*?\n {4}\}.*)(?=\n)/g;
+const MEMBER = /\n {4}\/\*\*(?:(?!\*\/)[\s\S])*\*\/\n {4}(?:\S.*;|\S[\s\S]*?\n {4}\}(?:.*;)?)(?=\n)/g;
 
 /** Removes the members of classes that the entry point of a method lacks, from code or declarations. */
 const without = (method, text) =>
