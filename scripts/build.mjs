@@ -16,7 +16,7 @@ const WHOLE = { target: 'target', name: 'vesicle_bg' };
 
 /** The whole library for engines without vector instructions. */
 const PLAIN = {
-  ...{ target: 'target/plain', name: 'vesicle_plain_bg' },
+  ...{ target: 'target/methods', name: 'vesicle_plain_bg' },
   // After what .cargo/config.toml says of the target: the last word counts.
   env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
