@@ -83,32 +83,32 @@ const GROUPS = [
   [
     [
       ['format', check('cargo', ['fmt', '--all', '--check']), 5],
-      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 60],
-      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY]), 60],
+      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 100],
+      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY]), 100],
       [
         'rust docs',
         check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
         20,
       ],
       // Shows the tests' measurements in the log.
-      ['native', cargoTests('--', '--show-output'), 400],
+      ['native', cargoTests('--', '--show-output'), 600],
       // Has one thread only.
-      ['wasm', cargoTests('--lib', '--tests', ...WASM), 500],
+      ['wasm', cargoTests('--lib', '--tests', ...WASM), 700],
     ],
     [
-      ['build', works(build), 400],
+      ['build', works(build), 700],
       ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
       ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
-      ['package', vitest('tests/js'), 150],
+      ['package', vitest('tests/js'), 200],
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', 'together'), 500],
+      ['app', vitest('tests/app', 'together'), 700],
     ],
   ],
-  [[['app alone', vitest('tests/app', 'alone'), 120]]],
+  [[['app alone', vitest('tests/app', 'alone'), 200]]],
 ];
 
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
