@@ -106,6 +106,15 @@ pub struct VolumeInit {
     pub space: Space,
 }
 
+impl VolumeInit {
+    /// Returns the arguments of a volume whose stored values are its intensities, with voxels of size 1 from the origin
+    /// on, in RAS, and without a time between frames.
+    pub fn new(voxels: Voxels, dims: [usize; 4]) -> Self {
+        let affine = DAffine3::IDENTITY;
+        Self { voxels, dims, affine, slope: 1.0, intercept: 0.0, frame_seconds: 0.0, space: Space::Ras }
+    }
+}
+
 /// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
 ///
 /// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from ranges and histograms.

@@ -319,13 +319,8 @@ mod tests {
             DVec3::new(-2.0, -1.0, 0.3),
         );
         let like = Volume::new(VolumeInit {
-            voxels: Voxels::U8(vec![0; 14 * 12 * 10]),
-            dims: [14, 12, 10, 1],
             affine: mirror * v.affine() * turned,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
+            ..VolumeInit::new(Voxels::U8(vec![0; 14 * 12 * 10]), [14, 12, 10, 1])
         })
         .unwrap();
         let result = v.resample(ResampleGrid::Like(&like), Interpolation::Linear).unwrap();

@@ -28,21 +28,12 @@ pub(super) fn grid_difference(first: &Volume, other: &Volume) -> Option<&'static
 mod tests {
     use super::*;
     use crate::math::DAffine3;
-    use crate::volume::{Space, VolumeInit, Voxels};
+    use crate::volume::{VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn volume(affine: DAffine3) -> Volume {
-        Volume::new(VolumeInit {
-            voxels: Voxels::U8(vec![1; 40]),
-            dims: [2, 4, 5, 1],
-            affine,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        })
-        .unwrap()
+        Volume::new(VolumeInit { affine, ..VolumeInit::new(Voxels::U8(vec![1; 40]), [2, 4, 5, 1]) }).unwrap()
     }
 
     #[test]

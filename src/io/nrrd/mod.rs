@@ -106,13 +106,10 @@ impl Header {
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let voxels = self.voxels(self.after_lines(source)?)?;
         let volume = Volume::new(VolumeInit {
-            voxels: deinterleave_frames(voxels, self.run, self.dims[3])?,
-            dims: self.dims,
             affine: self.affine,
-            slope: 1.0,
-            intercept: 0.0,
             frame_seconds: self.frame_seconds,
             space: self.space,
+            ..VolumeInit::new(deinterleave_frames(voxels, self.run, self.dims[3])?, self.dims)
         });
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
