@@ -5,7 +5,7 @@ use super::deflate::zlib;
 use super::metaimage::FORMAT;
 use super::raw::volume_error;
 use super::volume_file::{Compression, with_payload, with_voxels, written};
-use crate::math::{DAffine3, DVec3};
+use crate::math::DVec3;
 use crate::volume::{LengthUnit, Space, Volume, Voxels};
 
 /// Returns the volume as a MetaImage file, whose world space is LPS. Frames are a fourth axis, whose spacing is the time
@@ -94,8 +94,7 @@ struct Geometry {
 
 impl Geometry {
     fn of(volume: &Volume) -> Self {
-        let sign = if volume.space() == Space::Ras { DVec3::new(-1.0, -1.0, 1.0) } else { DVec3::ONE };
-        let affine = DAffine3::from_scale(sign) * volume.affine();
+        let affine = volume.affine_in(Space::Lps);
         let axes = [affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis];
         let spacing = axes.map(DVec3::length);
         let directions = [0, 1, 2].map(|axis| axes[axis] / spacing[axis]);

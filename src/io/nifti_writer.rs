@@ -156,10 +156,9 @@ fn units_field(volume: &Volume) -> u8 {
 /// Returns the upper three rows of the affine map from voxel indices to RAS world space, row-major, for the header's
 /// sform.
 fn rows_in_ras(volume: &Volume) -> [f64; 12] {
-    let a = volume.affine();
-    let sign = if volume.space() == Space::Lps { [-1.0, -1.0, 1.0] } else { [1.0; 3] };
+    let a = volume.affine_in(Space::Ras);
     let columns = [a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis, a.translation];
-    std::array::from_fn(|i| columns[i % 4][i / 4] * sign[i / 4])
+    std::array::from_fn(|i| columns[i % 4][i / 4])
 }
 
 #[cfg(test)]

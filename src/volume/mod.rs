@@ -191,6 +191,13 @@ impl Volume {
         self.affine
     }
 
+    /// Returns the map from voxel index to world coordinates in the given space: RAS and LPS differ in the signs of x
+    /// and y.
+    pub fn affine_in(&self, space: Space) -> DAffine3 {
+        let sign = if space == self.space { 1.0 } else { -1.0 };
+        DAffine3::from_scale(DVec3::new(sign, sign, 1.0)) * self.affine
+    }
+
     /// Returns the map from world coordinates to voxel index.
     pub fn inverse_affine(&self) -> DAffine3 {
         self.inverse
@@ -442,7 +449,7 @@ fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 
 fn scaled_range(stored: [f64; 2], slope: f64, intercept: f64) -> Result<[f64; 2], VolumeError> {
     let ends = stored.map(|v| v * slope + intercept);
     let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
-    if low.abs().max(high.abs()) <= f64::from(f32::MAX) {
+    if [low, high].iter().all(|v| v.abs() <= f64::from(f32::MAX)) {
         return Ok([low, high]);
     }
     Err(VolumeError::invalid(

@@ -93,11 +93,10 @@ impl Volume {
             let problem = format!("must have the unit of length {:?}, got {:?}", self.unit, other.unit);
             return Err(VolumeError::invalid("like", problem));
         }
-        let between = if self.space == other.space { DVec3::ONE } else { DVec3::new(-1.0, -1.0, 1.0) };
         Ok(Target {
             dims: other.dims(),
             affine: other.affine,
-            to_source: self.inverse * DAffine3::from_scale(between) * other.affine,
+            to_source: self.inverse * other.affine_in(self.space),
             space: other.space,
             unit: if known { other.unit } else { self.unit },
             limited: true,
