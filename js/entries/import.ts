@@ -64,8 +64,12 @@ export function parsePoints(bytes: Uint8Array): PointData {
   return inOwnInstance(() => points(bytes));
 }
 
-/** Calls `work`, and gives back the memory it used, which is several times the size of the file. */
+/**
+ * Calls `work` in a new instance, and gives back the memory it used, which is several times the size of the file. The
+ * first instance is not used: the promise of {@link init} refers to it for good.
+ */
 function inOwnInstance<T>(work: () => T): T {
+  restart();
   try {
     return call(work);
   } finally {
@@ -89,10 +93,8 @@ function volumeData(file: VolumeFile): VolumeInit {
 }
 
 function meshData(file: MeshFile): MeshData {
-  const [normals, uvs, cornerUvs, colors, texture] = [
-    ...[file.normals(), file.uvs(), file.cornerUvs(), file.colors()],
-    file.texture(),
-  ] as const;
+  const [normals, uvs, cornerUvs, colors] = [file.normals(), file.uvs(), file.cornerUvs(), file.colors()];
+  const texture = file.texture();
   return {
     positions: file.positions(),
     indices: file.indices(),

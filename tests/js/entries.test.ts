@@ -207,9 +207,31 @@ describe('vesicle/import', () => {
   });
 
   test('gives back the memory of large files', () => {
-    const bytes = new vesicle.Volume({ data: new Uint8Array(3e7), dims: [300, 400, 250] }).toNifti();
-    const { buffer } = files.parseVolume(bytes).data;
-    // An array of its own, not one inside the module's memory, which is gone.
-    expect(buffer.byteLength).toBe(3e7);
+    const script = `
+      import { readFile } from 'node:fs/promises';
+      import { setFlagsFromString } from 'node:v8';
+      import { runInNewContext } from 'node:vm';
+      import * as vesicle from './pkg/index.js';
+      setFlagsFromString('--expose-gc');
+      const collect = runInNewContext('gc');
+      await vesicle.default();
+      const bytes = new vesicle.Volume({ data: new Uint8Array(3e7), dims: [300, 400, 250] }).toNifti();
+      const memories = [];
+      const watched = (instance) => {
+        memories.push(new WeakRef(instance.exports.memory));
+        return instance;
+      };
+      const { instantiate, Instance } = WebAssembly;
+      WebAssembly.instantiate = async (...given) => watched(await instantiate(...given));
+      WebAssembly.Instance = function (...given) { return watched(new Instance(...given)); };
+      WebAssembly.Instance.prototype = Instance.prototype;
+      const files = await import('./pkg/import/index.js');
+      await files.default();
+      const voxels = [0, 1].map(() => files.parseVolume(bytes).data.length);
+      await new Promise((resolve) => setTimeout(resolve));
+      collect();
+      const left = memories.map((memory) => memory.deref()?.buffer.byteLength ?? 0);
+      console.log(voxels, memories.length > 2, Math.max(...left) < 5e6);`;
+    expect(node(script)).toBe('[ 30000000, 30000000 ] true true');
   });
 });
