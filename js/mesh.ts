@@ -510,7 +510,7 @@ function made(make: () => RawMesh): Mesh {
   return wrapMesh(new Handle('Mesh', make));
 }
 
-/** Numbers of the arrays of a {@link MeshExtra}: so many for each vertex, or for each triangle. */
+/** Arrays of a {@link MeshExtra}: name, and how many numbers they have per vertex or per triangle. */
 const EXTRA_ARRAYS = [
   ['normals', 3, 'vertex'],
   ['uvs', 2, 'vertex'],

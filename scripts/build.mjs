@@ -84,28 +84,10 @@ async function make(module) {
   if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === wanted) return;
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
-    ...[
-      'run',
-      '--locked',
-      '--quiet',
-      '--target-dir',
-      at('target/xtask'),
-      '--package',
-      'xtask',
-      '--',
-      'bindgen',
-      compiled,
-    ],
+    ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
+    ...['--', 'bindgen', compiled, '--target', 'web', '--out-dir', folder(module), '--out-name', glueName(module)],
     // A trap loses the instance; the reset function lets a page start a new one without reloading.
-    ...[
-      '--target',
-      'web',
-      '--out-dir',
-      folder(module),
-      '--out-name',
-      glueName(module),
-      '--experimental-reset-state-function',
-    ],
+    '--experimental-reset-state-function',
     // The face says where the module is, so that a bundler meets only one address of it.
     ...['--omit-default-module-path', '--remove-producers-section'],
   ]);

@@ -106,13 +106,21 @@ pub fn space_name(space: Space) -> &'static str {
     }
 }
 
-/// Lengths of a world unit, and their names; the name of an unknown one is empty.
-pub const UNITS: [(LengthUnit, &str); 4] = [
-    (LengthUnit::Unknown, ""),
-    (LengthUnit::Metre, "m"),
-    (LengthUnit::Millimetre, "mm"),
-    (LengthUnit::Micrometre, "um"),
-];
+/// Returns the name of a unit of length; that of the unknown one is empty.
+pub fn unit_name(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Unknown => "",
+        LengthUnit::Metre => "m",
+        LengthUnit::Millimetre => "mm",
+        LengthUnit::Micrometre => "um",
+    }
+}
+
+/// Returns the unit of length of a name, as [`unit_name`] returns it; unknown for any other.
+pub fn unit_named(name: &str) -> LengthUnit {
+    let known = [LengthUnit::Metre, LengthUnit::Millimetre, LengthUnit::Micrometre];
+    known.into_iter().find(|&unit| unit_name(unit) == name).unwrap_or_default()
+}
 
 /// Converts a serialisable value to plain objects and arrays, in which `None` is `undefined`.
 pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {

@@ -5,10 +5,9 @@ use js_sys::{
 };
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{UNITS, bytes, columns, flat, packed, space_name};
-use super::error::Failure;
+use super::convert::{columns, flat, packed, space_name, unit_name};
+use super::readers::{read_mesh, read_volume};
 use super::texture::RawTexture;
-use crate::io::{parse_mesh, parse_textured_mesh, parse_volume};
 use crate::mesh::TriangleMesh;
 use crate::volume::{Volume, Voxels};
 
@@ -21,8 +20,7 @@ impl VolumeFile {
     /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of
     /// its own.
     pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<VolumeFile, JsValue> {
-        let payload = data.as_ref().map(bytes).transpose()?;
-        Ok(VolumeFile(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
+        Ok(VolumeFile(read_volume(file, data.as_ref())?))
     }
 
     /// Returns the stored values as a typed array of their type, x fastest, then y, z and frames.
@@ -78,7 +76,7 @@ impl VolumeFile {
 
     /// Returns the length of a world unit: `m`, `mm` or `um`, or an empty string if the file does not state it.
     pub fn unit(&self) -> String {
-        UNITS.into_iter().find(|&(unit, _)| unit == self.0.unit()).unwrap_or_default().1.to_owned()
+        unit_name(self.0.unit()).to_owned()
     }
 }
 
@@ -91,12 +89,7 @@ impl MeshFile {
     /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
     /// given.
     pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<MeshFile, JsValue> {
-        let file = bytes(file)?;
-        let mesh = match texture {
-            Some(texture) => parse_textured_mesh(&file, texture.0),
-            None => parse_mesh(&file),
-        };
-        Ok(MeshFile(mesh.map_err(Failure::from)?))
+        Ok(MeshFile(read_mesh(file, texture)?))
     }
 
     /// Returns the positions of the vertices as packed xyz.

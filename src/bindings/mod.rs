@@ -26,7 +26,7 @@ mod method;
 #[cfg(feature = "multires")]
 mod multires;
 #[cfg(feature = "import")]
-mod points;
+mod readers;
 mod texture;
 #[cfg(feature = "tracking")]
 mod tracking;

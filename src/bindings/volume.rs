@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{UNITS, columns, copy_array, point, space_name};
+use super::convert::{columns, copy_array, point, space_name, unit_named};
 use super::error::Failure;
 use crate::io::write_nifti;
 use crate::math::DAffine3;
@@ -52,8 +52,7 @@ impl RawVolume {
     /// Returns the volume with the length of a world unit set to `m`, `mm` or `um`; anything else means unknown.
     #[wasm_bindgen(js_name = withUnit)]
     pub fn with_unit(self, unit: &str) -> RawVolume {
-        let (unit, _) = UNITS.into_iter().find(|&(_, name)| name == unit).unwrap_or_default();
-        RawVolume(self.0.with_unit(unit))
+        RawVolume(self.0.with_unit(unit_named(unit)))
     }
 
     /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if that cannot represent the volume.
