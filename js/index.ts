@@ -7,7 +7,13 @@
  * @module vesicle
  */
 import { type ParamSpec, paramSpecsOf } from './params.js';
-import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingParamSpecs } from './vesicle.js';
+import {
+  deformableParamSpecs,
+  implicitParamSpecs,
+  labelParamSpecs,
+  multiresParamSpecs,
+  trackingParamSpecs,
+} from './vesicle.js';
 
 export * from './common.js';
 export { default } from './common.js';
@@ -15,6 +21,7 @@ export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';
 export type { PointData } from './data.js';
 export * from './deformable.js';
 export * from './implicit.js';
+export * from './label-surfaces.js';
 export * from './multires.js';
 export * from './points.js';
 export * from './tracking.js';
@@ -24,6 +31,7 @@ const specsOf = paramSpecsOf({
   implicit: implicitParamSpecs,
   tracking: trackingParamSpecs,
   multires: multiresParamSpecs,
+  labels: labelParamSpecs,
 });
 
 /**
@@ -31,6 +39,6 @@ const specsOf = paramSpecsOf({
  *
  * @throws {@link VesicleError} `invalid-argument`: no such method.
  */
-export function paramSpecs(method: 'deformable' | 'implicit' | 'tracking' | 'multires'): ParamSpec[] {
+export function paramSpecs(method: 'deformable' | 'implicit' | 'tracking' | 'multires' | 'labels'): ParamSpec[] {
   return specsOf(method);
 }

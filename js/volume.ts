@@ -389,8 +389,8 @@ export class Volume {
    *   is then unchanged.
    */
   write(region: { min: Vec3; dims: Vec3; data: VoxelArray }, frame = 0): void {
-    const { min, dims, data } = checkProperties('region', shallowCopy('region', region), ['min', 'dims', 'data']);
-    const [first, sizes] = [counts('region.min', min), counts('region.dims', dims)];
+    const { data, ...box } = checkProperties('region', shallowCopy('region', region), ['min', 'dims', 'data']);
+    const [first, sizes] = checkedRegion(box as typeof region);
     const voxels = voxelArray('region.data', data);
     integer('frame', frame);
     this.#handle.use((raw) => raw.write(first, sizes, voxels, frame));
@@ -405,6 +405,12 @@ export class Volume {
   [Symbol.dispose](): void {
     this.free();
   }
+}
+
+/** Returns a copy of the first index and the numbers of voxels of a region; throws unless they are counts. */
+export function checkedRegion(region: { min: Vec3; dims: Vec3 }): [Uint32Array, Uint32Array] {
+  const { min, dims } = checkProperties('region', region, ['min', 'dims']);
+  return [counts('region.min', min), counts('region.dims', dims)];
 }
 
 function wrap(make: () => RawVolume): Volume {

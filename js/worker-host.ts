@@ -9,6 +9,7 @@ import init, {
   animationGlb,
   DeformableModel,
   ImplicitSurface,
+  LabelSurfaces,
   Mesh,
   MultiresolutionModel,
   paramSpecs,
@@ -40,7 +41,7 @@ type Call = Extract<Task, { type: 'call' }>;
 type Entry = { object: LibraryObject } | { failed: unknown };
 
 const LIBRARY: Pick<Library, ClassName | FunctionName> = {
-  ...{ Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel },
+  ...{ Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel, LabelSurfaces },
   ...{ version, paramSpecs, parsePoints, animationGlb },
 };
 

@@ -172,6 +172,12 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     distortion: 'method',
     levelMeshes: 'method',
   },
+  LabelSurfaces: {
+    ...STEPPER,
+    mesh: 'method',
+    labels: 'value',
+    refresh: 'method',
+  },
 };
 
 /** Static methods that the page may call in the worker, by class. */
@@ -182,6 +188,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   ImplicitSurface: {},
   SurfaceTracker: {},
   MultiresolutionModel: {},
+  LabelSurfaces: {},
 };
 
 /** Free functions that the page may call in the worker. */

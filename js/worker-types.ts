@@ -39,6 +39,8 @@ export interface ImplicitSurface extends Remote<vesicle.ImplicitSurface> {}
 export interface MultiresolutionModel extends Remote<vesicle.MultiresolutionModel> {}
 /** Proxy of a `SurfaceTracker` in the worker; its methods and properties, except live meshes, return promises. */
 export interface SurfaceTracker extends Remote<vesicle.SurfaceTracker> {}
+/** Proxy of `LabelSurfaces` in the worker; its methods and properties return promises. */
+export interface LabelSurfaces extends Remote<vesicle.LabelSurfaces> {}
 /** Interface of the proxies of all four models in the worker. */
 export interface Stepper extends Remote<vesicle.Stepper> {}
 
@@ -49,6 +51,7 @@ interface Remotes {
   ImplicitSurface: ImplicitSurface;
   MultiresolutionModel: MultiresolutionModel;
   SurfaceTracker: SurfaceTracker;
+  LabelSurfaces: LabelSurfaces;
 }
 
 type NameOf<T> = { [N in ClassName]: T extends Library[N]['prototype'] ? N : never }[ClassName];

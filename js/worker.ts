@@ -67,6 +67,7 @@ export type {
   FrameStatistics,
   ImplicitOptions,
   ImplicitParams,
+  LabelParams,
   InitInput,
   MeshArrays,
   MeshFormat,
@@ -99,6 +100,8 @@ export type { Remote, Stepper } from './worker-types.js';
 export type DeformableOptions = there.WithRemotes<vesicle.DeformableOptions>;
 /** The initial surface of a {@link DeformableModel} in the worker, as in `vesicle`. */
 export type DeformableStart = there.WithRemotes<vesicle.DeformableStart>;
+/** Constructor options of {@link LabelSurfaces} in the worker, as in `vesicle`. */
+export type LabelOptions = there.WithRemotes<vesicle.LabelOptions>;
 /** Constructor options of a {@link MultiresolutionModel} in the worker, as in `vesicle`. */
 export type MultiresOptions = there.WithRemotes<vesicle.MultiresOptions>;
 /** Constructor options of a {@link SurfaceTracker} in the worker, as in `vesicle`. */
@@ -110,8 +113,17 @@ export type DeformableModel = there.DeformableModel;
 export type ImplicitSurface = there.ImplicitSurface;
 export type SurfaceTracker = there.SurfaceTracker;
 export type MultiresolutionModel = there.MultiresolutionModel;
+export type LabelSurfaces = there.LabelSurfaces;
 
-export const { Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel } = remoteClasses;
+export const {
+  Volume,
+  Mesh,
+  DeformableModel,
+  ImplicitSurface,
+  SurfaceTracker,
+  MultiresolutionModel,
+  LabelSurfaces,
+} = remoteClasses;
 
 /** Returns the version of the library in the worker. */
 export const version = remoteFunction('version');

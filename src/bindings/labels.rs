@@ -63,8 +63,7 @@ impl RawVolume {
     /// Changes the voxels of one frame in the region of `dims` voxels from index `min` to those of the typed array
     /// `data`, x fastest.
     pub fn write(&mut self, min: &[u32], dims: &[u32], data: &JsValue, frame: usize) -> Result<(), JsValue> {
-        let region = Region { min: three("region.min", min)?, dims: three("region.dims", dims)? };
-        Ok(self.0.write(region, &voxels(data)?, frame).map_err(Failure::from)?)
+        Ok(self.0.write(region(min, dims)?, &voxels(data)?, frame).map_err(Failure::from)?)
     }
 
     /// Returns the volume as a file; `format` is nifti, nrrd or mha. Compressed if `gzip`.
@@ -85,6 +84,11 @@ impl RawVolume {
 }
 
 /// Converts an array of one integer for each of x, y and z; a failure about `parameter` if it does not have three.
+/// Returns the region of `dims` voxels from index `min`.
+pub(super) fn region(min: &[u32], dims: &[u32]) -> Result<Region, Failure> {
+    Ok(Region { min: three("region.min", min)?, dims: three("region.dims", dims)? })
+}
+
 fn three(parameter: &str, values: &[u32]) -> Result<[usize; 3], Failure> {
     let values: [u32; 3] =
         values.try_into().map_err(|_| Failure::invalid(parameter, "must be 3 integers"))?;

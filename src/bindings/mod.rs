@@ -18,6 +18,8 @@ mod implicit;
 #[cfg(all(feature = "import", feature = "processing"))]
 mod import;
 #[cfg(feature = "labels")]
+mod label_surfaces;
+#[cfg(feature = "labels")]
 mod labels;
 #[cfg(feature = "processing")]
 mod mesh;

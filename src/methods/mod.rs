@@ -6,6 +6,8 @@ pub mod deformable;
 mod error;
 #[cfg(feature = "implicit")]
 pub mod implicit;
+#[cfg(feature = "labels")]
+pub mod label_surfaces;
 mod method;
 #[cfg(feature = "multires")]
 pub mod multires;

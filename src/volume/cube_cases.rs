@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 /// The twelve edges of a marching cubes cube: the axis of each (0 = x, 1 = y, 2 = z) and the offset [dx, dy, dz] of its
 /// start from the cube's origin.
-pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
+pub(crate) const EDGES: [(usize, [usize; 3]); 12] = [
     (0, [0, 0, 0]),
     (0, [0, 1, 0]),
     (0, [0, 0, 1]),
@@ -65,7 +65,7 @@ fn derive(case: usize) -> Case {
 
 /// Returns the number of a cube's corner, 0 to 7, from its offset from the cube's origin. In a marching cubes case, bit
 /// `corner` is set if the corner is inside.
-pub(super) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
+pub(crate) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
     dy | dz << 1 | dx << 2
 }
 
@@ -97,7 +97,7 @@ fn faces() -> [[usize; 4]; 6] {
 
 /// Returns the closed loops of cut edges (indices into [`EDGES`]) of a marching cubes case, oriented so that the
 /// triangles that fill them face outwards.
-fn loops(case: usize) -> Vec<Vec<usize>> {
+pub(crate) fn loops(case: usize) -> Vec<Vec<usize>> {
     let mut next = next_on_loop(case);
     let mut out = Vec::new();
     for start in 0..EDGES.len() {

@@ -1,8 +1,8 @@
 //! Label maps: volumes whose intensities are integers that name regions, with 0 for the background.
 
-use super::Volume;
 use super::error::{VolumeError, reserve};
 use super::voxels::Voxels;
+use super::{Region, Volume};
 use crate::math::order::{rank_f64, sort_ranks};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -85,6 +85,30 @@ impl Volume {
         }
         let mask = each_integer!(self.voxels.as_ref(), values => mask_of(values, &stored))?;
         self.mask(mask)
+    }
+
+    /// Calls `visit` with the label, 0 for the background, and the length of each run of voxels with equal stored values
+    /// in the rows of a region of one frame of a label map, in the order of the voxels.
+    ///
+    /// # Errors
+    /// [`VolumeError::InvalidArgument`] if the region is empty or not within the volume, `frame` is out of range, the
+    /// voxels are floats, or an intensity is not an integer; `visit` may have been called then.
+    pub fn label_runs(
+        &self,
+        region: Region,
+        frame: usize,
+        visit: &mut dyn FnMut(f64, usize),
+    ) -> Result<(), VolumeError> {
+        let start = self.frame_start(frame)?;
+        region.check("region", self.dims())?;
+        for row in region.rows(self.dims(), start) {
+            each_integer!(self.voxels.as_ref(), values => {
+                for (stored, times) in runs(&values[row]) {
+                    visit(self.intensity_of(stored)?, times);
+                }
+            });
+        }
+        Ok(())
     }
 
     /// Returns an error unless the voxels are integers, as those of label maps.

@@ -25,7 +25,7 @@
 mod binning;
 mod contour;
 mod crop;
-mod cube_cases;
+pub(crate) mod cube_cases;
 mod dice;
 mod enrich;
 mod error;

@@ -1,0 +1,168 @@
+import { checkProperties, denseCopy, integer, number, shallowCopy, typedArray } from './check.js';
+import type { Vec3 } from './data.js';
+import { type Mesh, wrapMesh } from './mesh.js';
+import { Handle } from './runtime.js';
+import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
+import { RawLabelSurfaces } from './vesicle.js';
+import { checkedRegion, type Volume, volumeHandle } from './volume.js';
+
+/** Parameters of {@link LabelSurfaces}; `paramSpecs('labels')` has their ranges, defaults and descriptions. */
+export interface LabelParams {
+  /** Number of smoothing iterations; 0 leaves the faces of the voxels. */
+  smoothing?: number;
+}
+
+/** Constructor options of {@link LabelSurfaces}. */
+export interface LabelOptions extends LabelParams {
+  /**
+   * Label map: a volume of integers, 0 for the background. Its voxels are copied, and read again by
+   * {@link LabelSurfaces.refresh}. Of a sequence, the first frame is used.
+   */
+  volume: Volume;
+  /** Labels that get a surface; all others count as background. Default all, including those that are added later. */
+  labels?: number[];
+}
+
+const OPTIONS = ['volume', 'labels', 'smoothing'];
+
+/**
+ * Surfaces of a label map: one closed surface for each label, none of which intersects itself or another, and which
+ * follow changes of the label map.
+ *
+ * The surfaces are surface nets (after Gibson, "Constrained elastic surface nets", 1998), smoothed within the voxels,
+ * so that the centre of each voxel is inside of the surface of its label, however thin that is; volumes are those of
+ * the voxels. Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
+ * Surfaces are in the volume's world space.
+ *
+ * @throws All methods: {@link VesicleError} `freed` after {@link LabelSurfaces.free}.
+ */
+export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
+  readonly #handle: Handle<RawLabelSurfaces>;
+  readonly #volume: Volume;
+  readonly #meshes = new Map<number, { mesh: Mesh; handle: Handle<import('./vesicle.js').RawMesh> }>();
+  readonly #runner = new Runner();
+
+  /**
+   * Creates the surfaces along the faces of the voxels; the first steps smooth them.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the option: a volume that is no label map, a label that it
+   *   does not have, too many labels; `too-large`.
+   */
+  constructor(given: LabelOptions) {
+    const { volume, labels, smoothing } = checkProperties('options', given, OPTIONS) as LabelOptions;
+    const image = volumeHandle('volume', volume);
+    const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
+    this.#volume = volume;
+    this.#handle = new Handle('LabelSurfaces', () =>
+      image.use((raw) => new RawLabelSurfaces(raw, wanted, smoothing === undefined ? {} : { smoothing })),
+    );
+  }
+
+  /** The labels that have voxels and a surface, in ascending order. */
+  get labels(): readonly number[] {
+    return this.#handle.use((raw) => Array.from(raw.labels()));
+  }
+
+  /** Current values of all parameters; a copy. */
+  get params(): Required<LabelParams> {
+    return this.#handle.use((raw) => raw.params() as Required<LabelParams>);
+  }
+
+  /**
+   * Returns the surface of a label in world space: the same live {@link Mesh} at every call. It shows the current state,
+   * is empty while the label has no voxels, and is freed with the surfaces.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: a label that never had a surface.
+   */
+  mesh(label: number): Mesh {
+    number('label', label);
+    let known = this.#meshes.get(label);
+    if (!known) {
+      const handle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(label)));
+      known = { handle, mesh: wrapMesh(handle, true) };
+      this.#meshes.set(label, known);
+    }
+    return known.mesh;
+  }
+
+  /**
+   * Adopts voxels that have changed, such as by {@link Volume.write}: the surfaces there follow at once, along the faces
+   * of the changed voxels, and the next steps smooth them. The rest of the surfaces stays as it is.
+   *
+   * @param region - `min`: index of the first voxel along x, y and z; `dims`: numbers of voxels.
+   * @throws {@link VesicleError} `invalid-argument`: an empty region or one beyond the volume, or too many labels;
+   *   `freed` if the volume was freed; `too-large`. Nothing has changed then.
+   */
+  refresh(region: { min: Vec3; dims: Vec3 }): void {
+    const [min, dims] = checkedRegion(region);
+    this.#handle.use((raw) => volumeHandle('volume', this.#volume).use((volume) => raw.refresh(volume, min, dims)));
+  }
+
+  /**
+   * Makes up to `iterations` steps, synchronous and deterministic; fewer if the surfaces are settled earlier. A step is
+   * five smoothing iterations.
+   *
+   * @returns The last report; counts are those of all surfaces together.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link LabelSurfaces.run} is in progress.
+   */
+  step(iterations = 1): StepReport {
+    integer('iterations', iterations, { min: 1 });
+    this.#runner.refuseWhileRunning('step');
+    return this.#step(iterations);
+  }
+
+  /**
+   * Runs until the surfaces are settled, yielding to the event loop between slices of work. {@link LabelSurfaces.refresh}
+   * may be called meanwhile.
+   *
+   * @returns The last report.
+   * @throws `signal.reason` when aborted, and the surfaces stay usable; any error thrown by `onStep`;
+   *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when freed meanwhile.
+   */
+  run(given?: RunOptions): Promise<StepReport> {
+    return this.#runner.run(() => this.#step(1), given);
+  }
+
+  #step(iterations: number): StepReport {
+    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+  }
+
+  /**
+   * Changes any subset of the parameters; all surfaces are smoothed again, from where they are.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out of
+   *   range. Nothing has changed then.
+   */
+  setParams(params: LabelParams): void {
+    const values = shallowCopy('params', params);
+    this.#handle.use((raw) => raw.setParams(values));
+  }
+
+  /** Saves the whole state but the label map, for {@link LabelSurfaces.restore} with the same label map and labels. */
+  save(): Uint8Array {
+    return this.#handle.use((raw) => raw.save());
+  }
+
+  /**
+   * Restores a saved state, bit for bit.
+   *
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of surfaces of the label map as it is
+   *   now; nothing has changed then; `invalid-argument` while a run is in progress.
+   */
+  restore(state: Uint8Array): void {
+    typedArray('state', state, Uint8Array);
+    this.#runner.refuseWhileRunning('restore');
+    this.#handle.use((raw) => raw.restore(state));
+  }
+
+  /** Frees the memory; the surfaces and their live meshes cannot be used afterwards. */
+  free(): void {
+    for (const { handle } of this.#meshes.values()) handle.free();
+    this.#handle.free();
+  }
+
+  /** The same as {@link LabelSurfaces.free}, for `using`. */
+  [Symbol.dispose](): void {
+    this.free();
+  }
+}

@@ -1,0 +1,257 @@
+//! The cells through which surfaces pass, in a sparse table: in blocks, which are allocated where there are any.
+//!
+//! A cell is a cube between the centres of eight voxels; cell (x, y, z) lies between the voxels (x − 1, y − 1, z − 1)
+//! and (x, y, z). It is stored if its corners have different labels.
+
+use super::label_grid::LabelGrid;
+use crate::math::Vec3;
+use crate::volume::VolumeError;
+
+/// Number of cells along each side of a block.
+const SIDE: u32 = 8;
+const PER_BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
+const NONE: u32 = u32::MAX;
+
+/// A cell through which surfaces pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Index of the cell along x, y and z.
+    pub at: [u32; 3],
+    /// Numbers of the labels at the corners, numbered as in marching cubes. All equal in a free slot.
+    pub corners: [u16; 8],
+    /// Position of the cell's vertices, relative to the centre of the cell, in voxels.
+    pub offset: Vec3,
+}
+
+impl Cell {
+    /// Returns the corners that have the label `number`, as bits.
+    #[inline]
+    pub fn case(&self, number: u16) -> usize {
+        (0..8).fold(0, |case, corner| case | usize::from(self.corners[corner] == number) << corner)
+    }
+
+    /// Returns whether surfaces pass through the cell.
+    #[inline]
+    pub fn is_live(&self) -> bool {
+        self.corners.iter().any(|&number| number != self.corners[0])
+    }
+}
+
+/// A box of cells: from `low` to `high`, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellBox {
+    /// The first cell along x, y and z.
+    pub low: [u32; 3],
+    /// The last cell along x, y and z.
+    pub high: [u32; 3],
+}
+
+impl CellBox {
+    /// Returns the box with `by` more cells on each side, within a volume of `dims` voxels.
+    pub fn grown(&self, by: u32, dims: [usize; 3]) -> Self {
+        let mut grown = *self;
+        for axis in 0..3 {
+            grown.low[axis] = grown.low[axis].saturating_sub(by);
+            grown.high[axis] = (grown.high[axis] + by).min(dims[axis] as u32);
+        }
+        grown
+    }
+
+    /// Returns the smallest box that contains both.
+    pub fn union(&self, other: &Self) -> Self {
+        let mut union = *self;
+        for axis in 0..3 {
+            union.low[axis] = union.low[axis].min(other.low[axis]);
+            union.high[axis] = union.high[axis].max(other.high[axis]);
+        }
+        union
+    }
+
+    /// Returns whether the box contains a cell.
+    pub fn contains(&self, at: [u32; 3]) -> bool {
+        (0..3).all(|axis| self.low[axis] <= at[axis] && at[axis] <= self.high[axis])
+    }
+}
+
+/// All cells through which surfaces pass, each in a slot that it keeps as long as it is stored.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    /// Number of blocks along each axis.
+    blocks: [u32; 3],
+    /// Index into `slots` of each block; [`NONE`] if it has not been allocated.
+    table: Vec<u32>,
+    /// Slot of each cell of an allocated block; [`NONE`] for cells that are not stored.
+    slots: Vec<[u32; PER_BLOCK]>,
+    list: Vec<Cell>,
+    free: Vec<u32>,
+}
+
+impl Cells {
+    /// Creates an empty table for a volume of `dims` voxels.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
+        let blocks = dims.map(|n| n as u32 / SIDE + 1);
+        let size = blocks.iter().map(|&n| n as usize).product();
+        let mut table = Vec::new();
+        table.try_reserve_exact(size).map_err(|_| VolumeError::TooLarge { bytes: 4 * size as u64 })?;
+        table.resize(size, NONE);
+        Ok(Self { blocks, table, slots: Vec::new(), list: Vec::new(), free: Vec::new() })
+    }
+
+    /// Creates the table of cells that are in given slots; `None` if two are the same, or the free slots are not those in
+    /// `free`.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn restored(dims: [usize; 3], list: Vec<Cell>, free: Vec<u32>) -> Result<Option<Self>, VolumeError> {
+        let mut cells = Self::new(dims)?;
+        for cell in list.iter().filter(|cell| cell.is_live()) {
+            if cells.find(cell.at).is_some() {
+                return Ok(None);
+            }
+            cells.store(cell.at, cell.corners)?;
+        }
+        let mut is_free: Vec<bool> = list.iter().map(|cell| !cell.is_live()).collect();
+        for &slot in &free {
+            match is_free.get_mut(slot as usize) {
+                Some(expected) if *expected => *expected = false,
+                _ => return Ok(None),
+            }
+        }
+        if is_free.contains(&true) {
+            return Ok(None);
+        }
+        for (slot, cell) in (0..).zip(&list).filter(|(_, cell)| cell.is_live()) {
+            if let Some((block, index)) = cells.place(cell.at) {
+                cells.slots[cells.table[block] as usize][index] = slot;
+            }
+        }
+        (cells.list, cells.free) = (list, free);
+        Ok(Some(cells))
+    }
+
+    /// Returns all slots, including free ones.
+    pub fn slots(&self) -> &[Cell] {
+        &self.list
+    }
+
+    /// Returns the free slots, the one that is used next last.
+    pub fn free(&self) -> &[u32] {
+        &self.free
+    }
+
+    /// Returns the cell in a slot, which may be free.
+    #[inline]
+    pub fn get(&self, slot: u32) -> &Cell {
+        &self.list[slot as usize]
+    }
+
+    /// Returns the position of the vertices of the cell in a slot, relative to its centre, to change it.
+    #[inline]
+    pub fn offset_mut(&mut self, slot: u32) -> &mut Vec3 {
+        &mut self.list[slot as usize].offset
+    }
+
+    /// Returns the slot of a cell, if it is stored.
+    #[inline]
+    pub fn find(&self, at: [u32; 3]) -> Option<u32> {
+        let (block, index) = self.place(at)?;
+        let slot = self.slots.get(self.table[block] as usize)?[index];
+        (slot != NONE).then_some(slot)
+    }
+
+    /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn update(&mut self, grid: &LabelGrid, area: CellBox) -> Result<(), VolumeError> {
+        let width = grid.dims()[0] + 2;
+        let layer = width * (grid.dims()[1] + 2);
+        let numbers = grid.numbers();
+        let (first, last) = (area.low[0] as usize, area.high[0] as usize);
+        for z in area.low[2]..=area.high[2] {
+            for y in area.low[1]..=area.high[1] {
+                let start = width * y as usize + layer * z as usize;
+                let rows = [start, start + width, start + layer, start + width + layer]
+                    .map(|start| &numbers[start + first..start + last + 2]);
+                self.update_row(grid, [area.low[0], y, z], rows)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Updates a row of cells from `at` on; `rows` are the four rows of voxels around it.
+    fn update_row(&mut self, grid: &LabelGrid, at: [u32; 3], rows: [&[u16]; 4]) -> Result<(), VolumeError> {
+        let [a, b, c, d] = rows;
+        let mut before = true;
+        for i in 0..a.len() {
+            let uniform = a[i] == b[i] && a[i] == c[i] && a[i] == d[i];
+            if i > 0 {
+                let crossed = !(uniform && before && a[i] == a[i - 1]);
+                let cell = [at[0] + i as u32 - 1, at[1], at[2]];
+                if crossed {
+                    self.store(cell, grid.corners(cell))?;
+                } else if let Some(slot) = self.find(cell) {
+                    self.remove(cell, slot);
+                }
+            }
+            before = uniform;
+        }
+        Ok(())
+    }
+
+    fn store(&mut self, at: [u32; 3], corners: [u16; 8]) -> Result<(), VolumeError> {
+        let Some((block, index)) = self.place(at) else { return Ok(()) };
+        if self.table[block] == NONE {
+            self.table[block] = self.slots.len() as u32;
+            grow(&mut self.slots)?;
+            self.slots.push([NONE; PER_BLOCK]);
+        }
+        let slot = &mut self.slots[self.table[block] as usize][index];
+        if *slot != NONE {
+            self.list[*slot as usize].corners = corners;
+            return Ok(());
+        }
+        let cell = Cell { at, corners, offset: Vec3::ZERO };
+        if let Some(free) = self.free.pop() {
+            (*slot, self.list[free as usize]) = (free, cell);
+            return Ok(());
+        }
+        grow(&mut self.list)?;
+        *slot = self.list.len() as u32;
+        self.list.push(cell);
+        Ok(())
+    }
+
+    fn remove(&mut self, at: [u32; 3], slot: u32) {
+        let Some((block, index)) = self.place(at) else { return };
+        self.slots[self.table[block] as usize][index] = NONE;
+        self.list[slot as usize].corners = [0; 8];
+        self.free.push(slot);
+    }
+
+    /// Returns the block of a cell, as an index into `table`, and the cell's index in it.
+    #[inline]
+    fn place(&self, at: [u32; 3]) -> Option<(usize, usize)> {
+        let block = at.map(|n| n / SIDE);
+        if (0..3).any(|axis| block[axis] >= self.blocks[axis]) {
+            return None;
+        }
+        let [x, y, z] = at.map(|n| (n % SIDE) as usize);
+        let [nx, ny, _] = self.blocks.map(|n| n as usize);
+        let table = block[0] as usize + nx * (block[1] as usize + ny * block[2] as usize);
+        let side = SIDE as usize;
+        Some((table, x + side * (y + side * z)))
+    }
+}
+
+fn grow<T>(list: &mut Vec<T>) -> Result<(), VolumeError> {
+    if list.len() < list.capacity() {
+        return Ok(());
+    }
+    let more = list.len() / 2 + 64;
+    let bytes = ((list.len() + more) * size_of::<T>()) as u64;
+    list.try_reserve_exact(more).map_err(|_| VolumeError::TooLarge { bytes })
+}

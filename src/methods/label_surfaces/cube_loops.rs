@@ -1,0 +1,112 @@
+//! How the surface of one label passes through a cell, for each of the 256 sets of a cell's corners that can have the
+//! label.
+//!
+//! The surface crosses the cell's edges between a corner with the label and one without. On the faces of the cell, the
+//! crossings are connected to closed loops, as in marching cubes; there is one vertex in the cell for each loop. Two
+//! corners with the label that are diagonally opposite on a face are separated, so the label's voxels are connected
+//! across their faces only.
+
+use crate::math::Vec3;
+use crate::volume::cube_cases::{EDGES, corner, loops};
+use std::sync::OnceLock;
+
+/// The loops of one set of corners.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CubeLoops {
+    /// Number of loops, at most four.
+    pub count: u8,
+    /// The loop on which each edge of the cell is crossed; meaningless for edges that are not.
+    pub of_edge: [u8; 12],
+    /// For each loop, the direction in which its vertex moves to keep clear of other surfaces in the cell: towards the
+    /// side with the label, 1 long where the surface is flat.
+    pub clear: [Vec3; 4],
+}
+
+/// Returns the loops for all sets of corners; bit c of the index is set if corner c has the label, numbered as in
+/// marching cubes: dx = bit 2, dz = bit 1, dy = bit 0.
+pub fn cube_loops() -> &'static [CubeLoops; 256] {
+    static TABLE: OnceLock<[CubeLoops; 256]> = OnceLock::new();
+    TABLE.get_or_init(|| std::array::from_fn(derive))
+}
+
+/// Returns the index of the edge of a cell along `axis` at the offsets `b` and `c` (0 or 1) along the next two axes.
+pub fn edge_at(axis: usize, b: usize, c: usize) -> usize {
+    static TABLE: OnceLock<[[[usize; 2]; 2]; 3]> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let mut table = [[[0; 2]; 2]; 3];
+        for (edge, (axis, offset)) in EDGES.iter().enumerate() {
+            table[*axis][offset[(axis + 1) % 3]][offset[(axis + 2) % 3]] = edge;
+        }
+        table
+    })[axis][b][c]
+}
+
+/// Returns the offset of a corner from the origin of its cell.
+pub fn corner_offset(corner: usize) -> [usize; 3] {
+    [corner >> 2 & 1, corner & 1, corner >> 1 & 1]
+}
+
+fn derive(case: usize) -> CubeLoops {
+    let mut found = CubeLoops::default();
+    for (index, contour) in loops(case).iter().enumerate() {
+        let mut clear = Vec3::ZERO;
+        for &edge in contour {
+            found.of_edge[edge] = index as u8;
+            let (axis, offset) = EDGES[edge];
+            let side = if case >> corner(offset) & 1 == 1 { -1.0 } else { 1.0 };
+            clear[axis] += side / contour.len() as f32;
+        }
+        found.clear[index] = clear;
+        found.count += 1;
+    }
+    if case.count_ones() == 6 && found.count == 2 {
+        // Around two opposite corners without the label, which each vertex must not approach: it moves towards its own
+        // corner instead, less far than the vertices of that corner's label.
+        found.clear.iter_mut().for_each(|clear| *clear *= -1.0 / 3.0);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn vertices_never_move_across_an_edge_away_from_the_label() {
+        for (case, loops) in cube_loops().iter().enumerate() {
+            assert!(loops.count <= 4);
+            let surrounds_corners = case.count_ones() == 6 && loops.count == 2;
+            for (edge, &(axis, offset)) in EDGES.iter().enumerate() {
+                let mut far = offset;
+                far[axis] += 1;
+                let [low, high] = [offset, far].map(|at| case >> corner(at) & 1 == 1);
+                if low != high && !surrounds_corners {
+                    let clear = loops.clear[usize::from(loops.of_edge[edge])];
+                    assert!(clear.length() > 0.3, "case {case}, edge {edge}: {clear}");
+                    assert!(
+                        if low { clear[axis] <= 0.0 } else { clear[axis] >= 0.0 },
+                        "case {case}, edge {edge}: {clear}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn offsets_of_corners_are_those_of_marching_cubes() {
+        for number in 0..8 {
+            assert_eq!(corner(corner_offset(number)), number);
+        }
+        for axis in 0..3 {
+            for (b, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (found, offset) = EDGES[edge_at(axis, b, c)];
+                assert_eq!(
+                    (found, offset[axis], offset[(axis + 1) % 3], offset[(axis + 2) % 3]),
+                    (axis, 0, b, c)
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! The surfaces as meshes in world space.
+
+use super::label_grid::BACKGROUND;
+use super::nets::{NetVertex, Nets};
+use crate::mesh::TriangleMesh;
+use std::collections::BTreeMap;
+
+/// Collects the surface of one label after another in one mesh.
+struct Extraction<'a> {
+    nets: &'a Nets,
+    mesh: TriangleMesh,
+    /// Index in the mesh of the first vertex in each cell; those of its other loops follow.
+    first: Vec<u32>,
+    /// Index in the mesh of each vertex on a face.
+    on_faces: BTreeMap<NetVertex, u32>,
+}
+
+impl Nets {
+    /// Returns the surface of the label that `number` stands for, in world space; empty if it has no voxels.
+    pub fn mesh(&self, number: u16) -> TriangleMesh {
+        let mut extraction = Extraction::new(self);
+        extraction.add(number);
+        extraction.mesh
+    }
+
+    /// Returns the surfaces of all labels in one mesh, in world space, label by label.
+    pub fn all_meshes(&self) -> TriangleMesh {
+        let mut extraction = Extraction::new(self);
+        let numbers = self.grid.table().count() as u16;
+        (1..=numbers).for_each(|number| extraction.add(number));
+        extraction.mesh
+    }
+}
+
+impl<'a> Extraction<'a> {
+    fn new(nets: &'a Nets) -> Self {
+        let first = vec![0; nets.cells.slots().len()];
+        Self { nets, mesh: TriangleMesh::default(), first, on_faces: BTreeMap::new() }
+    }
+
+    fn add(&mut self, number: u16) {
+        debug_assert_ne!(number, BACKGROUND);
+        let nets = self.nets;
+        let reflected = nets.to_world().matrix3.determinant() < 0.0;
+        self.on_faces.clear();
+        for (slot, cell) in (0..).zip(nets.cells.slots()) {
+            if !cell.corners.contains(&number) {
+                continue;
+            }
+            let count = super::cube_loops::cube_loops()[cell.case(number)].count;
+            self.first[slot as usize] = self.mesh.positions.len() as u32;
+            for on in 0..count {
+                self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));
+            }
+        }
+        for (slot, cell) in (0..).zip(nets.cells.slots()) {
+            if !cell.is_live() || !cell.corners.contains(&number) {
+                continue;
+            }
+            for crossing in nets.crossings(slot) {
+                let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
+                let mut on_edge = None;
+                for triangle in nets.patch(&crossing, far == 1).triangles() {
+                    let mut corners = triangle.map(|vertex| self.index(number, vertex, &mut on_edge));
+                    if reflected {
+                        corners.swap(1, 2);
+                    }
+                    self.mesh.triangles.push(corners);
+                }
+            }
+        }
+    }
+
+    /// Returns the index of a vertex in the mesh; `on_edge` is that of the vertex on the edge around which the present
+    /// polygon lies.
+    fn index(&mut self, number: u16, vertex: NetVertex, on_edge: &mut Option<u32>) -> u32 {
+        let next = self.mesh.positions.len() as u32;
+        let index = match vertex {
+            NetVertex::Cell { slot, on } => self.first[slot as usize] + u32::from(on),
+            NetVertex::Face { .. } => *self.on_faces.entry(vertex).or_insert(next),
+            NetVertex::Edge { .. } => *on_edge.get_or_insert(next),
+        };
+        if index == next {
+            self.mesh.positions.push(self.nets.world_position(number, vertex));
+        }
+        index
+    }
+}

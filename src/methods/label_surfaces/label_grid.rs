@@ -1,0 +1,173 @@
+//! The labels of all voxels, as small numbers in the order in which the labels were first seen.
+
+use crate::math::order::{rank_f64, sort_by_rank};
+use crate::methods::MethodError;
+use crate::methods::saved::Hash;
+use crate::volume::{Region, Volume, VolumeError};
+
+/// The number that stands for the background, and for labels that have no surface.
+pub const BACKGROUND: u16 = 0;
+/// Largest number of labels with surfaces.
+const MOST_LABELS: usize = u16::MAX as usize;
+
+/// A label map with a layer of background around it.
+#[derive(Clone, Debug)]
+pub struct LabelGrid {
+    dims: [usize; 3],
+    /// Number of each voxel's label, x fastest, including the layer around the volume.
+    numbers: Vec<u16>,
+    /// The label that each number stands for; that of number 1 comes first.
+    values: Vec<f64>,
+    /// Number of voxels of each label, in the same order.
+    voxels: Vec<usize>,
+    /// The labels that have surfaces, in ascending order, if not all have.
+    wanted: Option<Vec<f64>>,
+}
+
+impl LabelGrid {
+    /// Reads the first frame of a label map; `wanted` are the labels that get surfaces, all if not given.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if `wanted` has a value that is not a label of the volume; an error about the
+    /// volume if it is no label map, or too large.
+    pub fn new(volume: &Volume, wanted: Option<Vec<f64>>) -> Result<Self, MethodError> {
+        let present = volume.labels(0)?;
+        if let Some(wanted) = &wanted {
+            check_wanted(wanted, &present.iter().map(|label| label.value).collect::<Vec<_>>())?;
+        }
+        let dims = volume.dims();
+        let mut numbers = reserved(dims.map(|n| n + 2))?;
+        numbers.resize(dims.iter().map(|n| n + 2).product(), BACKGROUND);
+        let mut grid =
+            Self { dims, numbers, values: Vec::new(), voxels: Vec::new(), wanted: wanted.map(sorted) };
+        grid.read(volume, Region { min: [0; 3], dims })?;
+        Ok(grid)
+    }
+
+    /// Returns the number of voxels along each axis.
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Returns the label that `number`, which is not [`BACKGROUND`], stands for.
+    pub fn value(&self, number: u16) -> f64 {
+        self.values[usize::from(number) - 1]
+    }
+
+    /// Returns the number that stands for a label, if the volume has, or had, voxels of it that get a surface.
+    pub fn number(&self, value: f64) -> Option<u16> {
+        self.values.iter().position(|&known| known == value).map(|index| index as u16 + 1)
+    }
+
+    /// Returns the labels that have voxels and a surface, in ascending order.
+    pub fn labels(&self) -> Vec<f64> {
+        let present = self.values.iter().zip(&self.voxels).filter(|&(_, &voxels)| voxels > 0);
+        sorted(present.map(|(&value, _)| value).collect())
+    }
+
+    /// Returns all numbers with their labels and the numbers of their voxels: those of the numbers 1, 2 and so on.
+    pub fn table(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
+        self.values.iter().copied().zip(self.voxels.iter().copied())
+    }
+
+    /// Returns the numbers of the labels of all voxels, with the layer around them, x fastest.
+    pub fn numbers(&self) -> &[u16] {
+        &self.numbers
+    }
+
+    /// Returns the numbers at the corners of a cell, which lies between the voxels `at` − 1 and `at`, numbered as in
+    /// marching cubes.
+    pub fn corners(&self, at: [u32; 3]) -> [u16; 8] {
+        let [x, y, z] = at.map(|n| n as usize);
+        let [width, height] = [self.dims[0] + 2, self.dims[1] + 2];
+        let start = x + width * (y + height * z);
+        let (up, back) = (width, width * height);
+        [0, up, back, back + up, 1, up + 1, back + 1, back + up + 1]
+            .map(|offset| self.numbers[start + offset])
+    }
+
+    /// Adds the labels of all voxels to a hash; it does not depend on the order in which labels were first seen.
+    pub fn hash(&self, hash: &mut Hash) {
+        for run in self.numbers.chunk_by(|a, b| a == b) {
+            let label = if run[0] == BACKGROUND { 0.0 } else { self.value(run[0]) };
+            hash.mix(label.to_bits());
+            hash.mix(run.len() as u64);
+        }
+    }
+
+    /// Reads the labels in a region of the volume's first frame anew. Labels that are met for the first time get the
+    /// next numbers.
+    ///
+    /// # Errors
+    /// An error about the region if it is not within the volume, or about the volume if it is no label map or has too
+    /// many labels; nothing has changed then.
+    pub fn read(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
+        let known = self.values.len();
+        let mut numbers = reserved(region.dims)?;
+        let read = volume.label_runs(region, 0, &mut |label, voxels| {
+            let number = self.number_or_new(label);
+            numbers.resize(numbers.len() + voxels, number);
+        });
+        if read.is_err() || self.values.len() > MOST_LABELS {
+            self.values.truncate(known);
+            read?;
+            let problem = format!("must have at most {MOST_LABELS} labels with surfaces");
+            return Err(MethodError::invalid("volume", problem));
+        }
+        self.voxels.resize(self.values.len(), 0);
+        self.replace(region, &numbers);
+        Ok(())
+    }
+
+    fn number_or_new(&mut self, label: f64) -> u16 {
+        let has_surface = self.wanted.as_ref().is_none_or(|wanted| wanted.contains(&label));
+        if label == 0.0 || !has_surface {
+            return BACKGROUND;
+        }
+        self.number(label).unwrap_or_else(|| {
+            self.values.push(label);
+            // One beyond the last number, if there are too many labels, is never used.
+            self.values.len().min(MOST_LABELS) as u16
+        })
+    }
+
+    fn replace(&mut self, region: Region, numbers: &[u16]) {
+        let [width, height] = [self.dims[0] + 2, self.dims[1] + 2];
+        let [nx, ny, _] = region.dims;
+        for (row, new) in numbers.chunks_exact(nx).enumerate() {
+            let [y, z] = [region.min[1] + row % ny + 1, region.min[2] + row / ny + 1];
+            let start = region.min[0] + 1 + width * (y + height * z);
+            for (old, &number) in self.numbers[start..start + nx].iter_mut().zip(new) {
+                for (label, change) in [(*old, -1), (number, 1)] {
+                    if label != BACKGROUND {
+                        let count = &mut self.voxels[usize::from(label) - 1];
+                        *count = count.wrapping_add_signed(change);
+                    }
+                }
+                *old = number;
+            }
+        }
+    }
+}
+
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    sort_by_rank(&mut values, |&value| rank_f64(value));
+    values
+}
+
+/// Returns an empty array with room for the numbers of `dims` voxels.
+fn reserved(dims: [usize; 3]) -> Result<Vec<u16>, VolumeError> {
+    let size = dims.iter().try_fold(1usize, |size, &n| size.checked_mul(n));
+    let mut numbers = Vec::new();
+    let size = size.ok_or(VolumeError::TooLarge { bytes: u64::MAX })?;
+    numbers.try_reserve_exact(size).map_err(|_| VolumeError::TooLarge { bytes: 2 * size as u64 })?;
+    Ok(numbers)
+}
+
+fn check_wanted(wanted: &[f64], present: &[f64]) -> Result<(), MethodError> {
+    if wanted.is_empty() {
+        return Err(MethodError::invalid("labels", "must be at least one label"));
+    }
+    let Some(missing) = wanted.iter().find(|value| !present.contains(value)) else { return Ok(()) };
+    Err(MethodError::invalid("labels", format!("must be labels of the volume, got {missing}")))
+}

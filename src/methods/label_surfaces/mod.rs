@@ -1,0 +1,249 @@
+//! Surfaces of a label map: one closed surface for each label, none of which intersects itself or another, and which
+//! follow changes of the label map.
+//!
+//! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
+//! ([`nets`]), whose vertices are smoothed within the grid's cells ([`smooth`]), so that each voxel stays on its side of
+//! every surface. What smoothing takes from the volume of a label is given back ([`balance`]), and intersections are
+//! resolved ([`untangle`]). All of this is local: after a change of some voxels, only cells nearby are touched.
+//!
+//! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
+
+mod balance;
+mod cells;
+mod counts;
+mod cube_loops;
+mod extract;
+mod label_grid;
+mod nets;
+mod params;
+mod smooth;
+mod state;
+mod untangle;
+
+pub use params::LabelParams;
+
+use crate::mesh::TriangleMesh;
+use crate::methods::method::method;
+use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
+use crate::remesh::Changes;
+use crate::volume::{Region, Volume};
+use cells::CellBox;
+use counts::Counts;
+use label_grid::LabelGrid;
+use nets::Nets;
+use smooth::Stencil;
+
+/// Number of smoothing iterations in a step.
+const ITERATIONS: u32 = 5;
+/// Number of times that volumes are balanced at the end.
+const BALANCES: u32 = 3;
+/// Distance from a change, in cells, up to which surfaces are smoothed again.
+const HALO: u32 = 8;
+
+/// The surfaces of all labels of a label map, or of some.
+pub struct LabelSurfaces {
+    nets: Nets,
+    params: LabelParams,
+    /// The cells that are being smoothed; `None` when all is done.
+    area: Option<CellBox>,
+    stencils: Vec<Stencil>,
+    /// Number of iterations made in `area`.
+    iterations: u32,
+    steps: u32,
+    residual: f64,
+    counts: Counts,
+    topology_version: u32,
+    geometry_version: u32,
+    clock: fn() -> f64,
+}
+
+method!(LabelSurfaces, LabelParams);
+
+impl LiveSurface for LabelSurfaces {
+    fn surface(&self) -> TriangleMesh {
+        self.nets.all_meshes()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.counts.vertices, self.counts.triangles]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.topology_version, self.geometry_version]
+    }
+}
+
+impl LabelSurfaces {
+    /// Creates the surfaces of the first frame of a label map, along the faces of the voxels at first; `labels` are those
+    /// that get surfaces, by default all.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for a volume that is no label map, labels it does not have, or parameters out of
+    /// range; an error about memory.
+    pub fn new(volume: &Volume, labels: Option<Vec<f64>>, params: LabelParams) -> Result<Self, MethodError> {
+        params.check_ranges()?;
+        let nets = Nets::new(LabelGrid::new(volume, labels)?, volume.affine())?;
+        let everywhere = nets.everywhere();
+        let mut surfaces = Self {
+            counts: nets.counts(),
+            stencils: Vec::new(),
+            nets,
+            params,
+            area: None,
+            iterations: 0,
+            steps: 0,
+            residual: f64::NAN,
+            topology_version: 0,
+            geometry_version: 0,
+            clock: || 0.0,
+        };
+        surfaces.nets.untangle(everywhere);
+        surfaces.wake(everywhere);
+        Ok(surfaces)
+    }
+
+    /// Returns the labels that have voxels and a surface, in ascending order.
+    pub fn labels(&self) -> Vec<f64> {
+        self.nets.grid.labels()
+    }
+
+    /// Returns the surface of one label in world space.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if the label has no surface.
+    pub fn mesh(&self, label: f64) -> Result<TriangleMesh, MethodError> {
+        Ok(self.nets.mesh(self.check_label(label)?))
+    }
+
+    /// Returns the number of a label that has, or had, a surface.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if it never had one.
+    pub(crate) fn check_label(&self, label: f64) -> Result<u16, MethodError> {
+        self.nets.grid.number(label).ok_or_else(|| {
+            let problem = format!("must be a label that has a surface ({:?}), got {label}", self.labels());
+            MethodError::invalid("label", problem)
+        })
+    }
+
+    /// Adopts the voxels of `volume`, which has the grid of the volume that the surfaces were made of, in a region, where
+    /// they have changed. Surfaces are along the faces of changed voxels at first, and are smoothed by the next steps.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if the volume has another grid or is no label map, or the region is not within it;
+    /// nothing has changed then.
+    pub fn refresh(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
+        if volume.dims() != self.nets.grid.dims() || volume.affine() != *self.nets.to_world() {
+            return Err(MethodError::invalid(
+                "volume",
+                "must have the grid of the volume that the surfaces are of",
+            ));
+        }
+        self.nets.grid.read(volume, region)?;
+        let changed = CellBox {
+            low: region.min.map(|n| n as u32),
+            high: [0, 1, 2].map(|axis| (region.min[axis] + region.dims[axis]) as u32),
+        };
+        self.nets.cells.update(&self.nets.grid, changed)?;
+        let dims = self.nets.grid.dims();
+        self.nets.untangle(changed.grown(1, dims));
+        self.counts = self.nets.counts();
+        self.topology_version = self.topology_version.wrapping_add(1);
+        self.geometry_version = self.geometry_version.wrapping_add(1);
+        let area = changed.grown(HALO, dims);
+        self.wake(self.area.map_or(area, |unfinished| unfinished.union(&area)));
+        Ok(())
+    }
+
+    /// Returns the current parameters.
+    pub fn params(&self) -> &LabelParams {
+        &self.params
+    }
+
+    /// Replaces the parameters; all surfaces are smoothed again with them, from where they are.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`]; nothing has changed then.
+    pub fn set_params(&mut self, params: LabelParams) -> Result<(), MethodError> {
+        params.check_ranges()?;
+        if params != self.params {
+            self.params = params;
+            self.wake(self.nets.everywhere());
+        }
+        Ok(())
+    }
+
+    /// Sets the clock, a function that returns the time in milliseconds, for [`StepReport::times`].
+    pub fn set_clock(&mut self, clock: fn() -> f64) {
+        self.clock = clock;
+    }
+
+    /// Makes one step: some iterations of smoothing, after which volumes are balanced and nothing intersects.
+    ///
+    /// # Errors
+    /// None at present.
+    pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        let mut times = Times::default();
+        if let Some(area) = self.area {
+            self.steps += 1;
+            let wanted = self.params.smoothing.saturating_sub(self.iterations).min(ITERATIONS);
+            self.timed("smoothing", &mut times, |surfaces| {
+                for _ in 0..wanted {
+                    surfaces.residual = surfaces.nets.smooth(&surfaces.stencils);
+                }
+            });
+            self.iterations += wanted;
+            let is_last = self.iterations >= self.params.smoothing;
+            if self.params.smoothing > 0 {
+                let balances = if is_last { BALANCES } else { 1 };
+                self.timed("volumes", &mut times, |surfaces| {
+                    (0..balances).for_each(|_| surfaces.nets.balance(area, &surfaces.stencils));
+                });
+            }
+            let near = area.grown(1, self.nets.grid.dims());
+            self.timed("intersections", &mut times, |surfaces| {
+                surfaces.nets.untangle(near);
+            });
+            self.geometry_version = self.geometry_version.wrapping_add(1);
+            if is_last {
+                self.area = None;
+                self.stencils = Vec::new();
+            }
+        }
+        Ok(self.report(times))
+    }
+
+    fn timed(&mut self, part: &'static str, times: &mut Times, work: impl FnOnce(&mut Self)) {
+        let start = (self.clock)();
+        work(self);
+        times.add(part, (self.clock)() - start);
+    }
+
+    fn wake(&mut self, area: CellBox) {
+        self.stencils = self.nets.stencils(area);
+        self.area = Some(area);
+        self.iterations = 0;
+    }
+
+    fn report(&self, times: Times) -> StepReport {
+        let done = self.area.is_none();
+        let share = f64::from(self.iterations) / f64::from(self.params.smoothing.max(1));
+        StepReport {
+            iteration: self.steps,
+            done,
+            phase: if done { "done" } else { "smoothing" }.into(),
+            progress: if done { 1.0 } else { share.min(1.0) },
+            residual: self.residual,
+            tolerance: 0.0,
+            vertices: self.counts.vertices as u32,
+            triangles: self.counts.triangles as u32,
+            components: self.counts.components as u32,
+            euler: self.counts.euler() as i32,
+            events: Changes::default(),
+            times,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,303 @@
+//! The surfaces as polygons: one around each edge between two voxels of different labels, for each of the two.
+//!
+//! Vertices are the positions of the four cells around the edge (surface nets: Gibson, "Constrained elastic surface
+//! nets", 1998), one for each loop of the label in a cell, so that the surface is a 2-manifold. All labels share the
+//! position of a cell; where several surfaces pass through it, each vertex is moved towards its label's side, which
+//! leaves a gap between them. Two corners with the label that are diagonally opposite on a face would give two
+//! polygon edges between the same cells; there, each gets a vertex on the face, and polygons are divided around a
+//! vertex on the edge of the grid instead of by a diagonal.
+
+use super::cells::{Cell, CellBox, Cells};
+use super::cube_loops::{cube_loops, edge_at};
+use super::label_grid::{BACKGROUND, LabelGrid};
+use crate::math::{DAffine3, Vec3};
+
+/// Width of the gap between surfaces that touch, in voxels.
+pub const GAP: f32 = 0.01;
+
+/// A vertex of a label's surface, by which equal ones are recognised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NetVertex {
+    /// In the cell in a slot, on one of the label's loops.
+    Cell {
+        /// Slot of the cell.
+        slot: u32,
+        /// Index of the loop.
+        on: u8,
+    },
+    /// On the face between the cell in a slot and the one before it along an axis, next to one of two corners.
+    Face {
+        /// Slot of the later cell.
+        slot: u32,
+        /// Axis that the face is normal to.
+        axis: u8,
+        /// The corner of the later cell that the vertex is next to.
+        corner: u8,
+    },
+    /// On the edge from the first corner of the cell in a slot along an axis, next to one of its ends.
+    Edge {
+        /// Slot of the last of the four cells around the edge.
+        slot: u32,
+        /// Axis of the edge.
+        axis: u8,
+        /// Whether the vertex is next to the far end.
+        far: bool,
+    },
+}
+
+/// An edge of the grid between two voxels of different labels, and the four cells around it.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// Axis of the edge.
+    pub axis: usize,
+    /// Numbers of the labels at its low and its high end.
+    pub ends: [u16; 2],
+    /// Slots of the cells around it, counter-clockwise seen from the high end; the third is the one that begins at it.
+    pub slots: [u32; 4],
+}
+
+/// Position, along the two axes after that of the edge, of the four cells around it: 0 before it, 1 after.
+const AROUND: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+
+/// The polygon of one label around an edge of the grid, as triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    triangles: [[NetVertex; 3]; 8],
+    count: usize,
+}
+
+impl Patch {
+    /// Returns the triangles, counter-clockwise seen from outside of the label in index space.
+    pub fn triangles(&self) -> &[[NetVertex; 3]] {
+        &self.triangles[..self.count]
+    }
+
+    fn add(&mut self, corners: [NetVertex; 3]) {
+        self.triangles[self.count] = corners;
+        self.count += 1;
+    }
+}
+
+/// The labels and the cells through which their surfaces pass.
+#[derive(Clone, Debug)]
+pub struct Nets {
+    /// The labels of the voxels.
+    pub grid: LabelGrid,
+    /// The cells through which surfaces pass.
+    pub cells: Cells,
+    to_world: DAffine3,
+}
+
+impl Nets {
+    /// Creates the surfaces of a label map, with all vertices in the middle of their cells; `to_world` maps the index
+    /// space of the volume to world space.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`](crate::volume::VolumeError::TooLarge).
+    pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, crate::volume::VolumeError> {
+        let mut nets = Self { cells: Cells::new(grid.dims())?, grid, to_world };
+        nets.cells.update(&nets.grid, nets.everywhere())?;
+        Ok(nets)
+    }
+
+    /// Returns the map from the index space of the volume to world space.
+    pub fn to_world(&self) -> &DAffine3 {
+        &self.to_world
+    }
+
+    /// Returns the box of all cells.
+    pub fn everywhere(&self) -> CellBox {
+        CellBox { low: [0; 3], high: self.grid.dims().map(|n| n as u32) }
+    }
+
+    /// Returns the edges of the grid that begin at the first corner of the cell in a slot and end at a voxel of another
+    /// label.
+    #[inline]
+    pub fn crossings(&self, slot: u32) -> impl Iterator<Item = Crossing> + '_ {
+        let cell = *self.cells.get(slot);
+        // Corner numbers of the voxels next to the first corner along x, y and z.
+        [4, 1, 2].into_iter().enumerate().filter_map(move |(axis, corner)| {
+            let ends = [cell.corners[0], cell.corners[corner]];
+            if ends[0] == ends[1] {
+                return None;
+            }
+            let mut slots = [slot; 4];
+            for (found, [b, c]) in slots.iter_mut().zip(AROUND) {
+                let mut at = cell.at;
+                at[(axis + 1) % 3] -= 1 - b as u32;
+                at[(axis + 2) % 3] -= 1 - c as u32;
+                *found = self.cells.find(at)?;
+            }
+            Some(Crossing { axis, ends, slots })
+        })
+    }
+
+    /// Returns the polygon of the label at the `far` or near end of a crossed edge.
+    pub fn patch(&self, crossing: &Crossing, far: bool) -> Patch {
+        let Crossing { axis, ends, slots } = *crossing;
+        let number = ends[usize::from(far)];
+        let mut corners = [NetVertex::Cell { slot: 0, on: 0 }; 4];
+        for ((vertex, slot), [b, c]) in corners.iter_mut().zip(slots).zip(AROUND) {
+            let edge = edge_at(axis, 1 - b, 1 - c);
+            let on = cube_loops()[self.cells.get(slot).case(number)].of_edge[edge];
+            *vertex = NetVertex::Cell { slot, on };
+        }
+        let mut patch = Patch { triangles: [[corners[0]; 3]; 8], count: 0 };
+        if self.has_diagonal(crossing) {
+            self.divide_around_edge(crossing, far, corners, &mut patch);
+        } else {
+            self.halves(slots).into_iter().for_each(|half| patch.add(half.map(|i| corners[i])));
+        }
+        if far {
+            patch.triangles[..patch.count].iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+        patch
+    }
+
+    /// Returns, for each of the four faces around an edge, from each of the cells to the next one, whether the labels of
+    /// `ends` are diagonally opposite on it: that at the near end and that at the far end of the edge.
+    fn diagonals(&self, Crossing { axis, ends, slots }: &Crossing) -> [[bool; 2]; 4] {
+        let bits = [4usize, 1, 2];
+        let (a, b, c) = (bits[*axis], bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
+        let mut found = [[false; 2]; 4];
+        for (i, diagonals) in found.iter_mut().enumerate() {
+            let cell = self.cells.get(slots[i]);
+            // The face towards the next cell lies beyond the edge along the axis in which both cells agree.
+            let [here, next] = [AROUND[i], AROUND[(i + 1) % 4]];
+            let start = (1 - here[0]) * b | (1 - here[1]) * c;
+            let across = if here[0] == next[0] { b } else { c };
+            let other = start ^ across;
+            let (near, far) = (cell.corners[other], cell.corners[other | a]);
+            *diagonals = [far == ends[0] && near != ends[0], near == ends[1] && far != ends[1]];
+            // The background has no surface of its own.
+            (0..2).for_each(|end| diagonals[end] &= ends[end] != BACKGROUND);
+        }
+        found
+    }
+
+    /// Returns whether a label at the ends of an edge is also diagonally opposite on one of the faces around the edge.
+    fn has_diagonal(&self, crossing: &Crossing) -> bool {
+        self.diagonals(crossing).iter().flatten().any(|&is_diagonal| is_diagonal)
+    }
+
+    /// Returns the triangles into which the shorter diagonal divides a polygon, as indices of its cells.
+    pub fn halves(&self, slots: [u32; 4]) -> [[usize; 3]; 2] {
+        let [a, b, c, d] = slots.map(|slot| self.cells.get(slot));
+        let between = |from: &Cell, to: &Cell| {
+            let step = |axis: usize| to.at[axis] as f32 - from.at[axis] as f32;
+            (Vec3::new(step(0), step(1), step(2)) + to.offset - from.offset).length_squared()
+        };
+        if between(b, d) < between(a, c) { [[0, 1, 3], [1, 2, 3]] } else { [[0, 1, 2], [0, 2, 3]] }
+    }
+
+    fn divide_around_edge(&self, crossing: &Crossing, far: bool, corners: [NetVertex; 4], patch: &mut Patch) {
+        let middle = NetVertex::Edge { slot: crossing.slots[2], axis: crossing.axis as u8, far };
+        let diagonals = self.diagonals(crossing);
+        for i in 0..4 {
+            let (from, to) = (corners[i], corners[(i + 1) % 4]);
+            if diagonals[i][usize::from(far)] {
+                let face = self.face_vertex(crossing, i, far);
+                patch.add([middle, from, face]);
+                patch.add([middle, face, to]);
+            } else {
+                patch.add([middle, from, to]);
+            }
+        }
+    }
+
+    /// Returns the vertex on the face between two of the cells around an edge, `i` and the next one, next to one of the
+    /// ends of the edge.
+    fn face_vertex(&self, Crossing { axis, slots, .. }: &Crossing, i: usize, far: bool) -> NetVertex {
+        let [here, next] = [AROUND[i], AROUND[(i + 1) % 4]];
+        let changes = usize::from(here[0] == next[0]);
+        let (later, place) = if next[changes] == 1 { (slots[(i + 1) % 4], next) } else { (slots[i], here) };
+        let bits = [4, 1, 2];
+        let corner = usize::from(far) * bits[*axis]
+            | (1 - place[0]) * bits[(axis + 1) % 3]
+            | (1 - place[1]) * bits[(axis + 2) % 3];
+        NetVertex::Face { slot: later, axis: ((axis + 1 + changes) % 3) as u8, corner: corner as u8 }
+    }
+
+    /// Returns the position of a vertex of a label in the volume's index space, relative to the centre of cell `from`.
+    pub fn position(&self, number: u16, vertex: NetVertex, from: [u32; 3]) -> Vec3 {
+        match vertex {
+            NetVertex::Cell { slot, on } => self.cell_position(number, slot, on, from),
+            NetVertex::Face { slot, axis, corner } => self.face_position(slot, axis.into(), corner, from),
+            NetVertex::Edge { slot, axis, far } => self.edge_position(slot, axis.into(), far, from),
+        }
+    }
+
+    /// Returns the position of a vertex of a label in world space.
+    pub fn world_position(&self, number: u16, vertex: NetVertex) -> Vec3 {
+        let slot = match vertex {
+            NetVertex::Cell { slot, .. } | NetVertex::Face { slot, .. } | NetVertex::Edge { slot, .. } => {
+                slot
+            }
+        };
+        let at = self.cells.get(slot).at;
+        let centre = crate::math::DVec3::from(at.map(|n| f64::from(n) - 0.5));
+        let local = self.position(number, vertex, at).as_dvec3();
+        self.to_world.transform_point3(centre + local).as_vec3()
+    }
+
+    fn cell_position(&self, number: u16, slot: u32, on: u8, from: [u32; 3]) -> Vec3 {
+        let cell = self.cells.get(slot);
+        let loops = &cube_loops()[cell.case(number)];
+        let shift =
+            if has_one_surface(cell) { Vec3::ZERO } else { loops.clear[usize::from(on)] * (GAP / 2.0) };
+        steps(from, cell.at) + cell.offset + shift
+    }
+
+    /// The point of a face lies on the line between the positions of both cells.
+    fn face_position(&self, slot: u32, axis: usize, corner: u8, from: [u32; 3]) -> Vec3 {
+        let later = self.cells.get(slot);
+        let mut at = later.at;
+        at[axis] -= 1;
+        let earlier = self.cells.find(at).map_or(Vec3::ZERO, |slot| self.cells.get(slot).offset);
+        let mut across = Vec3::ZERO;
+        across[axis] = 1.0;
+        let way = later.offset + across - earlier;
+        let point = earlier - across + way * ((0.5 - earlier[axis]) / way[axis]);
+        let mut towards = corner_position(corner.into());
+        towards[axis] = 0.0;
+        steps(from, later.at) + point + towards * GAP
+    }
+
+    /// The point of an edge lies at the mean height of the four cells around it.
+    fn edge_position(&self, slot: u32, axis: usize, far: bool, from: [u32; 3]) -> Vec3 {
+        let cell = self.cells.get(slot);
+        let mut height = 0.0;
+        for [b, c] in AROUND {
+            let mut at = cell.at;
+            at[(axis + 1) % 3] -= 1 - b as u32;
+            at[(axis + 2) % 3] -= 1 - c as u32;
+            height += self.cells.find(at).map_or(0.0, |slot| self.cells.get(slot).offset[axis]) / 4.0;
+        }
+        let mut point = Vec3::splat(-0.5);
+        point[axis] = height + if far { GAP / 2.0 } else { -GAP / 2.0 };
+        steps(from, cell.at) + point
+    }
+}
+
+/// Returns whether only one vertex lies in a cell: one loop of one label.
+#[inline]
+pub fn has_one_surface(cell: &Cell) -> bool {
+    let number = if cell.corners[0] == BACKGROUND {
+        cell.corners.iter().copied().find(|&number| number != BACKGROUND).unwrap_or(BACKGROUND)
+    } else {
+        cell.corners[0]
+    };
+    let is_only = cell.corners.iter().all(|&other| other == number || other == BACKGROUND);
+    is_only && cube_loops()[cell.case(number)].count == 1
+}
+
+fn steps(from: [u32; 3], to: [u32; 3]) -> Vec3 {
+    let step = |axis: usize| to[axis] as f32 - from[axis] as f32;
+    Vec3::new(step(0), step(1), step(2))
+}
+
+/// Returns the position of a corner relative to the centre of its cell.
+fn corner_position(corner: usize) -> Vec3 {
+    let [x, y, z] = super::cube_loops::corner_offset(corner).map(|n| n as f32 - 0.5);
+    Vec3::new(x, y, z)
+}
