@@ -3,7 +3,8 @@
 //! A cell is a cube between the centres of eight voxels; cell (x, y, z) lies between the voxels (x − 1, y − 1, z − 1)
 //! and (x, y, z). It is stored if its corners have different labels.
 
-use super::label_grid::LabelGrid;
+use super::cube_loops::cube_loops;
+use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::Vec3;
 use crate::volume::VolumeError;
 
@@ -11,6 +12,9 @@ use crate::volume::VolumeError;
 const SIDE: u32 = 8;
 const PER_BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
 const NONE: u32 = u32::MAX;
+/// The corners of each face of a cell; the second and the third are next to the first.
+const FACES: [[usize; 4]; 6] =
+    [[0, 1, 2, 3], [4, 5, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 3, 6, 7]];
 
 /// A cell through which surfaces pass.
 #[derive(Clone, Copy, Debug)]
@@ -21,9 +25,38 @@ pub struct Cell {
     pub corners: [u16; 8],
     /// Position of the cell's vertices, relative to the centre of the cell, in voxels.
     pub offset: Vec3,
+    /// Number of surfaces that pass through the cell, if each does so once and they are one or two, else 0.
+    pub simple: u8,
+    /// Whether a label, not the background, has two diagonally opposite corners of a face, and no other of that face.
+    pub has_diagonal: bool,
 }
 
 impl Cell {
+    /// Creates a cell with its vertices in the middle.
+    pub fn new(at: [u32; 3], corners: [u16; 8]) -> Self {
+        let mut cell = Self { at, corners, offset: Vec3::ZERO, simple: 0, has_diagonal: false };
+        cell.set_corners(corners);
+        cell
+    }
+
+    fn set_corners(&mut self, corners: [u16; 8]) {
+        self.corners = corners;
+        let loops = self.numbers().map(|number| cube_loops()[self.case(number)].count);
+        let (surfaces, most) = loops.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
+        self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
+        self.has_diagonal = FACES.iter().any(|face| {
+            let [a, b, c, d] = face.map(|corner| corners[corner]);
+            (a == d && a != BACKGROUND || b == c && b != BACKGROUND) && a != b && a != c && d != b && d != c
+        });
+    }
+
+    /// Returns the numbers of the different labels at the corners, but for the background, in the order of the corners.
+    pub fn numbers(&self) -> impl Iterator<Item = u16> + '_ {
+        let corners = &self.corners;
+        let is_new = |&i: &usize| corners[i] != BACKGROUND && !corners[..i].contains(&corners[i]);
+        (0..8).filter(is_new).map(|i| corners[i])
+    }
+
     /// Returns the corners that have the label `number`, as bits.
     #[inline]
     pub fn case(&self, number: u16) -> usize {
@@ -162,6 +195,27 @@ impl Cells {
         (slot != NONE).then_some(slot)
     }
 
+    /// Returns the slots of the cells of a box, in the order of z, y and x.
+    pub fn within(&self, area: &CellBox) -> Vec<u32> {
+        let mut found = Vec::new();
+        for z in area.low[2]..=area.high[2] {
+            for y in area.low[1]..=area.high[1] {
+                let mut x = area.low[0];
+                while x <= area.high[0] {
+                    let end = (x / SIDE * SIDE + SIDE - 1).min(area.high[0]);
+                    if let Some((block, index)) = self.place([x, y, z])
+                        && let Some(slots) = self.slots.get(self.table[block] as usize)
+                    {
+                        let row = &slots[index..=index + (end - x) as usize];
+                        found.extend(row.iter().copied().filter(|&slot| slot != NONE));
+                    }
+                    x = end + 1;
+                }
+            }
+        }
+        found
+    }
+
     /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass.
     ///
     /// # Errors
@@ -211,10 +265,10 @@ impl Cells {
         }
         let slot = &mut self.slots[self.table[block] as usize][index];
         if *slot != NONE {
-            self.list[*slot as usize].corners = corners;
+            self.list[*slot as usize].set_corners(corners);
             return Ok(());
         }
-        let cell = Cell { at, corners, offset: Vec3::ZERO };
+        let cell = Cell::new(at, corners);
         if let Some(free) = self.free.pop() {
             (*slot, self.list[free as usize]) = (free, cell);
             return Ok(());

@@ -1,20 +1,19 @@
 //! The numbers of vertices, triangles and components of all surfaces together.
 
-use super::cube_loops::cube_loops;
+use super::cells::{Cell, CellBox};
+use super::cube_loops::{cube_loops, edge_at};
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
 use crate::mesh::DisjointSets;
 use std::collections::BTreeSet;
 
-/// The size and the topology of all surfaces together.
+/// The numbers of vertices and triangles of all surfaces together, or of a part of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Number of vertices.
     pub vertices: usize,
     /// Number of triangles.
     pub triangles: usize,
-    /// Number of connected components.
-    pub components: usize,
 }
 
 impl Counts {
@@ -22,59 +21,104 @@ impl Counts {
     pub fn euler(&self) -> i64 {
         self.vertices as i64 - self.triangles as i64 / 2
     }
+
+    /// Returns the counts after a part that had the counts `before` was replaced by one that has `after`.
+    pub fn replaced(&self, before: Self, after: Self) -> Self {
+        Self {
+            vertices: self.vertices - before.vertices + after.vertices,
+            triangles: self.triangles - before.triangles + after.triangles,
+        }
+    }
 }
 
 impl Nets {
-    /// Counts vertices, triangles and components.
-    pub fn counts(&self) -> Counts {
-        let first = self.first_vertices();
-        let in_cells = first.last().copied().unwrap_or(0);
-        let mut sets = DisjointSets::new(in_cells as usize);
-        let mut counts = Counts { vertices: in_cells as usize, ..Counts::default() };
+    /// Counts the vertices in and the polygons that begin at the cells of a box.
+    pub fn counts(&self, area: &CellBox) -> Counts {
+        let mut counts = Counts::default();
         let mut on_faces = BTreeSet::new();
-        for (slot, cell) in (0..).zip(self.cells.slots()) {
-            if !cell.is_live() {
-                continue;
-            }
+        for slot in self.cells.within(area) {
+            let cell = self.cells.get(slot);
+            counts.vertices += cell.numbers().map(|number| loops_of(cell, number)).sum::<usize>();
             for crossing in self.crossings(slot) {
+                let has_diagonal = self.has_diagonal(&crossing);
                 for far in [false, true] {
-                    let number = crossing.ends[usize::from(far)];
-                    if number == BACKGROUND {
+                    if crossing.ends[usize::from(far)] == BACKGROUND {
+                        continue;
+                    }
+                    if !has_diagonal {
+                        counts.triangles += 2;
                         continue;
                     }
                     let patch = self.patch(&crossing, far);
                     counts.triangles += patch.triangles().len();
                     // Divided around a vertex of its own.
-                    counts.vertices += usize::from(patch.triangles().len() > 2);
-                    let mut before = None;
-                    for &vertex in patch.triangles().iter().flatten() {
-                        match vertex {
-                            NetVertex::Cell { slot, on } => {
-                                let index = self.index_in(&first, slot, number) + usize::from(on);
-                                sets.union(before.unwrap_or(index), index);
-                                before = Some(index);
-                            }
-                            NetVertex::Face { .. } => {
-                                on_faces.insert(vertex);
-                            }
-                            NetVertex::Edge { .. } => {}
-                        }
-                    }
+                    counts.vertices += 1;
+                    let faces = patch.triangles().iter().flatten();
+                    on_faces.extend(faces.filter(|vertex| matches!(vertex, NetVertex::Face { .. })));
                 }
             }
         }
-        counts.vertices += on_faces.len();
-        counts.components = sets.count();
+        let is_inside = |slot: u32| area.contains(self.cells.get(slot).at);
+        let owned = |vertex: &&NetVertex| matches!(vertex, NetVertex::Face { slot, .. } if is_inside(*slot));
+        counts.vertices += on_faces.iter().filter(owned).count();
         counts
+    }
+
+    /// Counts the connected components of all surfaces.
+    pub fn components(&self) -> usize {
+        let first = self.first_vertices();
+        let mut sets = DisjointSets::new(first.last().map_or(0, |&count| count as usize));
+        for (slot, cell) in (0..).zip(self.cells.slots()) {
+            if !cell.is_live() {
+                continue;
+            }
+            for axis in 0..3 {
+                let mut next = cell.at;
+                next[axis] += 1;
+                if let Some(next) = self.cells.find(next) {
+                    self.join_across(axis, slot, next, &first, &mut sets);
+                }
+            }
+        }
+        sets.count()
+    }
+
+    /// Joins the vertices in a cell with those in the next one along an axis that share a polygon edge with them.
+    fn join_across(&self, axis: usize, slot: u32, next: u32, first: &[u32], sets: &mut DisjointSets) {
+        let [cell, other] = [slot, next].map(|slot| self.cells.get(slot));
+        let face = face_towards(axis);
+        let labels = face.map(|corner| cell.corners[corner]);
+        for (i, &number) in labels.iter().enumerate() {
+            if number == BACKGROUND || labels[..i].contains(&number) || labels.iter().all(|&l| l == number) {
+                continue;
+            }
+            if cell.simple > 0 && other.simple > 0 {
+                sets.union(self.index_in(first, slot, number), self.index_in(first, next, number));
+                continue;
+            }
+            let [case, other_case] = [cell, other].map(|cell| &cube_loops()[cell.case(number)]);
+            for (j, (edge, other_edge)) in edges_towards(axis).into_iter().enumerate() {
+                if (labels[j] == number) != (labels[(j + 1) % 4] == number) {
+                    let index = self.index_in(first, slot, number) + usize::from(case.of_edge[edge]);
+                    let other =
+                        self.index_in(first, next, number) + usize::from(other_case.of_edge[other_edge]);
+                    sets.union(index, other);
+                }
+            }
+        }
     }
 
     /// Returns the number of vertices in the cells of lower slots, for each slot, and the number of all.
     fn first_vertices(&self) -> Vec<u32> {
         let mut sum = 0;
-        let mut first = vec![0];
+        let mut first = Vec::with_capacity(self.cells.slots().len() + 1);
+        first.push(0);
         first.extend(self.cells.slots().iter().map(|cell| {
-            let numbers = (0..8).filter(|&i| is_first(&cell.corners, i));
-            sum += numbers.map(|i| loops_of(cell, cell.corners[i])).sum::<u32>();
+            sum += match cell.simple {
+                _ if !cell.is_live() => 0,
+                0 => cell.numbers().map(|number| loops_of(cell, number)).sum::<usize>() as u32,
+                surfaces => surfaces.into(),
+            };
             sum
         }));
         first
@@ -83,18 +127,34 @@ impl Nets {
     /// Returns the index of the first vertex of a label in a cell among those of all cells.
     fn index_in(&self, first: &[u32], slot: u32, number: u16) -> usize {
         let cell = self.cells.get(slot);
-        let before =
-            (0..8).take_while(|&i| cell.corners[i] != number).filter(|&i| is_first(&cell.corners, i));
-        let skipped: u32 = before.map(|i| loops_of(cell, cell.corners[i])).sum();
-        (first[slot as usize] + skipped) as usize
+        let first = first[slot as usize] as usize;
+        match cell.simple {
+            1 => first,
+            2 => first + usize::from(cell.numbers().next() != Some(number)),
+            _ => {
+                let before = cell.numbers().take_while(|&other| other != number);
+                first + before.map(|number| loops_of(cell, number)).sum::<usize>()
+            }
+        }
     }
 }
 
-/// Returns whether corner `i` is the first one with its label, which is not the background.
-fn is_first(corners: &[u16; 8], i: usize) -> bool {
-    corners[i] != BACKGROUND && !corners[..i].contains(&corners[i])
+/// Returns the corners of the face of a cell towards the next one along an axis, around the face.
+fn face_towards(axis: usize) -> [usize; 4] {
+    let bits = [4, 1, 2];
+    let (a, b, c) = (bits[axis], bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
+    [a, a | b, a | b | c, a | c]
 }
 
-fn loops_of(cell: &super::cells::Cell, number: u16) -> u32 {
+/// Returns the edges between these corners, from each to the next, as edges of the cell and of the next one.
+fn edges_towards(axis: usize) -> [(usize, usize); 4] {
+    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+    // The other two coordinates of an edge along the next axis are the last one and `axis`, and so on.
+    let along_next = |c: usize| (edge_at(next, c, 1), edge_at(next, c, 0));
+    let along_last = |b: usize| (edge_at(last, 1, b), edge_at(last, 0, b));
+    [along_next(0), along_last(1), along_next(1), along_last(0)]
+}
+
+fn loops_of(cell: &Cell, number: u16) -> usize {
     cube_loops()[cell.case(number)].count.into()
 }

@@ -19,6 +19,7 @@ mod params;
 mod smooth;
 mod state;
 mod untangle;
+mod zone;
 
 pub use params::LabelParams;
 
@@ -31,27 +32,27 @@ use cells::CellBox;
 use counts::Counts;
 use label_grid::LabelGrid;
 use nets::Nets;
-use smooth::Stencil;
+use zone::Zone;
 
 /// Number of smoothing iterations in a step.
-const ITERATIONS: u32 = 5;
+const ITERATIONS: u32 = 10;
 /// Number of times that volumes are balanced at the end.
 const BALANCES: u32 = 3;
 /// Distance from a change, in cells, up to which surfaces are smoothed again.
-const HALO: u32 = 8;
+const HALO: u32 = 6;
 
 /// The surfaces of all labels of a label map, or of some.
 pub struct LabelSurfaces {
     nets: Nets,
     params: LabelParams,
-    /// The cells that are being smoothed; `None` when all is done.
-    area: Option<CellBox>,
-    stencils: Vec<Stencil>,
-    /// Number of iterations made in `area`.
+    /// The part that is being smoothed; `None` when all is done.
+    zone: Option<Zone>,
+    /// Number of iterations made in the zone.
     iterations: u32,
     steps: u32,
     residual: f64,
     counts: Counts,
+    components: usize,
     topology_version: u32,
     geometry_version: u32,
     clock: fn() -> f64,
@@ -85,11 +86,11 @@ impl LabelSurfaces {
         let nets = Nets::new(LabelGrid::new(volume, labels)?, volume.affine())?;
         let everywhere = nets.everywhere();
         let mut surfaces = Self {
-            counts: nets.counts(),
-            stencils: Vec::new(),
+            counts: nets.counts(&everywhere),
+            components: nets.components(),
             nets,
             params,
-            area: None,
+            zone: None,
             iterations: 0,
             steps: 0,
             residual: f64::NAN,
@@ -139,19 +140,22 @@ impl LabelSurfaces {
                 "must have the grid of the volume that the surfaces are of",
             ));
         }
-        self.nets.grid.read(volume, region)?;
+        let dims = self.nets.grid.dims();
         let changed = CellBox {
             low: region.min.map(|n| n as u32),
             high: [0, 1, 2].map(|axis| (region.min[axis] + region.dims[axis]) as u32),
         };
+        let touched = changed.grown(1, dims);
+        let before = self.nets.counts(&touched);
+        self.nets.grid.read(volume, region)?;
         self.nets.cells.update(&self.nets.grid, changed)?;
-        let dims = self.nets.grid.dims();
-        self.nets.untangle(changed.grown(1, dims));
-        self.counts = self.nets.counts();
+        self.nets.untangle(touched);
+        self.counts = self.counts.replaced(before, self.nets.counts(&touched));
+        self.components = self.nets.components();
         self.topology_version = self.topology_version.wrapping_add(1);
         self.geometry_version = self.geometry_version.wrapping_add(1);
         let area = changed.grown(HALO, dims);
-        self.wake(self.area.map_or(area, |unfinished| unfinished.union(&area)));
+        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         Ok(())
     }
 
@@ -184,31 +188,25 @@ impl LabelSurfaces {
     /// None at present.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
-        if let Some(area) = self.area {
+        if let Some(mut zone) = self.zone.take() {
             self.steps += 1;
             let wanted = self.params.smoothing.saturating_sub(self.iterations).min(ITERATIONS);
-            self.timed("smoothing", &mut times, |surfaces| {
-                for _ in 0..wanted {
-                    surfaces.residual = surfaces.nets.smooth(&surfaces.stencils);
-                }
-            });
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
-            if self.params.smoothing > 0 {
+            self.timed("smoothing", &mut times, |surfaces| {
+                (0..wanted).for_each(|_| surfaces.residual = zone.smooth());
+            });
+            self.timed("volumes", &mut times, |surfaces| {
                 let balances = if is_last { BALANCES } else { 1 };
-                self.timed("volumes", &mut times, |surfaces| {
-                    (0..balances).for_each(|_| surfaces.nets.balance(area, &surfaces.stencils));
-                });
-            }
-            let near = area.grown(1, self.nets.grid.dims());
+                (0..if wanted > 0 { balances } else { 0 }).for_each(|_| zone.balance());
+                zone.write(&mut surfaces.nets);
+            });
             self.timed("intersections", &mut times, |surfaces| {
-                surfaces.nets.untangle(near);
+                surfaces.nets.untangle(zone.area.grown(1, surfaces.nets.grid.dims()));
+                zone.read(&surfaces.nets);
             });
             self.geometry_version = self.geometry_version.wrapping_add(1);
-            if is_last {
-                self.area = None;
-                self.stencils = Vec::new();
-            }
+            self.zone = (!is_last).then_some(zone);
         }
         Ok(self.report(times))
     }
@@ -220,13 +218,12 @@ impl LabelSurfaces {
     }
 
     fn wake(&mut self, area: CellBox) {
-        self.stencils = self.nets.stencils(area);
-        self.area = Some(area);
+        self.zone = Some(Zone::new(&self.nets, area));
         self.iterations = 0;
     }
 
     fn report(&self, times: Times) -> StepReport {
-        let done = self.area.is_none();
+        let done = self.zone.is_none();
         let share = f64::from(self.iterations) / f64::from(self.params.smoothing.max(1));
         StepReport {
             iteration: self.steps,
@@ -237,7 +234,7 @@ impl LabelSurfaces {
             tolerance: 0.0,
             vertices: self.counts.vertices as u32,
             triangles: self.counts.triangles as u32,
-            components: self.counts.components as u32,
+            components: self.components as u32,
             euler: self.counts.euler() as i32,
             events: Changes::default(),
             times,

@@ -134,24 +134,34 @@ impl Nets {
 
     /// Returns the polygon of the label at the `far` or near end of a crossed edge.
     pub fn patch(&self, crossing: &Crossing, far: bool) -> Patch {
-        let Crossing { axis, ends, slots } = *crossing;
+        let Crossing { ends, slots, .. } = *crossing;
         let number = ends[usize::from(far)];
-        let mut corners = [NetVertex::Cell { slot: 0, on: 0 }; 4];
-        for ((vertex, slot), [b, c]) in corners.iter_mut().zip(slots).zip(AROUND) {
-            let edge = edge_at(axis, 1 - b, 1 - c);
-            let on = cube_loops()[self.cells.get(slot).case(number)].of_edge[edge];
-            *vertex = NetVertex::Cell { slot, on };
-        }
+        let loops = self.loops(crossing, number);
+        let corners = [0, 1, 2, 3].map(|i| NetVertex::Cell { slot: slots[i], on: loops[i] });
         let mut patch = Patch { triangles: [[corners[0]; 3]; 8], count: 0 };
         if self.has_diagonal(crossing) {
             self.divide_around_edge(crossing, far, corners, &mut patch);
         } else {
-            self.halves(slots).into_iter().for_each(|half| patch.add(half.map(|i| corners[i])));
+            let origin = self.cells.get(slots[0]).at;
+            let cell_position = |slot| steps(origin, self.cells.get(slot).at) + self.cells.get(slot).offset;
+            for half in halves(slots.map(cell_position)) {
+                patch.add(half.map(|i| corners[i]));
+            }
         }
         if far {
             patch.triangles[..patch.count].iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
         patch
+    }
+
+    /// Returns the loops of the label `number`, at one end of an edge, on which the edge is crossed in the cells around it.
+    pub fn loops(&self, crossing: &Crossing, number: u16) -> [u8; 4] {
+        let mut loops = [0; 4];
+        for ((on, &slot), [b, c]) in loops.iter_mut().zip(&crossing.slots).zip(AROUND) {
+            let edge = edge_at(crossing.axis, 1 - b, 1 - c);
+            *on = cube_loops()[self.cells.get(slot).case(number)].of_edge[edge];
+        }
+        loops
     }
 
     /// Returns, for each of the four faces around an edge, from each of the cells to the next one, whether the labels of
@@ -176,18 +186,9 @@ impl Nets {
     }
 
     /// Returns whether a label at the ends of an edge is also diagonally opposite on one of the faces around the edge.
-    fn has_diagonal(&self, crossing: &Crossing) -> bool {
-        self.diagonals(crossing).iter().flatten().any(|&is_diagonal| is_diagonal)
-    }
-
-    /// Returns the triangles into which the shorter diagonal divides a polygon, as indices of its cells.
-    pub fn halves(&self, slots: [u32; 4]) -> [[usize; 3]; 2] {
-        let [a, b, c, d] = slots.map(|slot| self.cells.get(slot));
-        let between = |from: &Cell, to: &Cell| {
-            let step = |axis: usize| to.at[axis] as f32 - from.at[axis] as f32;
-            (Vec3::new(step(0), step(1), step(2)) + to.offset - from.offset).length_squared()
-        };
-        if between(b, d) < between(a, c) { [[0, 1, 3], [1, 2, 3]] } else { [[0, 1, 2], [0, 2, 3]] }
+    pub fn has_diagonal(&self, crossing: &Crossing) -> bool {
+        crossing.slots.iter().any(|&slot| self.cells.get(slot).has_diagonal)
+            && self.diagonals(crossing).iter().flatten().any(|&is_diagonal| is_diagonal)
     }
 
     fn divide_around_edge(&self, crossing: &Crossing, far: bool, corners: [NetVertex; 4], patch: &mut Patch) {
@@ -243,8 +244,7 @@ impl Nets {
     fn cell_position(&self, number: u16, slot: u32, on: u8, from: [u32; 3]) -> Vec3 {
         let cell = self.cells.get(slot);
         let loops = &cube_loops()[cell.case(number)];
-        let shift =
-            if has_one_surface(cell) { Vec3::ZERO } else { loops.clear[usize::from(on)] * (GAP / 2.0) };
+        let shift = if cell.simple == 1 { Vec3::ZERO } else { loops.clear[usize::from(on)] * (GAP / 2.0) };
         steps(from, cell.at) + cell.offset + shift
     }
 
@@ -279,16 +279,13 @@ impl Nets {
     }
 }
 
-/// Returns whether only one vertex lies in a cell: one loop of one label.
-#[inline]
-pub fn has_one_surface(cell: &Cell) -> bool {
-    let number = if cell.corners[0] == BACKGROUND {
-        cell.corners.iter().copied().find(|&number| number != BACKGROUND).unwrap_or(BACKGROUND)
+/// Returns the triangles into which the shorter diagonal divides a quadrilateral, as indices of its corners.
+pub fn halves([a, b, c, d]: [Vec3; 4]) -> [[usize; 3]; 2] {
+    if b.distance_squared(d) < a.distance_squared(c) {
+        [[0, 1, 3], [1, 2, 3]]
     } else {
-        cell.corners[0]
-    };
-    let is_only = cell.corners.iter().all(|&other| other == number || other == BACKGROUND);
-    is_only && cube_loops()[cell.case(number)].count == 1
+        [[0, 1, 2], [0, 2, 3]]
+    }
 }
 
 fn steps(from: [u32; 3], to: [u32; 3]) -> Vec3 {

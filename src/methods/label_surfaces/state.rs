@@ -37,7 +37,7 @@ impl LabelSurfaces {
                 params: self.params.clone(),
                 cells: cells.map(|cell| cell.is_live().then_some((cell.at, cell.offset))).collect(),
                 free: self.nets.cells.free().to_vec(),
-                area: self.area.map(|area| [area.low, area.high]),
+                area: self.zone.as_ref().map(|zone| [zone.area.low, zone.area.high]),
                 iterations: self.iterations,
                 steps: self.steps,
                 residual: self.residual,
@@ -66,8 +66,7 @@ impl LabelSurfaces {
         let Some(cells) = self.restored(&state)? else { return bad("cells", "inconsistent") };
         self.nets.cells = cells;
         self.params = state.params;
-        self.area = None;
-        self.stencils = Vec::new();
+        self.zone = None;
         if let Some([low, high]) = state.area {
             self.wake(CellBox { low, high });
         }
@@ -84,11 +83,11 @@ impl LabelSurfaces {
         let grid = &self.nets.grid;
         let list = (state.cells.iter()).map(|saved| {
             let Some((at, offset)) = *saved else {
-                return Some(Cell { at: [0; 3], corners: [0; 8], offset: Vec3::ZERO });
+                return Some(Cell::new([0; 3], [0; 8]));
             };
             self.nets.cells.find(at)?;
-            let is_within = offset.is_finite() && super::smooth::within_reach(offset) == offset;
-            is_within.then(|| Cell { at, corners: grid.corners(at), offset })
+            let is_within = offset.is_finite() && super::zone::within_reach(offset) == offset;
+            is_within.then(|| Cell { offset, ..Cell::new(at, grid.corners(at)) })
         });
         let Some(list) = list.collect::<Option<Vec<Cell>>>() else { return Ok(None) };
         if count(&list) != wanted {

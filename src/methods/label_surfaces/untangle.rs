@@ -5,31 +5,55 @@
 //! cell: tests are local to each cell. They use the positions in world space in single precision, as they are returned.
 
 use super::cells::CellBox;
-use super::nets::{NetVertex, Nets};
-use crate::math::{Bounds, Vec3};
+use super::nets::{Crossing, NetVertex, Nets};
+use crate::math::Vec3;
 use crate::mesh::{Facet, facets_intersect};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Number of times that a cell's distance from its middle is halved before it becomes zero.
 const HALVINGS: u32 = 3;
 
+/// Sine-like measure below which a triangle counts as a needle, whose normal is not relied on: twice its area, in
+/// square voxels.
+const NEEDLE: f32 = 1e-3;
+/// Distance, in voxels, by which positions may differ between index space and world space in single precision, with
+/// room to spare.
+const MARGIN: f32 = 1e-3;
+
 /// A triangle of a polygon around one of the edges of a cell.
 struct Piece {
-    facet: Facet,
-    bounds: Bounds,
-    /// Index of the polygon.
-    patch: usize,
+    /// Indices of its vertices.
+    corners: [u32; 3],
+    /// Positions in index space, relative to the cell.
+    points: [Vec3; 3],
+    /// Unit normal; zero for needles.
+    normal: Vec3,
+}
+
+/// A polygon around one of the edges of a cell.
+struct Polygon {
+    /// Its triangles, as a range of the pieces.
+    pieces: Range<usize>,
+    /// Indices of its vertices, if it is divided by a diagonal.
+    corners: Option<[u32; 4]>,
+    /// Positions of these vertices.
+    points: [Vec3; 4],
 }
 
 /// The polygons around the edges of one cell, to be tested against each other.
 #[derive(Default)]
 struct Neighbourhood {
+    /// Slot of the cell.
+    slot: u32,
+    /// Slots of the four cells around each edge that is crossed, and the range of its polygons, one or two.
+    edges: Vec<([u32; 4], Range<usize>)>,
+    polygons: Vec<Polygon>,
     pieces: Vec<Piece>,
-    /// Label and identity of each vertex, in the order of their numbers in the facets.
+    /// Label and identity of each vertex.
     vertices: Vec<(u16, NetVertex)>,
+    /// Positions of the vertices in index space, relative to the cell.
     positions: Vec<Vec3>,
-    /// Slots of the four cells of each polygon.
-    slots: Vec<[u32; 4]>,
 }
 
 impl Nets {
@@ -47,7 +71,7 @@ impl Nets {
             let mut tangled = Vec::new();
             for &slot in &to_test {
                 neighbourhood.fill(self, slot);
-                neighbourhood.find_intersections(&mut tangled);
+                neighbourhood.find_intersections(self, &mut tangled);
             }
             crate::math::order::sort_distinct(&mut tangled);
             tangled.retain(|slot| halved.get(slot).is_none_or(|&times| times <= HALVINGS));
@@ -68,11 +92,7 @@ impl Nets {
         for &slot in slots {
             let at = self.cells.get(slot).at;
             let area = CellBox { low: at, high: at }.grown(1, self.grid.dims());
-            for z in area.low[2]..=area.high[2] {
-                for y in area.low[1]..=area.high[1] {
-                    found.extend((area.low[0]..=area.high[0]).filter_map(|x| self.cells.find([x, y, z])));
-                }
-            }
+            found.extend(self.cells.within(&area));
         }
         crate::math::order::sort_distinct(&mut found);
         found
@@ -82,10 +102,12 @@ impl Nets {
 impl Neighbourhood {
     /// Collects the polygons around the edges of the cell in a slot.
     fn fill(&mut self, nets: &Nets, slot: u32) {
+        self.slot = slot;
+        self.edges.clear();
+        self.polygons.clear();
         self.pieces.clear();
         self.vertices.clear();
         self.positions.clear();
-        self.slots.clear();
         let at = nets.cells.get(slot).at;
         for owner in 0..7 {
             let last = super::cube_loops::corner_offset(owner);
@@ -94,44 +116,162 @@ impl Neighbourhood {
             let Some(owner) = nets.cells.find(cell) else { continue };
             // Edges along an axis in which the owner is beyond this cell are not edges of this cell.
             for crossing in nets.crossings(owner).filter(|crossing| last[crossing.axis] == 0) {
+                let first = self.polygons.len();
                 for far in [false, true] {
                     let number = crossing.ends[usize::from(far)];
                     if number != super::label_grid::BACKGROUND {
-                        self.add(nets, number, nets.patch(&crossing, far).triangles());
-                        self.slots.push(crossing.slots);
+                        self.add(nets, at, number, &crossing, far);
                     }
                 }
+                self.edges.push((crossing.slots, first..self.polygons.len()));
             }
         }
     }
 
-    fn add(&mut self, nets: &Nets, number: u16, triangles: &[[NetVertex; 3]]) {
-        for &triangle in triangles {
-            let corners = triangle.map(|vertex| self.number_of(nets, (number, vertex)));
+    fn add(&mut self, nets: &Nets, at: [u32; 3], number: u16, crossing: &Crossing, far: bool) {
+        let patch = nets.patch(crossing, far);
+        let first = self.pieces.len();
+        for &triangle in patch.triangles() {
+            let corners = triangle.map(|vertex| self.index_of(nets, at, (number, vertex)));
             let points = corners.map(|corner| self.positions[corner as usize]);
-            let bounds = Bounds::from_points(&points);
-            self.pieces.push(Piece { facet: Facet { corners, points }, bounds, patch: self.slots.len() });
+            let area = (points[1] - points[0]).cross(points[2] - points[0]);
+            let length = area.length();
+            let normal = if length > NEEDLE { area / length } else { Vec3::ZERO };
+            self.pieces.push(Piece { corners, points, normal });
         }
+        let mut polygon =
+            Polygon { pieces: first..self.pieces.len(), corners: None, points: [Vec3::ZERO; 4] };
+        if let [s, t] = &self.pieces[first..]
+            && let Some(k) = (0..3).find(|&k| !s.corners.contains(&t.corners[k]))
+        {
+            let [a, b, c] = s.corners;
+            polygon.corners = Some([a, b, c, t.corners[k]]);
+            polygon.points = [s.points[0], s.points[1], s.points[2], t.points[k]];
+        }
+        self.polygons.push(polygon);
     }
 
-    fn number_of(&mut self, nets: &Nets, vertex: (u16, NetVertex)) -> u32 {
+    fn index_of(&mut self, nets: &Nets, at: [u32; 3], vertex: (u16, NetVertex)) -> u32 {
         if let Some(known) = self.vertices.iter().position(|&known| known == vertex) {
             return known as u32;
         }
         self.vertices.push(vertex);
-        self.positions.push(nets.world_position(vertex.0, vertex.1));
+        self.positions.push(nets.position(vertex.0, vertex.1, at));
         self.vertices.len() as u32 - 1
     }
 
-    /// Appends the slots of the cells of all polygons that intersect.
-    fn find_intersections(&self, tangled: &mut Vec<u32>) {
-        for (i, one) in self.pieces.iter().enumerate() {
-            for other in &self.pieces[..i] {
-                if one.bounds.overlaps(&other.bounds) && facets_intersect(&one.facet, &other.facet) {
-                    tangled.extend(self.slots[one.patch]);
-                    tangled.extend(self.slots[other.patch]);
+    /// Appends the slots of the cells of all polygons that intersect. A pair is tested in the first of the cells that both
+    /// have in common.
+    fn find_intersections(&self, nets: &Nets, tangled: &mut Vec<u32>) {
+        for (i, (slots, polygons)) in self.edges.iter().enumerate() {
+            for (others, other_polygons) in &self.edges[..=i] {
+                let first = slots.iter().filter(|slot| others.contains(slot)).min();
+                if first == Some(&self.slot) && self.any_intersect(nets, polygons, other_polygons) {
+                    tangled.extend(slots);
+                    tangled.extend(others);
                 }
             }
         }
     }
+
+    /// Returns whether a polygon of one range intersects a later one of the other, or of the same.
+    fn any_intersect(&self, nets: &Nets, of_one: &Range<usize>, of_other: &Range<usize>) -> bool {
+        of_one.clone().any(|i| {
+            of_other.clone().take_while(|&j| j < i).any(|j| {
+                let (one, other) = (&self.polygons[i], &self.polygons[j]);
+                !are_sides_of_a_plane(one, other) && self.intersect(nets, one, other)
+            })
+        })
+    }
+
+    fn intersect(&self, nets: &Nets, one: &Polygon, other: &Polygon) -> bool {
+        let [one, other] = [one, other].map(|polygon| &self.pieces[polygon.pieces.clone()]);
+        one.iter().any(|s| {
+            let facet = |piece| self.facet(nets, piece);
+            other.iter().any(|t| !surely_apart(s, t) && facets_intersect(&facet(s), &facet(t)))
+        })
+    }
+
+    fn facet(&self, nets: &Nets, piece: &Piece) -> Facet {
+        let points = piece.corners.map(|corner| {
+            let (number, vertex) = self.vertices[corner as usize];
+            nets.world_position(number, vertex)
+        });
+        Facet { corners: piece.corners, points }
+    }
+}
+
+/// Returns whether two polygons lie on different sides of a plane, which meets both at most in their common corners, as
+/// far as that is quickly seen: planes along either polygon, and between them.
+fn are_sides_of_a_plane(one: &Polygon, other: &Polygon) -> bool {
+    let (Some(of_one), Some(of_other)) = (one.corners, other.corners) else { return false };
+    let in_other = of_one.map(|corner| of_other.contains(&corner));
+    let in_one = of_other.map(|corner| of_one.contains(&corner));
+    let mut common = (0..4).filter(|&i| in_other[i]).map(|i| one.points[i]);
+    let (first, second, more) = (common.next(), common.next(), common.next());
+    if more.is_some() {
+        return false;
+    }
+    let mean = |polygon: &Polygon| polygon.points.iter().sum::<Vec3>() / 4.0;
+    let normal = |polygon: &Polygon| {
+        let [a, b, c, d] = polygon.points;
+        (c - a).cross(d - b)
+    };
+    let along = second.zip(first).map(|(second, first)| (second - first).normalize_or_zero());
+    [normal(one), normal(other), mean(one) - mean(other)].into_iter().any(|direction| {
+        let across =
+            along.map_or(direction, |along| direction - along * direction.dot(along)).normalize_or_zero();
+        let range = |polygon: &Polygon, shared: [bool; 4]| {
+            let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+            for (point, _) in polygon.points.iter().zip(shared).filter(|&(_, shared)| !shared) {
+                let height = across.dot(*point);
+                range = [range[0].min(height), range[1].max(height)];
+            }
+            range
+        };
+        let ([low, high], [other_low, other_high]) = (range(one, in_other), range(other, in_one));
+        // Between the ranges lie the common corners, if there are any, else any height does.
+        match first.map(|corner| across.dot(corner)) {
+            Some(height) => {
+                low > height + MARGIN && other_high < height - MARGIN
+                    || high < height - MARGIN && other_low > height + MARGIN
+            }
+            None => low > other_high + MARGIN || other_low > high + MARGIN,
+        }
+    })
+}
+
+/// Returns whether two triangles have nothing in common but their common corners, as far as that is quickly seen.
+fn surely_apart(s: &Piece, t: &Piece) -> bool {
+    let common = s.corners.iter().filter(|corner| t.corners.contains(corner)).count();
+    match common {
+        0 => is_beside(s, t) || is_beside(t, s),
+        1 => is_beside(s, t) || is_beside(t, s) || are_divided(s, t),
+        // They would have to be folded onto each other.
+        2 => s.normal.dot(t.normal) > -0.9,
+        _ => false,
+    }
+}
+
+/// Returns whether the corners of `t` that are not corners of `s`, too, are all on one side of the plane of `s`.
+fn is_beside(s: &Piece, t: &Piece) -> bool {
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    for (corner, point) in t.corners.iter().zip(t.points) {
+        if !s.corners.contains(corner) {
+            let height = s.normal.dot(point - s.points[0]);
+            (low, high) = (low.min(height), high.max(height));
+        }
+    }
+    low > MARGIN || high < -MARGIN
+}
+
+/// Returns whether a plane through the common corner, across the directions to the other ones, divides two triangles.
+fn are_divided(s: &Piece, t: &Piece) -> bool {
+    let Some(shared) = s.corners.iter().position(|corner| t.corners.contains(corner)) else { return false };
+    let Some(same) = t.corners.iter().position(|&corner| corner == s.corners[shared]) else { return false };
+    let ways = |piece: &Piece, k: usize| [1, 2].map(|step| piece.points[(k + step) % 3] - piece.points[k]);
+    let (of_s, of_t) = (ways(s, shared), ways(t, same));
+    let mean = |[a, b]: [Vec3; 2]| a.normalize_or_zero() + b.normalize_or_zero();
+    let across = (mean(of_s) - mean(of_t)).normalize_or_zero();
+    of_s.iter().all(|way| way.dot(across) > MARGIN) && of_t.iter().all(|way| way.dot(across) < -MARGIN)
 }

@@ -1,0 +1,158 @@
+//! A part of the surfaces that is being smoothed: copies of its cells' positions, with what links them.
+
+use super::cells::{Cell, CellBox};
+use super::nets::Nets;
+use crate::math::Vec3;
+
+/// Stands for a cell that does not exist, or is not in the zone.
+pub const NONE: u32 = u32::MAX;
+/// Largest distance of a position from the centre of its cell along each axis, in voxels; below one half, since
+/// surfaces would touch where positions of two cells coincide.
+const REACH: f32 = 0.48;
+
+/// Links of a cell to its neighbours, as indices into the zone.
+#[derive(Clone, Copy, Debug)]
+pub struct Links {
+    /// The neighbours along −x, +x, −y, +y, −z and +z that the position moves towards; [`NONE`] if there is none.
+    pub towards: [u32; 6],
+    /// Those of them in which the same two labels meet as in this cell, if two do.
+    pub alike: [u32; 6],
+}
+
+/// A polygon of which a vertex may move: the cells around an edge, as indices into the zone.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// The four cells, counter-clockwise seen from the side of the label with the higher number.
+    pub cells: [u32; 4],
+    /// Whether two labels meet in each of them.
+    pub pairs: [bool; 4],
+}
+
+/// The cells of a box, and those around it, which do not move.
+#[derive(Clone, Debug)]
+pub struct Zone {
+    /// The cells that move.
+    pub area: CellBox,
+    /// Slots of the cells: those that move first.
+    pub slots: Vec<u32>,
+    /// Index of each cell along x, y and z.
+    pub at: Vec<[u32; 3]>,
+    /// Positions relative to the centres of the cells.
+    pub offsets: Vec<Vec3>,
+    /// Links of each cell that moves.
+    pub links: Vec<Links>,
+    /// The polygons of which a vertex moves.
+    pub polygons: Vec<Link>,
+}
+
+impl Zone {
+    /// Copies the cells of a box.
+    pub fn new(nets: &Nets, area: CellBox) -> Self {
+        let around = area.grown(1, nets.grid.dims());
+        let mut slots = nets.cells.within(&area);
+        let moving = slots.len();
+        let all = nets.cells.within(&around);
+        slots.extend(all.iter().filter(|&&slot| !area.contains(nets.cells.get(slot).at)));
+        let mut index = vec![NONE; nets.cells.slots().len()];
+        (0..).zip(&slots).for_each(|(i, &slot)| index[slot as usize] = i);
+        let cells = |slot: u32| nets.cells.get(slot);
+        let links = slots[..moving].iter().map(|&slot| Self::links_of(nets, cells(slot), &index)).collect();
+        let mut polygons = Vec::new();
+        for crossing in all.iter().flat_map(|&slot| nets.crossings(slot)) {
+            let mut around = crossing.slots;
+            if crossing.ends[0] > crossing.ends[1] {
+                around.swap(1, 3);
+            }
+            let cells = around.map(|slot| index[slot as usize]);
+            if cells.iter().any(|&i| (i as usize) < moving) && !cells.contains(&NONE) {
+                let pairs = around.map(|slot| pair(nets.cells.get(slot)).is_some());
+                polygons.push(Link { cells, pairs });
+            }
+        }
+        Self {
+            area,
+            at: slots.iter().map(|&slot| cells(slot).at).collect(),
+            offsets: slots.iter().map(|&slot| cells(slot).offset).collect(),
+            slots,
+            links,
+            polygons,
+        }
+    }
+
+    /// Returns the number of cells that move.
+    pub fn moving(&self) -> usize {
+        self.links.len()
+    }
+
+    /// Copies the positions of the cells that move from the surfaces.
+    pub fn read(&mut self, nets: &Nets) {
+        for (offset, &slot) in self.offsets.iter_mut().zip(&self.slots) {
+            *offset = nets.cells.get(slot).offset;
+        }
+    }
+
+    /// Copies the positions of the cells that move to the surfaces.
+    pub fn write(&self, nets: &mut Nets) {
+        for (&offset, &slot) in self.offsets[..self.moving()].iter().zip(&self.slots) {
+            *nets.cells.offset_mut(slot) = offset;
+        }
+    }
+
+    /// Along a line where three or more labels meet, a cell has only neighbours on that line, if there are two at
+    /// least: the line is smoothed by itself, and surfaces do not pull it to one side.
+    fn links_of(nets: &Nets, cell: &Cell, index: &[u32]) -> Links {
+        let labels = [0, 1, 2, 3, 4, 5].map(|face| labels_on_face(cell, face));
+        let is_on_line = labels.iter().filter(|&&labels| labels >= 3).count() >= 2;
+        let least = if is_on_line { 3 } else { 2 };
+        let mut links = Links { towards: [NONE; 6], alike: [NONE; 6] };
+        let own = pair(cell);
+        for face in 0..6 {
+            if labels[face] < least {
+                continue;
+            }
+            let Some(slot) = nets.cells.find(beyond(cell.at, face)) else { continue };
+            links.towards[face] = index[slot as usize];
+            if own.is_some() && pair(nets.cells.get(slot)) == own {
+                links.alike[face] = index[slot as usize];
+            }
+        }
+        links
+    }
+}
+
+/// Returns the position nearest to `offset` that is within reach of the centre of the cell.
+pub fn within_reach(offset: Vec3) -> Vec3 {
+    offset.clamp(Vec3::splat(-REACH), Vec3::splat(REACH))
+}
+
+/// Returns the step from a cell to its neighbour beyond a face, numbered as in [`Links`].
+pub fn step_to(face: usize) -> Vec3 {
+    let mut step = Vec3::ZERO;
+    step[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
+    step
+}
+
+fn beyond(at: [u32; 3], face: usize) -> [u32; 3] {
+    let mut next = at;
+    let n = &mut next[face / 2];
+    *n = if face % 2 == 0 { n.wrapping_sub(1) } else { *n + 1 };
+    next
+}
+
+/// Returns the two labels that meet in a cell, the lower number first, if there are not more.
+fn pair(cell: &Cell) -> Option<[u16; 2]> {
+    let first = cell.corners[0];
+    let second = cell.corners.iter().copied().find(|&other| other != first)?;
+    let only = cell.corners.iter().all(|&other| other == first || other == second);
+    only.then(|| [first.min(second), first.max(second)])
+}
+
+/// Returns the number of different labels at the corners of a face of a cell.
+fn labels_on_face(cell: &Cell, face: usize) -> usize {
+    let bits = [4usize, 1, 2];
+    let axis = face / 2;
+    let (b, c) = (bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
+    let start = if face % 2 == 0 { 0 } else { bits[axis] };
+    let corners = [start, start | b, start | c, start | b | c].map(|corner| cell.corners[corner]);
+    (0..4).filter(|&i| !corners[..i].contains(&corners[i])).count()
+}
