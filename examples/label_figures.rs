@@ -55,7 +55,7 @@ fn paint(volume: &mut Volume, voxels: &mut [u8], centre: [i64; 3], label: u8) ->
 }
 
 fn main() {
-    let (labels, radius) = (9, 46.0);
+    let (labels, radius) = (9, 27.0);
     let mut voxels = balls(labels, radius);
     let mut volume = Volume::new(VolumeInit::new(Voxels::U8(voxels.clone()), [SIDE, SIDE, SIDE, 1])).unwrap();
     let started = Instant::now();

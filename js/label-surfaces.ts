@@ -100,7 +100,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
 
   /**
    * Makes up to `iterations` steps, synchronous and deterministic; fewer if the surfaces are settled earlier. A step is
-   * ten smoothing iterations.
+   * ten smoothing iterations, or more where few voxels have changed.
    *
    * @returns The last report; counts are those of all surfaces together.
    * @throws {@link VesicleError} `invalid-argument` while a {@link LabelSurfaces.run} is in progress.

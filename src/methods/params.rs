@@ -325,6 +325,12 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "labels")]
+    fn those_of_the_label_surfaces_agree_with_their_descriptions() {
+        check::<crate::methods::label_surfaces::LabelParams>();
+    }
+
+    #[test]
     #[cfg(feature = "multires")]
     fn those_of_the_multiresolution_model_agree_with_their_descriptions() {
         check::<crate::methods::multires::MultiresParams>();

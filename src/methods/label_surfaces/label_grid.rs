@@ -86,6 +86,31 @@ impl LabelGrid {
             .map(|offset| self.numbers[start + offset])
     }
 
+    /// Returns the labels that the numbers 1, 2 and so on stand for.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Returns the same label map with other numbers, which stand for `values` from 1 on; `None` if these are not
+    /// different, or a label with voxels is not among them.
+    pub fn renumbered(&self, values: &[f64]) -> Option<Self> {
+        let is_first = |(i, value): (usize, &f64)| value.is_finite() && !values[..i].contains(value);
+        if values.len() > MOST_LABELS || !values.iter().enumerate().all(is_first) {
+            return None;
+        }
+        let mut grid = Self { values: values.to_vec(), voxels: vec![0; values.len()], ..self.clone() };
+        let mut numbers = vec![BACKGROUND];
+        for (&value, &voxels) in self.values.iter().zip(&self.voxels) {
+            let number = grid.number(value);
+            if voxels > 0 {
+                grid.voxels[usize::from(number?) - 1] = voxels;
+            }
+            numbers.push(number.unwrap_or(BACKGROUND));
+        }
+        grid.numbers.iter_mut().for_each(|number| *number = numbers[usize::from(*number)]);
+        Some(grid)
+    }
+
     /// Adds the labels of all voxels to a hash; it does not depend on the order in which labels were first seen.
     pub fn hash(&self, hash: &mut Hash) {
         for run in self.numbers.chunk_by(|a, b| a == b) {

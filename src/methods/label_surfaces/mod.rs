@@ -23,6 +23,7 @@ mod zone;
 
 pub use params::LabelParams;
 
+use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::method::method;
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
@@ -34,12 +35,18 @@ use label_grid::LabelGrid;
 use nets::Nets;
 use zone::Zone;
 
-/// Number of smoothing iterations in a step.
+/// Least number of smoothing iterations in a step.
 const ITERATIONS: u32 = 10;
+/// Number of times that a cell is smoothed in a step, if the part to be smoothed is so small that this needs more
+/// iterations: after a change of some voxels, one step settles the surfaces.
+const WORK: usize = 200_000;
 /// Number of times that volumes are balanced at the end.
 const BALANCES: u32 = 3;
 /// Distance from a change, in cells, up to which surfaces are smoothed again.
 const HALO: u32 = 6;
+/// Largest distance of the volume from the origin of world space, in voxels: positions in single precision are then as
+/// exact as tests of intersections assume.
+const MOST_VOXELS_AWAY: f64 = 10_000.0;
 
 /// The surfaces of all labels of a label map, or of some.
 pub struct LabelSurfaces {
@@ -83,6 +90,7 @@ impl LabelSurfaces {
     /// range; an error about memory.
     pub fn new(volume: &Volume, labels: Option<Vec<f64>>, params: LabelParams) -> Result<Self, MethodError> {
         params.check_ranges()?;
+        check_precision(volume)?;
         let nets = Nets::new(LabelGrid::new(volume, labels)?, volume.affine())?;
         let everywhere = nets.everywhere();
         let mut surfaces = Self {
@@ -190,7 +198,8 @@ impl LabelSurfaces {
         let mut times = Times::default();
         if let Some(mut zone) = self.zone.take() {
             self.steps += 1;
-            let wanted = self.params.smoothing.saturating_sub(self.iterations).min(ITERATIONS);
+            let most = ITERATIONS.max((WORK / zone.moving().max(1)) as u32);
+            let wanted = self.params.smoothing.saturating_sub(self.iterations).min(most);
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
             self.timed("smoothing", &mut times, |surfaces| {
@@ -240,6 +249,26 @@ impl LabelSurfaces {
             times,
         }
     }
+}
+
+/// Returns an error unless positions in single precision are much finer than the gaps between surfaces.
+fn check_precision(volume: &Volume) -> Result<(), MethodError> {
+    let affine = volume.affine();
+    let far = volume.dims().map(|n| n as f64);
+    let ends = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
+    let corners =
+        ends.map(|end| affine.transform_point3(DVec3::from([0, 1, 2].map(|i| f64::from(end[i]) * far[i]))));
+    let farthest = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let axes = [affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis];
+    let voxel = axes.iter().map(|axis| axis.length()).fold(f64::INFINITY, f64::min);
+    if farthest < MOST_VOXELS_AWAY * voxel {
+        return Ok(());
+    }
+    let problem = format!(
+        "must be within {MOST_VOXELS_AWAY} voxels of the origin of world space, for positions in single precision, got \
+         {farthest} at a voxel size of {voxel}"
+    );
+    Err(MethodError::invalid("volume", problem))
 }
 
 #[cfg(test)]

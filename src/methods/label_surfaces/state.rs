@@ -2,6 +2,7 @@
 //! vertices are numbered in that order, and no labels: they come from the same volume.
 
 use super::cells::{Cell, Cells};
+use super::label_grid::LabelGrid;
 use super::{CellBox, LabelParams, LabelSurfaces};
 use crate::math::Vec3;
 use crate::methods::saved::{Hash, Magic, decode, encode};
@@ -15,6 +16,8 @@ const MAGIC: Magic = *b"VSCLLAB\x01";
 struct State {
     fingerprint: u64,
     params: LabelParams,
+    /// The labels in the order of their numbers.
+    labels: Vec<f64>,
     /// Index and offset of the cell in each slot; `None` for free slots.
     cells: Vec<Option<([u32; 3], Vec3)>>,
     /// The free slots, in the order in which they became free.
@@ -35,6 +38,7 @@ impl LabelSurfaces {
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
+                labels: self.nets.grid.values().to_vec(),
                 cells: cells.map(|cell| cell.is_live().then_some((cell.at, cell.offset))).collect(),
                 free: self.nets.cells.free().to_vec(),
                 area: self.zone.as_ref().map(|zone| [zone.area.low, zone.area.high]),
@@ -63,8 +67,11 @@ impl LabelSurfaces {
         if !state.area.iter().all(is_box) || state.iterations > state.params.smoothing {
             return bad("progress", "inconsistent");
         }
-        let Some(cells) = self.restored(&state)? else { return bad("cells", "inconsistent") };
-        self.nets.cells = cells;
+        let Some(grid) = self.nets.grid.renumbered(&state.labels) else {
+            return bad("labels", "inconsistent");
+        };
+        let Some(cells) = self.restored(&grid, &state)? else { return bad("cells", "inconsistent") };
+        (self.nets.grid, self.nets.cells) = (grid, cells);
         self.params = state.params;
         self.zone = None;
         if let Some([low, high]) = state.area {
@@ -77,10 +84,9 @@ impl LabelSurfaces {
     }
 
     /// Returns the cells of a saved state, if they are those through which the surfaces of the label map pass.
-    fn restored(&self, state: &State) -> Result<Option<Cells>, MethodError> {
+    fn restored(&self, grid: &LabelGrid, state: &State) -> Result<Option<Cells>, MethodError> {
         let count = |cells: &[Cell]| cells.iter().filter(|cell| cell.is_live()).count();
         let wanted = count(self.nets.cells.slots());
-        let grid = &self.nets.grid;
         let list = (state.cells.iter()).map(|saved| {
             let Some((at, offset)) = *saved else {
                 return Some(Cell::new([0; 3], [0; 8]));
