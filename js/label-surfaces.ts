@@ -87,7 +87,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
 
   /**
    * Adopts voxels that have changed, such as by {@link Volume.write}: the surfaces there follow at once, along the faces
-   * of the changed voxels, and the next steps smooth them. The rest of the surfaces stays as it is.
+   * of the changed voxels, and the next steps smooth them. The rest of the surfaces is unchanged.
    *
    * @param region - `min`: index of the first voxel along x, y and z; `dims`: numbers of voxels.
    * @throws {@link VesicleError} `invalid-argument`: an empty region or one beyond the volume, or too many labels;

@@ -6,7 +6,16 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import * as vesicle from '../../pkg/index.js';
 import { ball, HEALTHY } from './helpers.js';
 
-const { DeformableModel, ImplicitSurface, Mesh, MultiresolutionModel, SurfaceTracker, VesicleError, Volume } = vesicle;
+const {
+  DeformableModel,
+  ImplicitSurface,
+  LabelSurfaces,
+  Mesh,
+  MultiresolutionModel,
+  SurfaceTracker,
+  VesicleError,
+  Volume,
+} = vesicle;
 
 const root = fileURLToPath(new URL('../..', import.meta.url));
 
@@ -153,6 +162,7 @@ const MAKERS: Record<string, () => { free(): void }> = {
   DeformableModel: () => new DeformableModel({ volume, params: { iso: 100 } }),
   ImplicitSurface: () => new ImplicitSurface({ points: points() }),
   SurfaceTracker: () => new SurfaceTracker({ volume: film }),
+  LabelSurfaces: () => new LabelSurfaces({ volume }),
   MultiresolutionModel: () =>
     new MultiresolutionModel({ base: mesh, ellipsoids: BALL, params: { edgeMin: 2, edgeMax: 5 } }),
 };

@@ -18,6 +18,7 @@ same<Same<worker.ImplicitSurface['warning'], Promise<string | undefined>>>(true)
 same<Same<worker.DeformableModel['params'], Promise<Required<built.DeformableParams>>>>(true);
 same<Same<worker.DeformableModel['mesh'], worker.Mesh>>(true);
 same<Same<worker.MultiresolutionModel['linkMesh'], worker.Mesh>>(true);
+same<Same<ReturnType<worker.LabelSurfaces['mesh']>, Promise<worker.Mesh>>>(true);
 same<Same<ReturnType<worker.Mesh['arrays']>, Promise<built.MeshArrays>>>(true);
 same<Same<ReturnType<worker.Mesh['components']>, Promise<worker.Mesh[]>>>(true);
 same<Same<ReturnType<worker.Volume['pyramid']>, Promise<worker.Volume[]>>>(true);

@@ -170,6 +170,15 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
       await (await tracker.meshAt(1)).arrays(),
     ];
   },
+  labelSurfaces: async ({ LabelSurfaces, Volume }) => {
+    const volume = new Volume({ data: Uint8Array.of(1, 1, 2, 0, 2, 2, 0, 0), dims: [2, 2, 2] });
+    const surfaces = new LabelSurfaces({ volume, smoothing: 10 });
+    const { components } = await surfaces.run();
+    await volume.write({ min: [1, 1, 1], dims: [1, 1, 1], data: Uint8Array.of(3) });
+    await surfaces.refresh({ min: [1, 1, 1], dims: [1, 1, 1] });
+    const { done } = await surfaces.step(9);
+    return [components, done, await surfaces.labels, await (await surfaces.mesh(3)).arrays()];
+  },
   multires: async ({ MultiresolutionModel }) => {
     const ball = (x: number): vesicle.ControlEllipsoid => ({
       center: [x, 0, 0],

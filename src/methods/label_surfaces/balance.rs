@@ -5,7 +5,7 @@
 //! normal. The average is wide enough for the steps of slanted surfaces, whose differences cancel out, to stay smooth.
 
 use super::nets::halves;
-use super::zone::{Link, NONE, Zone, within_reach};
+use super::zone::{Polygon, NONE, Zone, within_reach};
 use crate::math::Vec3;
 
 /// Number of times that differences are averaged over neighbouring cells; the width of the average, a standard
@@ -16,7 +16,7 @@ const SHARE: f32 = 1.0 / 7.0;
 /// Largest displacement at once, in voxels.
 const MOST: f32 = 0.25;
 
-/// What is known of the surface around a cell in which two labels meet.
+/// The surface around a cell in which two labels meet.
 #[derive(Clone, Copy, Debug, Default)]
 struct Around {
     /// Volume that the label of the lower number has gained, in voxels, and the amount of surface that it is spread
@@ -58,7 +58,7 @@ impl Zone {
 
     /// Returns the volume that the label of lower number has gained at a polygon, and the polygon's area, normal to it
     /// and away from that label.
-    fn gain(&self, polygon: &Link) -> (f32, Vec3) {
+    fn gain(&self, polygon: &Polygon) -> (f32, Vec3) {
         let origin = self.at[polygon.cells[0] as usize];
         let corners = polygon.cells.map(|i| {
             let at = self.at[i as usize];

@@ -1,8 +1,8 @@
 //! How the surface of one label passes through a cell, for each of the 256 sets of a cell's corners that can have the
 //! label.
 //!
-//! The surface crosses the cell's edges between a corner with the label and one without. On the faces of the cell, the
-//! crossings are connected to closed loops, as in marching cubes; there is one vertex in the cell for each loop. Two
+//! The surface crosses the edges of the cell between a corner with the label and one without. On its faces, the points
+//! where it does so are connected to closed loops, as in marching cubes; there is one vertex per loop. Two
 //! corners with the label that are diagonally opposite on a face are separated, so the label's voxels are connected
 //! across their faces only.
 

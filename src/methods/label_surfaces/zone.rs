@@ -21,7 +21,7 @@ pub struct Links {
 
 /// A polygon of which a vertex may move: the cells around an edge, as indices into the zone.
 #[derive(Clone, Copy, Debug)]
-pub struct Link {
+pub struct Polygon {
     /// The four cells, counter-clockwise seen from the side of the label with the higher number.
     pub cells: [u32; 4],
     /// Whether two labels meet in each of them.
@@ -42,7 +42,7 @@ pub struct Zone {
     /// Links of each cell that moves.
     pub links: Vec<Links>,
     /// The polygons of which a vertex moves.
-    pub polygons: Vec<Link>,
+    pub polygons: Vec<Polygon>,
 }
 
 impl Zone {
@@ -66,7 +66,7 @@ impl Zone {
             let cells = around.map(|slot| index[slot as usize]);
             if cells.iter().any(|&i| (i as usize) < moving) && !cells.contains(&NONE) {
                 let pairs = around.map(|slot| pair(nets.cells.get(slot)).is_some());
-                polygons.push(Link { cells, pairs });
+                polygons.push(Polygon { cells, pairs });
             }
         }
         Self {

@@ -1,0 +1,109 @@
+import { expect, test } from 'vitest';
+import { LabelSurfaces, Mesh, paramSpecs, type Vec3, Volume } from '../../pkg/index.js';
+import { ball, failure } from './helpers.js';
+
+const DIMS: Vec3 = [12, 10, 8];
+
+/** Returns a label map of three blocks that touch, with labels 1, 2 and 300. */
+function blocks(more: object = {}): Volume {
+  const data = new Uint16Array(DIMS[0] * DIMS[1] * DIMS[2]);
+  const label = (x: number, y: number) => (x < 6 ? 1 : y < 5 ? 2 : 300);
+  for (let z = 1; z < 7; z++)
+    for (let y = 1; y < 9; y++) for (let x = 1; x < 11; x++) data[x + DIMS[0] * (y + DIMS[1] * z)] = label(x, y);
+  return new Volume({ data, dims: DIMS, ...more });
+}
+
+test('each label has a closed surface, in world space, that crosses no other', async () => {
+  const volume = blocks({ spacing: [1, 2, 0.5], origin: [5, 0, -3], space: 'LPS' });
+  const surfaces = new LabelSurfaces({ volume });
+  expect(surfaces.labels).toEqual([1, 2, 300]);
+  const report = await surfaces.run();
+  expect([report.done, report.components, report.euler]).toEqual([true, 3, 6]);
+  const meshes = surfaces.labels.map((label) => surfaces.mesh(label));
+  expect(surfaces.mesh(2)).toBe(meshes[1]);
+  for (const [index, mesh] of meshes.entries()) {
+    expect(mesh.check()).toMatchObject({ closed: true, oriented: true, nonManifoldEdges: 0, selfIntersections: 0 });
+    const voxels = volume.labels()[index]?.voxels ?? 0;
+    expect(mesh.info().volume / voxels).toBeGreaterThan(0.97);
+    expect(mesh.info().volume / voxels).toBeLessThan(1.001);
+  }
+  const all = meshes.map((mesh) => mesh.arrays());
+  const positions = all.flatMap((mesh) => [...mesh.positions]);
+  let start = 0;
+  const indices = all.flatMap((mesh) => {
+    const shifted = [...mesh.indices].map((index) => index + start);
+    start += mesh.positions.length / 3;
+    return shifted;
+  });
+  const joined = Mesh.fromArrays(Float32Array.from(positions), Uint32Array.from(indices));
+  expect(joined.check()).toMatchObject({ closed: true, selfIntersections: 0 });
+  surfaces.free();
+  expect(failure(() => meshes[0]?.info()).code).toBe('freed');
+  expect(failure(() => surfaces.labels).code).toBe('freed');
+});
+
+test('surfaces follow what is written to the volume, and live meshes show it', () => {
+  const volume = blocks();
+  using surfaces = new LabelSurfaces({ volume, smoothing: 10 });
+  surfaces.step(20);
+  const [one, version] = [surfaces.mesh(1), surfaces.mesh(1).topologyVersion];
+  const region = { min: [2, 2, 2] as Vec3, dims: [2, 3, 2] as Vec3 };
+  volume.write({ ...region, data: new Uint16Array(12).fill(7) });
+  surfaces.refresh(region);
+  expect(surfaces.labels).toEqual([1, 2, 7, 300]);
+  expect(one.topologyVersion).toBeGreaterThan(version);
+  expect(surfaces.step(5).done).toBe(true);
+  // The new label lies in a cavity of the first.
+  expect([one.info().components, surfaces.mesh(7).info().components]).toEqual([2, 1]);
+  expect(one.check().selfIntersections).toBe(0);
+  volume.write({ ...region, data: new Uint16Array(12).fill(1) });
+  surfaces.refresh(region);
+  expect(surfaces.labels).toEqual([1, 2, 300]);
+  expect([one.info().components, surfaces.mesh(7).vertexCount]).toEqual([1, 0]);
+});
+
+test('a saved state continues with the same bits', () => {
+  const volume = blocks();
+  using surfaces = new LabelSurfaces({ volume, labels: [300, 1] });
+  surfaces.setParams({ smoothing: 45 });
+  surfaces.step();
+  using other = new LabelSurfaces({ volume, labels: [1, 300] });
+  other.restore(surfaces.save());
+  expect(other.params).toEqual({ smoothing: 45 });
+  for (const each of [surfaces, other]) each.step(9);
+  for (const label of [1, 300]) expect(other.mesh(label).arrays()).toEqual(surfaces.mesh(label).arrays());
+  expect(failure(() => other.restore(surfaces.save().slice(1))).code).toBe('bad-file');
+});
+
+test('bad input is named, and nothing changes', () => {
+  const volume = blocks();
+  using surfaces = new LabelSurfaces({ volume });
+  const before = surfaces.save();
+  const bad: [() => unknown, string][] = [
+    [() => new LabelSurfaces({ volume: ball(8, 2), labels: [] }), 'labels'],
+    [() => new LabelSurfaces({ volume, labels: [4] }), 'labels'],
+    [() => new LabelSurfaces({ volume, labels: ['1'] as never }), 'labels'],
+    [() => new LabelSurfaces({ volume, smoothing: -1 }), 'smoothing'],
+    [() => new LabelSurfaces({ volume, colour: 'red' } as never), 'colour'],
+    [() => new LabelSurfaces({ volume: new Volume({ data: Float32Array.of(1), dims: [1, 1, 1] }) }), 'volume'],
+    [() => new LabelSurfaces({} as never), 'volume'],
+    [() => surfaces.mesh(5), 'label'],
+    [() => surfaces.mesh('1' as never), 'label'],
+    [() => surfaces.refresh({ min: [0, 0, 7], dims: [1, 1, 2] }), 'region'],
+    [() => surfaces.refresh({ min: [0, 0, 0.5], dims: [1, 1, 1] }), 'region.min'],
+    [() => surfaces.refresh({ min: [0, 0, 0] } as never), 'region.dims'],
+    [() => surfaces.setParams({ smoothing: 1000 }), 'smoothing'],
+    [() => surfaces.step(0), 'iterations'],
+  ];
+  for (const [work, name] of bad) {
+    const error = failure(work);
+    expect([error.code, error.message.split(':')[0]]).toEqual(['invalid-argument', name]);
+  }
+  expect(surfaces.save()).toEqual(before);
+  volume.free();
+  expect(failure(() => surfaces.refresh({ min: [0, 0, 0], dims: [1, 1, 1] })).code).toBe('freed');
+});
+
+test('its parameter is described', () => {
+  expect(paramSpecs('labels').map(({ name, default: value }) => [name, value])).toEqual([['smoothing', 20]]);
+});
