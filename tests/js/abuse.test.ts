@@ -162,7 +162,7 @@ const MAKERS: Record<string, () => { free(): void }> = {
   DeformableModel: () => new DeformableModel({ volume, params: { iso: 100 } }),
   ImplicitSurface: () => new ImplicitSurface({ points: points() }),
   SurfaceTracker: () => new SurfaceTracker({ volume: film }),
-  LabelSurfaces: () => new LabelSurfaces({ volume }),
+  LabelSurfaces: () => new LabelSurfaces({ volume, labels: [200] }),
   MultiresolutionModel: () =>
     new MultiresolutionModel({ base: mesh, ellipsoids: BALL, params: { edgeMin: 2, edgeMax: 5 } }),
 };
