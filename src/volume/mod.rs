@@ -273,14 +273,34 @@ impl Volume {
     pub fn normalised_grid(&self, frame: usize) -> Result<Grid, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
+        let normalised = self.normalisation();
+        let values =
+            each!(self.voxels.as_ref(), values => converted(&values[start..end], normalised))?;
+        Ok(Grid { dims: self.dims(), values })
+    }
+
+    /// Returns the part of [`Self::normalised_grid`] in a region, with the same values.
+    ///
+    /// # Errors
+    /// The region is empty or not within the volume; `frame` out of range; [`VolumeError::TooLarge`].
+    pub fn normalised_region(&self, region: Region, frame: usize) -> Result<Grid, VolumeError> {
+        let start = self.frame_start(frame)?;
+        region.check("region", self.dims())?;
+        let voxels = self.voxels.gathered(region.len(), region.rows(self.dims(), start))?;
+        let normalised = self.normalisation();
+        let values = each!(&voxels, values => converted(values, normalised))?;
+        Ok(Grid { dims: region.dims, values })
+    }
+
+    /// Returns the map from stored values to intensities scaled from [`Self::range`] to [0, 1].
+    fn normalisation(&self) -> impl Fn(f64) -> f64 + use<> {
         let factor = 1.0 / self.span();
         let (slope, intercept) = (self.slope * factor, (self.intercept - self.range[0]) * factor);
-        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], |v| {
-            let value = v * slope + intercept;
+        move |stored| {
+            let value = stored * slope + intercept;
             // NaN fails the comparison and becomes 0.
             if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
-        }))?;
-        Ok(Grid { dims: self.dims(), values })
+        }
     }
 
     /// Returns the trilinearly interpolated intensity at a world point; outside the volume the border is replicated.

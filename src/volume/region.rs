@@ -14,13 +14,13 @@ pub struct Region {
 
 impl Region {
     /// Returns the number of voxels in the region.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.dims.iter().product()
     }
 
     /// Returns an error about the argument `parameter` unless the region has a voxel and lies within a volume of `dims`
     /// voxels.
-    pub(super) fn check(&self, parameter: &'static str, dims: [usize; 3]) -> Result<(), VolumeError> {
+    pub(crate) fn check(&self, parameter: &'static str, dims: [usize; 3]) -> Result<(), VolumeError> {
         let Self { min, dims: size } = *self;
         let fits =
             |axis: usize| size[axis] >= 1 && size[axis] <= dims[axis] && min[axis] <= dims[axis] - size[axis];
@@ -34,9 +34,16 @@ impl Region {
         Err(VolumeError::invalid(parameter, problem))
     }
 
+    /// Returns the region enlarged by `margin` voxels on each side, within a volume of `dims` voxels.
+    pub fn enlarged(self, margin: usize, dims: [usize; 3]) -> Self {
+        let min = self.min.map(|first| first.saturating_sub(margin));
+        let end = |axis: usize| (self.min[axis] + self.dims[axis] + margin).min(dims[axis]);
+        Self { min, dims: [0, 1, 2].map(|axis| end(axis) - min[axis]) }
+    }
+
     /// Returns the ranges of indices of the region's rows along x, ordered by y, then z, in an array in which the frame
     /// of `dims` voxels starts at index `start`. The region must lie within the frame.
-    pub(super) fn rows(self, dims: [usize; 3], start: usize) -> impl Iterator<Item = Range<usize>> + Clone {
+    pub(crate) fn rows(self, dims: [usize; 3], start: usize) -> impl Iterator<Item = Range<usize>> + Clone {
         let Self { min, dims: [width, height, depth] } = self;
         (0..depth).flat_map(move |z| {
             (0..height).map(move |y| {
