@@ -7,9 +7,11 @@
 
 use super::contour::{ObjectIs, contour_of_grid, placed};
 use super::image::LevelImage;
-use crate::math::order::{combined_rank, sort_ranks};
+use crate::math::order::{combined_rank, sort_distinct, sort_ranks};
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{Mesh, Patch, PatchCorner, TriangleMesh, VertexId};
+use crate::mesh::{
+    Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices,
+};
 use crate::methods::MethodError;
 use crate::volume::Region;
 use std::collections::BTreeMap;
@@ -20,10 +22,14 @@ const GAP: f32 = 1.0;
 
 /// The largest distance of a rim's vertices from the rim that it is joined with, in voxels: of rims further apart, one
 /// is of a part that the other surface lacks.
-const MAX_RIM_DISTANCE: f32 = 2.0;
+const MAX_RIM_DISTANCE: f32 = 4.0;
 
 /// The least distance of a cut from the ends of its edge, as a share of the edge, so that no triangle is a sliver.
 const CUT_MARGIN: f32 = 0.15;
+
+/// The largest number of vertices of a bit of the mesh outside the outer box, cut off from the rest by the box, that is
+/// removed with the vertices inside.
+const MAX_CUT_OFF: usize = 12;
 
 /// The largest number of pairs of vertices that are compared to join two rims, which bounds the memory for it.
 const MAX_PAIRS: usize = 1 << 22;
@@ -75,71 +81,191 @@ pub(super) struct ContourRule {
     pub(super) smallest_part: f64,
 }
 
-/// Returns the patch that replaces the vertices `removed`, those of the mesh in the outer box, by the contour in the
-/// inner box and strips between the two; `None` if rims of the two do not correspond.
+/// Part of the mesh, and the surface that replaces it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Replacement {
+    /// The vertices to remove, sorted by id.
+    pub(super) removed: Vec<VertexId>,
+    pub(super) patch: Patch,
+    /// The change of the number of connected components of the mesh; `None` if it is not known, since the patch
+    /// connects other rims than the part that it replaces.
+    pub(super) components: Option<i64>,
+}
+
+/// Returns the replacement of the mesh in a box by the contour there. `near` are the vertices in the outer box, sorted by
+/// id. `None` if rims of the mesh and of the contour do not correspond.
 ///
 /// # Errors
 /// If memory does not suffice.
-pub(super) fn patch(
+pub(super) fn replacement(
     image: &LevelImage,
     mesh: &Mesh,
-    removed: &[VertexId],
+    near: &[VertexId],
     at: PatchBox,
     rule: ContourRule,
-) -> Result<Option<Patch>, MethodError> {
-    let cut = CutMesh::new(mesh, removed, &at.outer);
+) -> Result<Option<Replacement>, MethodError> {
+    let hole = Hole::new(mesh, near, &at.inner);
+    let cut = CutMesh::new(mesh, &hole, &at.outer);
     let piece = Piece::new(image, at, rule)?;
-    Ok(stitched(cut, piece))
+    Ok(stitched(hole, cut, piece))
 }
 
 /// Joins the rims of the cut mesh and of the contour; `None` if they do not correspond.
-fn stitched(cut: CutMesh, mut piece: Piece) -> Option<Patch> {
-    let first = cut.patch.positions.len() as u32;
+fn stitched(hole: Hole, cut: CutMesh, mut piece: Piece) -> Option<Replacement> {
     let (rims, contour_rims) = (rims(&cut.next)?, piece.rims()?);
     let points = |rim: &Vec<u32>, of: &[Vec3]| rim.iter().map(|&v| of[v as usize]).collect::<Vec<_>>();
     let here: Vec<Vec<Vec3>> = rims.iter().map(|rim| points(rim, &cut.patch.positions)).collect();
-    let there: Vec<Vec<Vec3>> = contour_rims.iter().map(|rim| points(rim, &piece.surface.positions)).collect();
+    let there: Vec<Vec<Vec3>> =
+        contour_rims.iter().map(|rim| points(rim, &piece.surface.positions)).collect();
     let partners = partners(&there, &here);
     piece.leave_out_noise(&contour_rims, &partners)?;
     if partners.iter().flatten().count() != rims.len() {
         return None;
     }
+    let first = cut.patch.positions.len() as u32;
     let mut patch = cut.patch;
+    let mut pairs = Vec::new();
     for (k, partner) in partners.into_iter().enumerate() {
         let Some(other) = partner else { continue };
-        let corner = |(is_contour, i): (bool, usize)| {
+        let corner = |(is_contour, i): StripCorner| {
             PatchCorner::New(if is_contour { first + contour_rims[k][i] } else { rims[other][i] })
         };
         let strip = strip(&here[other], &there[k])?;
         patch.triangles.extend(strip.into_iter().map(|corners| corners.map(corner)));
+        pairs.push((cut.part[rims[other][0] as usize], piece.part[contour_rims[k][0] as usize]));
     }
+    let components = change_of_components(pairs, hole.parts, piece.part_count());
     patch.positions.extend_from_slice(&piece.surface.positions);
     let inserted = piece.surface.triangles.iter();
     patch.triangles.extend(inserted.map(|corners| corners.map(|v| PatchCorner::New(first + v))));
-    Some(without_unused_positions(patch))
+    Some(Replacement { removed: hole.removed, patch: without_unused_positions(patch), components })
+}
+
+/// Returns by how much the number of components of the mesh changes if `before` connected parts of it are replaced by
+/// `after`; `pairs` are the parts at each rim, before and after. `None` if a part is replaced by others than one.
+fn change_of_components(mut pairs: Vec<(u32, u32)>, before: usize, after: usize) -> Option<i64> {
+    let distinct = |parts: &mut Vec<u32>| {
+        sort_distinct(parts);
+        parts.len()
+    };
+    pairs.sort_unstable();
+    pairs.dedup();
+    let open_before = distinct(&mut pairs.iter().map(|pair| pair.0).collect());
+    let open_after = distinct(&mut pairs.iter().map(|pair| pair.1).collect());
+    let is_one_to_one = open_before == pairs.len() && open_after == pairs.len();
+    is_one_to_one.then_some((after - open_after) as i64 - (before - open_before) as i64)
+}
+
+/// The vertices to remove from the mesh.
+struct Hole {
+    /// The vertices, sorted by id.
+    removed: Vec<VertexId>,
+    /// By vertex of `removed`, the index of its connected part.
+    part: Vec<u32>,
+    /// The number of connected parts.
+    parts: usize,
+}
+
+impl Hole {
+    /// Selects the connected parts of the vertices `near` that reach into the box `inner`, and bits of the mesh that they
+    /// cut off: beside the faces of the box, the surface may wind in and out without the contour doing so, too.
+    fn new(mesh: &Mesh, near: &[VertexId], inner: &Bounds) -> Self {
+        let mut removed = Vec::new();
+        for part in connected_parts(mesh, near) {
+            if part.iter().any(|&v| inner.contains(mesh.position(v))) {
+                removed.extend(part);
+            }
+        }
+        sort_vertices(&mut removed);
+        let mut rim = removed.clone();
+        mesh.add_neighbours(&mut rim);
+        rim.retain(|v| removed.binary_search(v).is_err());
+        let mut cut_off = Vec::new();
+        for v in rim {
+            cut_off.extend(cut_off_at(mesh, v, &removed).unwrap_or_default());
+        }
+        removed.extend(cut_off);
+        sort_vertices(&mut removed);
+        let mut part = vec![0; removed.len()];
+        let parts = connected_parts(mesh, &removed);
+        for (k, members) in parts.iter().enumerate() {
+            for index in members.iter().filter_map(|v| removed.binary_search(v).ok()) {
+                part[index] = k as u32;
+            }
+        }
+        Self { removed, part, parts: parts.len() }
+    }
+
+    fn index(&self, v: VertexId) -> Option<usize> {
+        self.removed.binary_search(&v).ok()
+    }
+}
+
+/// Returns the connected parts of some vertices, sorted by id, of the mesh.
+fn connected_parts(mesh: &Mesh, vertices: &[VertexId]) -> Vec<Vec<VertexId>> {
+    let mut is_found = vec![false; vertices.len()];
+    let mut parts = Vec::new();
+    for (first, &v) in vertices.iter().enumerate() {
+        if std::mem::replace(&mut is_found[first], true) {
+            continue;
+        }
+        let (mut part, mut next) = (vec![v], 0);
+        while next < part.len() {
+            for w in mesh.ring(part[next]).as_slice() {
+                if let Ok(index) = vertices.binary_search(w)
+                    && !std::mem::replace(&mut is_found[index], true)
+                {
+                    part.push(*w);
+                }
+            }
+            next += 1;
+        }
+        parts.push(part);
+    }
+    parts
+}
+
+/// Returns the vertices that are connected with `v` without passing through `removed`, if these are at most
+/// [`MAX_CUT_OFF`].
+fn cut_off_at(mesh: &Mesh, v: VertexId, removed: &[VertexId]) -> Option<Vec<VertexId>> {
+    let (mut found, mut next) = (vec![v], 0);
+    while next < found.len() {
+        for w in mesh.ring(found[next]).as_slice() {
+            if removed.binary_search(w).is_err() && !found.contains(w) {
+                found.push(*w);
+            }
+        }
+        if found.len() > MAX_CUT_OFF {
+            return None;
+        }
+        next += 1;
+    }
+    Some(found)
 }
 
 /// The mesh outside a box: what remains of the triangles that the faces of the box cut, and the rims there.
 struct CutMesh {
     /// The vertices on cut edges, and the remains of the cut triangles.
     patch: Patch,
+    /// By vertex on a cut edge, the connected part of the removed vertices at its other end.
+    part: Vec<u32>,
     /// By vertex on a cut edge, the next one along its rim; a strip that closes the hole has triangles on this edge.
     next: BTreeMap<u32, u32>,
 }
 
 impl CutMesh {
-    /// Cuts the triangles at the vertices `removed`, which are those in the box `bounds`.
-    fn new(mesh: &Mesh, removed: &[VertexId], bounds: &Bounds) -> Self {
-        let mut cut = Self { patch: Patch::default(), next: BTreeMap::new() };
-        let is_removed = |v: VertexId| removed.binary_search(&v).is_ok();
+    /// Cuts the triangles at removed vertices where they enter the box `bounds`.
+    fn new(mesh: &Mesh, hole: &Hole, bounds: &Bounds) -> Self {
+        let mut cut = Self { patch: Patch::default(), part: Vec::new(), next: BTreeMap::new() };
         let mut ends = BTreeMap::new();
-        for corners in mesh.triangles_at(removed) {
-            let inside = corners.map(is_removed);
+        for corners in mesh.triangles_at(&hole.removed) {
+            let inside = corners.map(|v| hole.index(v).is_some());
             let Some(k) = odd_one_out(inside) else { continue };
             let [a, b, c] = [0, 1, 2].map(|i| corners[(k + i) % 3]);
             let mut end = |kept: VertexId, gone: VertexId| {
                 *ends.entry(combined_rank(kept.0, gone.0)).or_insert_with(|| {
                     cut.patch.positions.push(cut_point(bounds, mesh.position(kept), mesh.position(gone)));
+                    cut.part.push(hole.index(gone).map_or(0, |index| hole.part[index]));
                     cut.patch.positions.len() as u32 - 1
                 })
             };
@@ -189,10 +315,11 @@ fn cut_point(bounds: &Bounds, outside: Vec3, inside: Vec3) -> Vec3 {
 /// The contour in a box, open at those faces of the box that are not at the border of the image.
 struct Piece {
     surface: TriangleMesh,
-    /// By vertex, the lowest vertex of its component of the contour, closed at all faces.
-    component: Vec<u32>,
-    /// By vertex, for those named in `component`: whether that component encloses less than the smallest part.
-    is_small: Vec<bool>,
+    /// By vertex, the lowest vertex of its connected part.
+    part: Vec<u32>,
+    /// By vertex, for those named in `part`: whether the part may be left out if no rim of it has a partner in the mesh.
+    /// It belongs to a component that encloses less than the smallest part, or is near the faces of the box only.
+    is_negligible: Vec<bool>,
 }
 
 impl Piece {
@@ -202,10 +329,23 @@ impl Piece {
         let mut surface = placed(contour_of_grid(&part, rule.iso, rule.object)?, |p| p + offset);
         let component = surface.component_of_each_vertex();
         let volumes = surface.enclosed_volumes(&component);
-        let is_small = volumes.into_iter().map(|volume| volume.abs() < rule.smallest_part).collect();
         let is_inside: Vec<bool> = surface.positions.iter().map(|&p| at.inner.contains(p)).collect();
         surface.triangles.retain(|corners| corners.iter().all(|&v| is_inside[v as usize]));
-        Ok(Self { surface, component, is_small })
+        let part = surface.component_of_each_vertex();
+        let deep = Bounds { min: at.inner.min + Vec3::splat(GAP), max: at.inner.max - Vec3::splat(GAP) };
+        let mut is_negligible = vec![true; part.len()];
+        for (v, &p) in surface.positions.iter().enumerate().filter(|&(v, _)| is_inside[v]) {
+            let is_small = volumes[component[v] as usize].abs() < rule.smallest_part;
+            is_negligible[part[v] as usize] &= is_small || !deep.contains(p);
+        }
+        Ok(Self { surface, part, is_negligible })
+    }
+
+    /// Returns the number of connected parts of the contour.
+    fn part_count(&self) -> usize {
+        let mut parts = self.surface.triangles.iter().map(|corners| self.part[corners[0] as usize]).collect();
+        sort_distinct(&mut parts);
+        parts.len()
     }
 
     /// Returns the rims of the contour, cycles of vertices along which strips are to be added.
@@ -220,22 +360,16 @@ impl Piece {
         if next.len() == open.len() { rims(&next) } else { None }
     }
 
-    /// Removes the components that enclose less than the smallest part and have no partner in the mesh. Returns `None`
-    /// if a larger one has a rim without a partner.
+    /// Removes negligible parts without a partner in the mesh. Returns `None` if another one has a rim without a partner.
     fn leave_out_noise(&mut self, rims: &[Vec<u32>], partners: &[Option<usize>]) -> Option<()> {
-        let mut is_left_out = self.is_small.clone();
-        for (rim, partner) in rims.iter().zip(partners) {
-            let component = self.component[rim[0] as usize] as usize;
-            is_left_out[component] &= partner.is_none();
-        }
-        let is_lost = |(rim, partner): (&Vec<u32>, &Option<usize>)| {
-            partner.is_none() && !is_left_out[self.component[rim[0] as usize] as usize]
-        };
-        if rims.iter().zip(partners).any(is_lost) {
+        let mut is_left_out = std::mem::take(&mut self.is_negligible);
+        let part = |rim: &Vec<u32>| self.part[rim[0] as usize] as usize;
+        let rims = || rims.iter().zip(partners);
+        rims().for_each(|(rim, partner)| is_left_out[part(rim)] &= partner.is_none());
+        if rims().any(|(rim, partner)| partner.is_none() && !is_left_out[part(rim)]) {
             return None;
         }
-        let component = &self.component;
-        self.surface.triangles.retain(|corners| !is_left_out[component[corners[0] as usize] as usize]);
+        self.surface.triangles.retain(|corners| !is_left_out[self.part[corners[0] as usize] as usize]);
         Some(())
     }
 }

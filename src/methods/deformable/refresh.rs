@@ -7,7 +7,7 @@
 
 use super::contour::ObjectIs;
 use super::image::Pyramid;
-use super::patch::{ContourRule, PatchBox, patch};
+use super::patch::{ContourRule, PatchBox, Replacement, replacement};
 use super::{DeformableModel, Topology};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
@@ -89,13 +89,15 @@ impl DeformableModel {
     /// vertices added; `None` if that would make the surface intersect itself, or rims do not correspond.
     fn try_to_patch(&mut self, at: PatchBox) -> Result<Option<usize>, MethodError> {
         let sampling = self.sampling();
-        let removed = self.resolver.embedding(&self.mesh, sampling).vertices_in(&self.mesh, &at.outer);
+        let near = self.resolver.embedding(&self.mesh, sampling).vertices_in(&self.mesh, &at.outer);
         let rule = ContourRule {
             iso: self.level_iso,
             object: ObjectIs::by(&self.params),
             smallest_part: self.params.smallest_part,
         };
-        let Some(patch) = patch(&self.pyramid.levels[0], &self.mesh, &removed, at, rule)? else {
+        let Some(Replacement { removed, patch, components }) =
+            replacement(&self.pyramid.levels[0], &self.mesh, &near, at, rule)?
+        else {
             return Ok(None);
         };
         if removed.is_empty() && patch.triangles.is_empty() {
@@ -107,6 +109,10 @@ impl DeformableModel {
         let Ok(added) = self.resolver.replace(&mut self.mesh, sampling, &removed, &patch) else {
             return Ok(None);
         };
+        self.components = match components {
+            Some(change) => self.components.saturating_add_signed(change as i32),
+            None => self.mesh.component_count() as u32,
+        };
         self.initialise_attributes(&added);
         if self.convergence.sized {
             self.set_sizes_of(&added);
@@ -114,8 +120,8 @@ impl DeformableModel {
         let mut active = added.clone();
         self.mesh.add_neighbours(&mut active);
         let changes = self.restore_bounds(&active, &mut Times::default());
+        self.count_components(changes);
         self.refreshed += changes;
-        self.components = self.mesh.component_count() as u32;
         Ok(Some(added.len()))
     }
 
