@@ -75,7 +75,15 @@ fn run(is_smooth: bool) -> (Vec<Row>, f64, DeformableModel) {
         row.steps = milliseconds() - refreshed;
         if std::env::var_os("EACH").is_some() {
             let all = model.mesh().to_triangles();
-            eprintln!("{kind:?} refresh {:.1} steps {:.1} ({}) {:.1?} crossings {} check {:?}", row.refresh, row.steps, row.iterations, row.parts, count_self_intersections(&all), model.mesh().check());
+            eprintln!(
+                "{kind:?} refresh {:.1} steps {:.1} ({}) {:.1?} crossings {} check {:?}",
+                row.refresh,
+                row.steps,
+                row.iterations,
+                row.parts,
+                count_self_intersections(&all),
+                model.mesh().check()
+            );
         }
         rows.push(row);
         let began = milliseconds();

@@ -274,8 +274,7 @@ impl Volume {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
         let normalised = self.normalisation();
-        let values =
-            each!(self.voxels.as_ref(), values => converted(&values[start..end], normalised))?;
+        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], normalised))?;
         Ok(Grid { dims: self.dims(), values })
     }
 

@@ -153,8 +153,7 @@ impl Grid {
             return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
         }
         let dims = reduced_dims(self.dims, factor);
-        Ok([0, 1, 2]
-            .map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis])))
+        Ok([0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis])))
     }
 
     fn resample(&self, taps: &[ResamplingWeights; 3], dims: [usize; 3]) -> Result<Grid, VolumeError> {

@@ -26,15 +26,8 @@ pub enum StrokeKind {
 }
 
 impl StrokeKind {
-    pub const ALL: [Self; 7] = [
-        Self::Add,
-        Self::Erase,
-        Self::Bridge,
-        Self::Cut,
-        Self::Drill,
-        Self::Island,
-        Self::EraseIsland,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Add, Self::Erase, Self::Bridge, Self::Cut, Self::Drill, Self::Island, Self::EraseIsland];
 }
 
 /// A hollow ball with bars across its cavity, in a volume of 8-bit voxels, and the islands that strokes added.
@@ -76,7 +69,11 @@ impl Scene {
 
     /// Returns the value of a voxel at a depth inside the object, in voxels.
     fn value(&self, depth: f32) -> u8 {
-        let share = if self.is_smooth { (0.5 + 0.5 * depth).clamp(0.0, 1.0) } else { f32::from(u8::from(depth >= 0.0)) };
+        let share = if self.is_smooth {
+            (0.5 + 0.5 * depth).clamp(0.0, 1.0)
+        } else {
+            f32::from(u8::from(depth >= 0.0))
+        };
         (FULL * share) as u8
     }
 
@@ -86,7 +83,7 @@ impl Scene {
         let from_centre = q.length();
         let wall = (from_centre - r).max(r - 2.0 * b - from_centre);
         let to_line = |x: f32| x - 6.0 * b * (x / (6.0 * b)).round_ties_even();
-        let bar = (to_line(q.y).powi(2) + to_line(q.z).powi(2)).sqrt() - 0.8 * b;
+        let bar = Vec3::new(0.0, to_line(q.y), to_line(q.z)).length() - 0.8 * b;
         wall.min(bar.max(from_centre - r + b))
     }
 

@@ -9,9 +9,7 @@ use super::contour::{ObjectIs, contour_of_grid, placed};
 use super::image::LevelImage;
 use crate::math::order::{combined_rank, sort_distinct, sort_ranks};
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{
-    Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices,
-};
+use crate::mesh::{Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices};
 use crate::methods::MethodError;
 use crate::volume::Region;
 use std::collections::BTreeMap;
@@ -63,10 +61,7 @@ impl PatchBox {
             let end = end(axis);
             if end == dims[axis] { f32::INFINITY } else { (end - 1) as f32 }
         };
-        let inner = Bounds {
-            min: Vec3::from([0, 1, 2].map(low)),
-            max: Vec3::from([0, 1, 2].map(high)),
-        };
+        let inner = Bounds { min: Vec3::from([0, 1, 2].map(low)), max: Vec3::from([0, 1, 2].map(high)) };
         let outer = Bounds { min: inner.min - Vec3::splat(GAP), max: inner.max + Vec3::splat(GAP) };
         Self { voxels, inner, outer }
     }
@@ -89,7 +84,7 @@ pub(super) struct Replacement {
     pub(super) patch: Patch,
     /// The change of the number of connected components of the mesh; `None` if it is not known, since the patch
     /// connects other rims than the part that it replaces.
-    pub(super) components: Option<i64>,
+    pub(super) components: Option<i32>,
 }
 
 /// Returns the replacement of the mesh in a box by the contour there. `near` are the vertices in the outer box, sorted by
@@ -143,7 +138,7 @@ fn stitched(hole: Hole, cut: CutMesh, mut piece: Piece) -> Option<Replacement> {
 
 /// Returns by how much the number of components of the mesh changes if `before` connected parts of it are replaced by
 /// `after`; `pairs` are the parts at each rim, before and after. `None` if a part is replaced by others than one.
-fn change_of_components(mut pairs: Vec<(u32, u32)>, before: usize, after: usize) -> Option<i64> {
+fn change_of_components(mut pairs: Vec<(u32, u32)>, before: usize, after: usize) -> Option<i32> {
     let distinct = |parts: &mut Vec<u32>| {
         sort_distinct(parts);
         parts.len()
@@ -153,7 +148,7 @@ fn change_of_components(mut pairs: Vec<(u32, u32)>, before: usize, after: usize)
     let open_before = distinct(&mut pairs.iter().map(|pair| pair.0).collect());
     let open_after = distinct(&mut pairs.iter().map(|pair| pair.1).collect());
     let is_one_to_one = open_before == pairs.len() && open_after == pairs.len();
-    is_one_to_one.then_some((after - open_after) as i64 - (before - open_before) as i64)
+    is_one_to_one.then_some((after - open_after) as i32 - (before - open_before) as i32)
 }
 
 /// The vertices to remove from the mesh.
@@ -276,7 +271,11 @@ impl CutMesh {
             } else {
                 let (from, to) = (end(a, c), end(a, b));
                 cut.next.insert(from, to);
-                cut.patch.triangles.push([PatchCorner::Kept(a), PatchCorner::New(to), PatchCorner::New(from)]);
+                cut.patch.triangles.push([
+                    PatchCorner::Kept(a),
+                    PatchCorner::New(to),
+                    PatchCorner::New(from),
+                ]);
             }
         }
         cut
@@ -286,9 +285,15 @@ impl CutMesh {
     /// `c`, which are on the same edges as `from` and `to`, in this order.
     fn keep_quad(&mut self, mesh: &Mesh, [from, to]: [u32; 2], [b, c]: [VertexId; 2]) {
         let point = |k: u32| self.patch.positions[k as usize];
-        let [first, second] = [point(from).distance_squared(mesh.position(c)), point(to).distance_squared(mesh.position(b))];
-        let [p, q, b, c] = [PatchCorner::New(from), PatchCorner::New(to), PatchCorner::Kept(b), PatchCorner::Kept(c)];
-        self.patch.triangles.extend(if first < second { [[p, b, c], [p, c, q]] } else { [[p, b, q], [b, c, q]] });
+        let [first, second] =
+            [point(from).distance_squared(mesh.position(c)), point(to).distance_squared(mesh.position(b))];
+        let [p, q, b, c] =
+            [PatchCorner::New(from), PatchCorner::New(to), PatchCorner::Kept(b), PatchCorner::Kept(c)];
+        self.patch.triangles.extend(if first < second {
+            [[p, b, c], [p, c, q]]
+        } else {
+            [[p, b, q], [b, c, q]]
+        });
     }
 }
 

@@ -5,6 +5,7 @@
 //! split at once, and moves only by fractions of a voxel afterwards. If that fails, or on coarse levels, the vertices
 //! there wake, and forces and seeding do the same in more iterations.
 
+use super::awake::ITERATIONS_TO_SLEEP;
 use super::contour::ObjectIs;
 use super::image::Pyramid;
 use super::patch::{ContourRule, PatchBox, Replacement, replacement};
@@ -62,9 +63,16 @@ impl DeformableModel {
     fn refresh_changed(&mut self, changed: Region, new: &Grid) -> Result<(), MethodError> {
         self.pyramid.update(changed, new)?;
         self.motion.forces.forget_image();
-        let was_settled = self.is_done() || self.convergence.refreshed > 0;
+        let was_done = self.is_done();
+        let was_settled = was_done || self.convergence.refreshed > 0;
+        if was_done {
+            self.put_to_sleep();
+        }
         let added = self.replace_by_contour(changed)?;
         let woken = self.wake_near(changed);
+        if was_done && added.is_some() && woken == 0 {
+            return Ok(());
+        }
         let count = if was_settled { added.map(|added| added.max(woken)) } else { None };
         self.convergence = self.convergence.continued(count);
         Ok(())
@@ -109,10 +117,7 @@ impl DeformableModel {
         let Ok(added) = self.resolver.replace(&mut self.mesh, sampling, &removed, &patch) else {
             return Ok(None);
         };
-        self.components = match components {
-            Some(change) => self.components.saturating_add_signed(change as i32),
-            None => self.mesh.component_count() as u32,
-        };
+        self.update_components(components);
         self.initialise_attributes(&added);
         if self.convergence.sized {
             self.set_sizes_of(&added);
@@ -123,6 +128,24 @@ impl DeformableModel {
         self.count_components(changes);
         self.refreshed += changes;
         Ok(Some(added.len()))
+    }
+
+    /// Updates the number of components, which has changed by `change`, or by an unknown number if that is `None`. Whole
+    /// components that appeared or vanished are reported by the next step.
+    fn update_components(&mut self, change: Option<i32>) {
+        let Some(change) = change else {
+            self.components = self.mesh.component_count() as u32;
+            return;
+        };
+        self.components = self.components.saturating_add_signed(change);
+        let count = if change > 0 { &mut self.refreshed.seeds } else { &mut self.refreshed.vanished };
+        *count += change.unsigned_abs();
+    }
+
+    /// Puts all vertices to sleep. In a finished run some still creep, and would do so whenever a part is refreshed.
+    fn put_to_sleep(&mut self) {
+        self.mesh.scalar_mut(self.keys.still_iterations).fill(ITERATIONS_TO_SLEEP);
+        self.mesh.vector_mut(self.keys.velocity).fill(Vec3::ZERO);
     }
 
     /// Wakes the vertices near changed voxels, and returns their number.
