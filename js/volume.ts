@@ -435,7 +435,7 @@ function voxelArray(parameter: string, data: unknown): VoxelArray {
 }
 
 /** Returns one integer of at least 0 for each of x, y and z. */
-function counts(parameter: string, given: unknown): Uint32Array {
+export function counts(parameter: string, given: unknown): Uint32Array {
   return Uint32Array.from(vec3(parameter, given), (count) => integer(parameter, count));
 }
 
