@@ -110,5 +110,10 @@ fn main() {
             coverage.recall,
             coverage.precision,
         );
+        for kind in StrokeKind::ALL {
+            let of_kind = rows.iter().filter(|row| row.kind == kind);
+            let time = median(of_kind.map(|row| row.refresh + row.steps).collect());
+            println!("  {{ \"kind\": \"{kind:?}\", \"stroke\": {:.4} }}", time / extraction);
+        }
     }
 }

@@ -273,7 +273,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Adapts the model to its volume after {@link Volume.write} has changed voxels in a region of its frame, as a brush
-   * does. Only the image and the surface there are computed anew: at level 0 the surface is replaced by the iso-surface,
+   * does. Only the image and the surface there are updated: at level 0 the surface is replaced by the iso-surface,
    * so that components appear, vanish, join and split at once. A finished model continues, near the changed voxels only;
    * `step` or `run` it until it is done again. If no voxel has changed, nothing happens. A run may be in progress.
    *

@@ -112,7 +112,7 @@ impl Grid {
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
-    /// after the values in the region `changed` have changed; returns the region of `coarse` that was computed anew, or
+    /// after the values in the region `changed` have changed; returns the region of `coarse` that was updated, or
     /// `None` if no voxel of it depends on them.
     ///
     /// # Errors

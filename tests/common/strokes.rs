@@ -13,7 +13,7 @@ pub struct Stroke {
     pub adds: bool,
 }
 
-/// What a stroke does to the object.
+/// The effect of a stroke on the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StrokeKind {
     Add,

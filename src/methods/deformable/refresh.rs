@@ -1,6 +1,6 @@
 //! Refreshing the model after part of its volume has changed, as by a stroke of a brush.
 //!
-//! Only what depends on the changed voxels is computed anew: the image in a box around them, and the surface there. On
+//! Only what depends on the changed voxels is updated: the image in a box around them, and the surface there. On
 //! the finest level the surface in the box is replaced by the contour (`patch`), so that parts appear, vanish, join and
 //! split at once, and moves only by fractions of a voxel afterwards. If that fails, or on coarse levels, the vertices
 //! there wake, and forces and seeding do the same in more iterations.
