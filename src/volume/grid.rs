@@ -225,6 +225,7 @@ fn padding_weight(x: f32, last: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -240,6 +241,25 @@ mod tests {
 
     fn ramp(p: Vec3) -> f32 {
         1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z
+    }
+
+    /// Random parts of a grid are replaced; the gradient is then that of the whole grid.
+    #[test]
+    fn the_gradient_is_updated_where_values_have_changed() {
+        let mut random = Random::new(4);
+        let mut g = grid([9, 7, 6], |p| p.x * p.y - p.z);
+        let mut gradient = g.sobel().unwrap();
+        for _ in 0..60 {
+            let min = g.dims.map(|n| random.below(n as u32) as usize);
+            let dims =
+                [0, 1, 2].map(|axis| 1 + random.below((g.dims[axis] - min[axis]).min(4) as u32) as usize);
+            let region = Region { min, dims };
+            let values = (0..region.len()).map(|_| random.unit() as f32).collect();
+            g.overwrite(region, &Grid { dims, values });
+            let before = gradient.clone();
+            g.update_sobel(&mut gradient, region).unwrap();
+            assert!(gradient == g.sobel().unwrap() && gradient != before);
+        }
     }
 
     #[test]

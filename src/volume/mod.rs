@@ -513,6 +513,20 @@ mod tests {
     }
 
     #[test]
+    fn a_normalised_region_is_part_of_the_normalised_grid() {
+        let values = (0..48).map(|i| if i == 40 { f32::NAN } else { i as f32 }).collect();
+        let v = Volume::new(init(Voxels::F32(values), [3, 4, 2, 2])).unwrap();
+        let region = Region { min: [1, 2, 0], dims: [2, 2, 2] };
+        for frame in 0..2 {
+            let whole = v.normalised_grid(frame).unwrap();
+            assert_eq!(v.normalised_region(region, frame), whole.part(region));
+        }
+        assert!(v.normalised_region(region, 2).is_err());
+        let refused = v.normalised_region(Region { dims: [3, 1, 1], ..region }, 0).unwrap_err().to_string();
+        assert!(refused.starts_with("region: must have"), "{refused}");
+    }
+
+    #[test]
     fn a_negative_slope_turns_the_range_round() {
         let turned = VolumeInit { slope: -1.0, intercept: 0.0, ..init(Voxels::U8(vec![1, 5]), [2, 1, 1, 1]) };
         assert_eq!(Volume::new(turned).unwrap().range(), [-5.0, -1.0]);

@@ -88,4 +88,12 @@ mod tests {
             assert!(refused.starts_with("region: must") && refused.contains("[4, 3, 5]"), "{refused}");
         }
     }
+
+    #[test]
+    fn an_enlarged_region_ends_at_the_border() {
+        let region = Region { min: [1, 5, 0], dims: [2, 1, 3] };
+        let enlarged = Region { min: [0, 3, 0], dims: [4, 3, 3] };
+        assert_eq!(region.enlarged(2, [4, 6, 3]), enlarged);
+        assert_eq!(region.enlarged(0, [4, 6, 3]), region);
+    }
 }

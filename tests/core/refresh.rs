@@ -98,36 +98,43 @@ fn changes(kind: StrokeKind) -> (i64, i64) {
     (after.0 - before.0, after.1 as i64 - before.1 as i64)
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn added_matter_is_a_bump() {
     assert_eq!(changes(StrokeKind::Add), (0, 0));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn erased_matter_is_a_dent() {
     assert_eq!(changes(StrokeKind::Erase), (0, 0));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_bridge_is_a_handle() {
     assert_eq!(changes(StrokeKind::Bridge), (-2, 0));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_cut_bar_is_no_handle() {
     assert_eq!(changes(StrokeKind::Cut), (2, 0));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_hole_through_the_wall_joins_its_two_sides() {
     assert_eq!(changes(StrokeKind::Drill), (-2, -1));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn an_island_is_a_component() {
     assert_eq!(changes(StrokeKind::Island), (2, 1));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn an_erased_island_vanishes() {
     assert_eq!(changes(StrokeKind::EraseIsland), (-2, -1));

@@ -492,7 +492,8 @@ test('after a change of voxels, the surface follows with `refresh`, there and no
   const fitted = model({ volume: brushed, start: 'contour', params: ADAPTING });
   await fitted.run();
   const before = fitted.mesh.info().volume;
-  const lowest = (from: Mesh) => from.arrays().positions.reduce((least, x, i) => (i % 3 === 0 && x < least ? x : least), 0);
+  const lowest = (from: Mesh) =>
+    from.arrays().positions.reduce((least, x, i) => (i % 3 === 0 && x < least ? x : least), 0);
   const far = lowest(fitted.mesh);
   const region = { min: [22, 12, 12], dims: [6, 7, 7] } as const;
   const box = { min: [...region.min], dims: [...region.dims] } as { min: vesicle.Vec3; dims: vesicle.Vec3 };

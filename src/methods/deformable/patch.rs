@@ -29,6 +29,9 @@ const CUT_MARGIN: f32 = 0.15;
 /// removed with the vertices inside.
 const MAX_CUT_OFF: usize = 12;
 
+/// The largest number of pairs of vertices that are compared to find the partners of rims: some tenths of a second.
+const MAX_COMPARED: usize = 1 << 26;
+
 /// The largest number of pairs of vertices that are compared to join two rims, which bounds the memory for it.
 const MAX_PAIRS: usize = 1 << 22;
 
@@ -112,6 +115,10 @@ fn stitched(hole: Hole, cut: CutMesh, mut piece: Piece) -> Option<Replacement> {
     let here: Vec<Vec<Vec3>> = rims.iter().map(|rim| points(rim, &cut.patch.positions)).collect();
     let there: Vec<Vec<Vec3>> =
         contour_rims.iter().map(|rim| points(rim, &piece.surface.positions)).collect();
+    let count = |rims: &[Vec<Vec3>]| rims.iter().map(Vec::len).sum::<usize>();
+    if count(&here).saturating_mul(count(&there)) > MAX_COMPARED {
+        return None;
+    }
     let partners = partners(&there, &here);
     piece.leave_out_noise(&contour_rims, &partners)?;
     if partners.iter().flatten().count() != rims.len() {

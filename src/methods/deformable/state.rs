@@ -12,6 +12,10 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLDEF\x06";
 
+/// The largest number of edits of each kind, made by refreshes since the last step, that is accepted in a saved state, so
+/// that their sums do not overflow.
+const MAX_EDITS: u32 = 1 << 28;
+
 /// The saved part of a run of the deformable model: everything but the volume and what is computed from it.
 #[derive(Serialize, Deserialize)]
 struct State {
@@ -92,6 +96,9 @@ impl DeformableModel {
             && (1.0..=coarse::MAX_FACTOR).contains(&state.image_force_factor);
         if !is_in_range {
             return bad("level", "iso value or factor on the image force is out of range".into());
+        }
+        if state.refreshed.most() > MAX_EDITS {
+            return bad("refreshed", format!("more than {MAX_EDITS} edits of a kind"));
         }
         let domain = self.domain_for(state.finest_delta);
         let lost = |v: &VertexId| !domain.bounds.contains(state.mesh.position(*v));
