@@ -527,7 +527,7 @@ test.each([
   ['region.dims', { min: [0, 0, 0], dims: [1, 1, -1] }],
   ['region', { min: [0, 0, 0], dims: [1, 0, 1] }],
   ['region', { min: [31, 0, 0], dims: [2, 1, 1] }],
-  ['region', { min: [0, 0, 0], dims: [1, 1, 1], frame: 0 }],
+  ['frame', { min: [0, 0, 0], dims: [1, 1, 1], frame: 0 }],
 ])('refresh refuses a wrong %s', (name, region) => {
   const fitted = model();
   const before = fitted.save();
