@@ -16,7 +16,7 @@ import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, runInSlices, type Stepper, type StepReport } from './stepper.js';
 import { RawDeformable, RawStart } from './vesicle.js';
-import { type Volume, volumeHandle } from './volume.js';
+import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {
@@ -133,7 +133,10 @@ export type DeformableStart =
 
 /** Constructor options of a {@link DeformableModel}. */
 export interface DeformableOptions {
-  /** The volume that the model is fitted to; it may be freed once the model is made. */
+  /**
+   * The volume that the model is fitted to; it may be freed once the model is made, unless
+   * {@link DeformableModel.refresh} is called later.
+   */
   volume: Volume;
   /** Index of the frame of a 4D volume that the model is fitted to; default 0. */
   frame?: number;
@@ -171,6 +174,7 @@ export class DeformableModel implements Stepper {
   readonly #handle: Handle<RawDeformable>;
   readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
   readonly #mesh: Mesh;
+  readonly #volume: Handle<import('./vesicle.js').RawVolume>;
   readonly #runner = new Runner();
 
   /**
@@ -182,9 +186,9 @@ export class DeformableModel implements Stepper {
   constructor(given: DeformableOptions) {
     const { volume, frame = 0, start = 'contour', levels = 0, edge, params: some = {} } = checked(given);
     const params = shallowCopy('params', some);
-    const image = volumeHandle('volume', volume as Volume);
+    this.#volume = volumeHandle('volume', volume as Volume);
     this.#handle = new Handle('DeformableModel', () =>
-      image.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
+      this.#volume.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
     );
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#mesh = wrapMesh(this.#meshHandle, true);
@@ -265,6 +269,23 @@ export class DeformableModel implements Stepper {
   seed(): StepReport {
     this.#runner.refuseWhileRunning('seed');
     return this.#handle.use((raw) => raw.seed() as StepReport);
+  }
+
+  /**
+   * Adapts the model to its volume after {@link Volume.write} has changed voxels in a region of its frame, as a brush
+   * does. Only the image and the surface there are updated: at level 0 the surface is replaced by the iso-surface,
+   * so that components appear, vanish, join and split at once. A finished model continues, near the changed voxels only;
+   * `step` or `run` it until it is done again. If no voxel has changed, nothing happens. A run may be in progress.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param region - `min`: index of the first voxel along x, y and z; `dims`: numbers of voxels.
+   * @throws {@link VesicleError} `invalid-argument`: an empty region or one beyond the volume, and `freed` after
+   *   {@link Volume.free}; the model is then unchanged; `too-large`.
+   */
+  refresh(region: { min: Vec3; dims: Vec3 }): void {
+    const [first, sizes] = checkedRegion(region);
+    this.#handle.use((raw) => this.#volume.use((volume) => raw.refresh(volume, first, sizes)));
   }
 
   /**

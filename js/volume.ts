@@ -409,7 +409,7 @@ export class Volume {
 
 /** Returns a copy of the first index and the numbers of voxels of a region; throws unless they are counts. */
 export function checkedRegion(region: { min: Vec3; dims: Vec3 }): [Uint32Array, Uint32Array] {
-  const { min, dims } = checkProperties('region', region, ['min', 'dims']);
+  const { min, dims } = checkProperties('region', shallowCopy('region', region), ['min', 'dims']);
   return [counts('region.min', min), counts('region.dims', dims)];
 }
 

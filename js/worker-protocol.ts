@@ -126,6 +126,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     delta: 'value',
     setAttractors: 'method',
     seed: 'method',
+    refresh: 'method',
     coverage: 'method',
     speeds: 'method',
   },

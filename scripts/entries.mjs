@@ -34,7 +34,7 @@ const own = (part, glue) => ({
     bundle.onResolve({ filter: /\/error\.js$/ }, () => ({ path: '../error.js', external: true }));
     bundle.onResolve({ filter: /\/module\.js$/ }, () => ({ path: at('pkg/entries/module.js') }));
     bundle.onResolve({ filter: /\/(vesicle|files)\.js$/ }, () => ({ path: `${glue}.js` }));
-    bundle.onLoad({ filter: /\/(mesh|volume)\.js$/ }, async ({ path }) => ({
+    bundle.onLoad({ filter: /\/(deformable|mesh|volume)\.js$/ }, async ({ path }) => ({
       contents: without(part, await readFile(path, 'utf8')),
     }));
   },

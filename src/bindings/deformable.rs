@@ -61,7 +61,7 @@ impl RawStart {
 
 /// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
+pub struct RawDeformable(pub(super) Rc<RefCell<DeformableModel>>);
 
 method_bindings!(RawDeformable, DeformableModel, deformableParamSpecs);
 

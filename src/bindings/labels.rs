@@ -3,6 +3,8 @@
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::point;
+#[cfg(feature = "deformable")]
+use super::deformable::RawDeformable;
 use super::error::Failure;
 use super::volume::{RawVolume, voxels};
 use crate::io::{Compression, VolumeFormat, write_volume};
@@ -73,6 +75,15 @@ impl RawVolume {
             .ok_or_else(|| Failure::invalid("format", "must be one of nifti, nrrd, mha"))?;
         let compression = if gzip { Compression::Deflate } else { Compression::None };
         Ok(write_volume(&self.0, format, compression).map_err(Failure::from)?)
+    }
+}
+
+#[cfg(feature = "deformable")]
+#[wasm_bindgen]
+impl RawDeformable {
+    /// Adapts the model to its volume after voxels in the region of `dims` voxels from index `min` have changed.
+    pub fn refresh(&self, volume: &RawVolume, min: &[u32], dims: &[u32]) -> Result<(), JsValue> {
+        Ok(self.0.borrow_mut().refresh(&volume.0, region(min, dims)?).map_err(Failure::from)?)
     }
 }
 

@@ -160,7 +160,7 @@ fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
 
 /// Orders the links of vertex `v`, the edges opposite it in its triangles, into its one-ring, or reports why they are
 /// not a single cycle of 3 to [`LARGEST_VALENCE`] edges.
-fn ring_from_links(v: usize, links: &[[u32; 2]]) -> Result<Ring, MeshError> {
+pub(super) fn ring_from_links(v: usize, links: &[[u32; 2]]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
         return fail(&format!("more than {LARGEST_VALENCE} triangles meet"));

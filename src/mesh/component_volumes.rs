@@ -58,7 +58,7 @@ impl TriangleMesh {
 
     /// Returns the signed volume of each connected component, positive if its triangles face outwards, at the lowest
     /// vertex index of the component, and 0 at other indices. `component_of` is that index by vertex.
-    fn enclosed_volumes(&self, component_of: &[u32]) -> Vec<f64> {
+    pub(crate) fn enclosed_volumes(&self, component_of: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.positions.len()];
         for triangle in &self.triangles {
             let component = component_of[triangle[0] as usize] as usize;

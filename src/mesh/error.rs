@@ -59,6 +59,9 @@ pub enum EditError {
     /// The edit would make the mesh intersect itself; only edits through a collision guard are tested for it.
     #[error("the edit would make the mesh intersect itself")]
     WouldSelfIntersect,
+    /// With the patch to be inserted, the surface would not be closed, or not be a manifold, at this vertex.
+    #[error("the patch does not close the surface at {0:?}")]
+    OpenPatch(VertexId),
     /// The edit needs a new vertex, but no vertex ids are left.
     #[error("no vertex ids are left")]
     Full,

@@ -124,20 +124,41 @@ impl Mesh {
         }
     }
 
-    fn record(&mut self, v: VertexId) {
-        let journal = &mut self.journal;
-        if v.index() >= journal.slots || journal.touched.iter().any(|was| was.vertex == v) {
-            return;
+    /// Records the states of distinct vertices as [`Self::touch`] does; fast if nothing was recorded before.
+    pub(super) fn touch_distinct(&mut self, vertices: &[VertexId]) {
+        let is_first = self.journal.touched.is_empty();
+        for &v in vertices {
+            if is_first && self.journal.open && v.index() < self.journal.slots {
+                self.record_anew(v);
+            } else {
+                self.touch(v);
+            }
         }
+    }
+
+    fn record(&mut self, v: VertexId) {
+        let journal = &self.journal;
+        if v.index() < journal.slots && !journal.touched.iter().any(|was| was.vertex == v) {
+            self.record_anew(v);
+        }
+    }
+
+    fn record_anew(&mut self, v: VertexId) {
+        let journal = &mut self.journal;
         let (ring, position) = (self.rings[v.index()].clone(), self.positions[v.index()]);
         journal.touched.push(Touched { vertex: v, ring, position });
         self.attributes.get(v.index(), &mut journal.attributes);
     }
 
     pub(super) fn slot_taken(&mut self, v: VertexId) {
+        self.slot_taken_recorded(v);
+        self.touch(v);
+    }
+
+    /// Records that a slot whose state was recorded already was taken from the free list.
+    pub(super) fn slot_taken_recorded(&mut self, v: VertexId) {
         if self.journal.open {
             self.journal.slots_taken_and_freed.push(SlotChange::Taken(v));
-            self.record(v);
         }
     }
 

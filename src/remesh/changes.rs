@@ -23,6 +23,12 @@ pub struct Changes {
 }
 
 impl Changes {
+    /// Returns the largest of the numbers.
+    pub fn most(self) -> u32 {
+        let Self { creations, deletions, inversions, axial, annular, seeds, vanished } = self;
+        [creations, deletions, inversions, axial, annular, seeds, vanished].into_iter().fold(0, u32::max)
+    }
+
     /// Returns whether any edit changed the topology of the mesh, not only its sampling.
     pub fn changed_topology(self) -> bool {
         self.axial + self.annular + self.seeds + self.vanished > 0

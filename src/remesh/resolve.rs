@@ -3,7 +3,7 @@
 use super::small_components::SmallComponents;
 use super::{Changes, Embedding, Sampling};
 use crate::math::{Bounds, DAffine3, Vec3};
-use crate::mesh::{Mesh, MeshError, VertexId};
+use crate::mesh::{EditError, Mesh, MeshError, Patch, VertexId};
 use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -265,6 +265,25 @@ impl Resolver {
         self.stuck.clear();
         self.stuck.extend(held.iter().filter(|(_, share)| *share == 0.0).map(|(v, _)| *v));
         held
+    }
+
+    /// Replaces triangles of the mesh as [`Embedding::replace`] does; returns the new vertices.
+    ///
+    /// # Errors
+    /// As [`Embedding::replace`]; the mesh is unchanged on error.
+    pub fn replace(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        removed: &[VertexId],
+        patch: &Patch,
+    ) -> Result<Vec<VertexId>, EditError> {
+        self.small.find(mesh);
+        self.embedding.sync_with_edge(mesh, sampling.longest());
+        let added = self.embedding.replace(mesh, removed, patch)?;
+        let touched: Vec<VertexId> = mesh.touched_vertices().filter(|&v| mesh.is_live(v)).collect();
+        self.small.find_again(mesh, &touched);
+        Ok(added)
     }
 
     /// Returns whether the mesh is free of self-intersections; exact.

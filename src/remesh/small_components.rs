@@ -32,7 +32,7 @@ impl SmallComponents {
     }
 
     /// Updates the list of small components after edits that created or displaced the vertices `edited`.
-    fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
+    pub(super) fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
         let known = std::mem::take(&mut self.components);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
         self.find_among(mesh, members.filter(|&v| mesh.is_live(v)));

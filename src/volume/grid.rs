@@ -1,5 +1,6 @@
 //! Scalar and vector fields on a regular grid, for sampling in hot loops.
 
+use super::Region;
 use super::error::{VolumeError, reserve};
 use super::sampling::Cell;
 use crate::math::Vec3;
@@ -48,6 +49,22 @@ impl Grid {
         let grid = Grid { dims, values };
         grid.check()?;
         Ok(grid)
+    }
+
+    /// Returns the part of the grid in a region, which must lie within it.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn part(&self, region: Region) -> Result<Grid, VolumeError> {
+        let mut values = reserve(region.len())?;
+        region.rows(self.dims, 0).for_each(|row| values.extend_from_slice(&self.values[row]));
+        Ok(Grid { dims: region.dims, values })
+    }
+
+    /// Replaces the values in a region, which must lie within the grid, by those of `part`, of the region's dimensions.
+    pub fn overwrite(&mut self, region: Region, part: &Grid) {
+        let from = part.values.chunks_exact(region.dims[0]);
+        region.rows(self.dims, 0).zip(from).for_each(|(row, from)| self.values[row].copy_from_slice(from));
     }
 
     /// Returns an error unless the grid has one value per voxel, and at least one; marching cubes calls it, too, since
@@ -108,6 +125,20 @@ impl Grid {
             }
         }
         Ok(VectorGrid { dims: self.dims, values })
+    }
+
+    /// Updates `gradient`, the [`Self::sobel`] of this grid, after the values in a region have changed.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn update_sobel(&self, gradient: &mut VectorGrid, changed: Region) -> Result<(), VolumeError> {
+        let region = changed.enlarged(1, self.dims);
+        let around = region.enlarged(1, self.dims);
+        let part = self.part(around)?.sobel()?;
+        let inner = Region { min: [0, 1, 2].map(|axis| region.min[axis] - around.min[axis]), ..region };
+        let rows = region.rows(self.dims, 0).zip(inner.rows(around.dims, 0));
+        rows.for_each(|(row, from)| gradient.values[row].copy_from_slice(&part.values[from]));
+        Ok(())
     }
 
     /// Computes, for every voxel of the row (0.., y, z), the weighted 3 × 3 sums in the y-z plane from which Sobel
@@ -194,6 +225,7 @@ fn padding_weight(x: f32, last: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -209,6 +241,25 @@ mod tests {
 
     fn ramp(p: Vec3) -> f32 {
         1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z
+    }
+
+    /// Random parts of a grid are replaced; the gradient is then that of the whole grid.
+    #[test]
+    fn the_gradient_is_updated_where_values_have_changed() {
+        let mut random = Random::new(4);
+        let mut g = grid([9, 7, 6], |p| p.x * p.y - p.z);
+        let mut gradient = g.sobel().unwrap();
+        for _ in 0..60 {
+            let min = g.dims.map(|n| random.below(n as u32) as usize);
+            let dims =
+                [0, 1, 2].map(|axis| 1 + random.below((g.dims[axis] - min[axis]).min(4) as u32) as usize);
+            let region = Region { min, dims };
+            let values = (0..region.len()).map(|_| random.unit() as f32).collect();
+            g.overwrite(region, &Grid { dims, values });
+            let before = gradient.clone();
+            g.update_sobel(&mut gradient, region).unwrap();
+            assert!(gradient == g.sobel().unwrap() && gradient != before);
+        }
     }
 
     #[test]

@@ -273,14 +273,33 @@ impl Volume {
     pub fn normalised_grid(&self, frame: usize) -> Result<Grid, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
+        let normalised = self.normalisation();
+        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], normalised))?;
+        Ok(Grid { dims: self.dims(), values })
+    }
+
+    /// Returns the part of [`Self::normalised_grid`] in a region, with the same values.
+    ///
+    /// # Errors
+    /// The region is empty or not within the volume; `frame` out of range; [`VolumeError::TooLarge`].
+    pub fn normalised_region(&self, region: Region, frame: usize) -> Result<Grid, VolumeError> {
+        let start = self.frame_start(frame)?;
+        region.check("region", self.dims())?;
+        let voxels = self.voxels.gathered(region.len(), region.rows(self.dims(), start))?;
+        let normalised = self.normalisation();
+        let values = each!(&voxels, values => converted(values, normalised))?;
+        Ok(Grid { dims: region.dims, values })
+    }
+
+    /// Returns the map from stored values to intensities scaled from [`Self::range`] to [0, 1].
+    fn normalisation(&self) -> impl Fn(f64) -> f64 + use<> {
         let factor = 1.0 / self.span();
         let (slope, intercept) = (self.slope * factor, (self.intercept - self.range[0]) * factor);
-        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], |v| {
-            let value = v * slope + intercept;
+        move |stored| {
+            let value = stored * slope + intercept;
             // NaN fails the comparison and becomes 0.
             if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
-        }))?;
-        Ok(Grid { dims: self.dims(), values })
+        }
     }
 
     /// Returns the trilinearly interpolated intensity at a world point; outside the volume the border is replicated.
@@ -491,6 +510,20 @@ mod tests {
         assert_eq!(v.intensities(0).unwrap(), (-4..8).map(|i| (2 * i - 1) as f32).collect::<Vec<_>>());
         assert_eq!((v.dims(), v.frames(), v.spacing()), ([3, 2, 2], 1, [2.0, 1.0, 0.5]));
         assert!(v.intensities(1).is_err());
+    }
+
+    #[test]
+    fn a_normalised_region_is_part_of_the_normalised_grid() {
+        let values = (0..48).map(|i| if i == 40 { f32::NAN } else { i as f32 }).collect();
+        let v = Volume::new(init(Voxels::F32(values), [3, 4, 2, 2])).unwrap();
+        let region = Region { min: [1, 2, 0], dims: [2, 2, 2] };
+        for frame in 0..2 {
+            let whole = v.normalised_grid(frame).unwrap();
+            assert_eq!(v.normalised_region(region, frame), whole.part(region));
+        }
+        assert!(v.normalised_region(region, 2).is_err());
+        let refused = v.normalised_region(Region { dims: [3, 1, 1], ..region }, 0).unwrap_err().to_string();
+        assert!(refused.starts_with("region: must have"), "{refused}");
     }
 
     #[test]

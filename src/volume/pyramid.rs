@@ -9,8 +9,9 @@
 use super::error::{VolumeError, reserve};
 use super::sampling::locate_f64;
 use super::voxels::Voxels;
-use super::{Grid, Volume, VolumeInit};
+use super::{Grid, Region, Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
+use std::ops::Range;
 
 /// The five weights of the Gaussian-like kernel by which each pyramid level is reduced to the next.
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
@@ -104,19 +105,61 @@ impl Grid {
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
     pub fn reduce(&self, spacing: [f64; 3], unit: f64, factor: f64) -> Result<(Grid, [f64; 3]), VolumeError> {
+        let dims = reduced_dims(self.dims, factor);
+        let coarse = self.resample(&self.reduction(spacing, unit, factor)?, dims)?;
+        let next = [0, 1, 2].map(|axis| spacing[axis] * self.dims[axis] as f64 / dims[axis] as f64);
+        Ok((coarse, next))
+    }
+
+    /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
+    /// after the values in the region `changed` have changed; returns the region of `coarse` that was updated, or
+    /// `None` if no voxel of it depends on them.
+    ///
+    /// # Errors
+    /// As [`Self::reduce`].
+    pub fn update_reduced(
+        &self,
+        coarse: &mut Grid,
+        changed: Region,
+        spacing: [f64; 3],
+        [unit, factor]: [f64; 2],
+    ) -> Result<Option<Region>, VolumeError> {
+        let taps = self.reduction(spacing, unit, factor)?;
+        let parts = [0, 1, 2].map(|axis| {
+            let first = changed.min[axis];
+            taps[axis].part(first..first + changed.dims[axis])
+        });
+        let [Some(x), Some(y), Some(z)] = parts else { return Ok(None) };
+        let (to, from) = ([&x.to, &y.to, &z.to], [&x.from, &y.from, &z.from]);
+        let region = |ranges: [&Range<usize>; 3]| Region {
+            min: ranges.map(|range| range.start),
+            dims: ranges.map(|range| range.len()),
+        };
+        let (to, from) = (region(to), region(from));
+        let part = self.part(from)?.resample(&[x.weights, y.weights, z.weights], to.dims)?;
+        coarse.overwrite(to, &part);
+        Ok(Some(to))
+    }
+
+    fn reduction(
+        &self,
+        spacing: [f64; 3],
+        unit: f64,
+        factor: f64,
+    ) -> Result<[ResamplingWeights; 3], VolumeError> {
         check_factor(factor)?;
         let positive = |v: f64| v > 0.0 && v.is_finite();
         if !spacing.iter().all(|&s| positive(s)) || !positive(unit) {
             return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
         }
         let dims = reduced_dims(self.dims, factor);
-        let taps =
-            [0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis]));
+        Ok([0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis])))
+    }
+
+    fn resample(&self, taps: &[ResamplingWeights; 3], dims: [usize; 3]) -> Result<Grid, VolumeError> {
         let along_x = self.resample_x(&taps[0], dims[0])?;
         let along_xy = along_x.resample_rows(&taps[1], dims[1], 1)?;
-        let coarse = along_xy.resample_rows(&taps[2], dims[2], 2)?;
-        let next = [0, 1, 2].map(|axis| spacing[axis] * self.dims[axis] as f64 / dims[axis] as f64);
-        Ok((coarse, next))
+        along_xy.resample_rows(&taps[2], dims[2], 2)
     }
 
     fn resample_x(&self, taps: &ResamplingWeights, nx: usize) -> Result<Grid, VolumeError> {
@@ -206,6 +249,33 @@ impl ResamplingWeights {
         let (first, start, end) = self.spans[i];
         (first, &self.weights[start..end])
     }
+
+    /// Returns the weights of the output voxels that depend on a source voxel in `changed`, which is not empty; `None`
+    /// if there are none.
+    fn part(&self, changed: Range<usize>) -> Option<PartialWeights> {
+        let sources = |&(first, start, end): &(usize, usize, usize)| first..first + (end - start);
+        let depends = |span| {
+            let span = sources(span);
+            span.start < changed.end && changed.start < span.end
+        };
+        // Both ends of the spans increase with the output voxel.
+        let to = self.spans.iter().position(depends)?..self.spans.iter().rposition(depends)? + 1;
+        let of_part = &self.spans[to.clone()];
+        let from = of_part.first().map(sources)?.start..of_part.last().map(sources)?.end;
+        let spans = of_part.iter().map(|&(first, start, end)| (first - from.start, start, end)).collect();
+        let weights = Self { spans, weights: self.weights.clone() };
+        Some(PartialWeights { to, from, weights })
+    }
+}
+
+/// The weights of consecutive output voxels along one axis, for updating part of a pyramid level.
+struct PartialWeights {
+    /// The output voxels.
+    to: Range<usize>,
+    /// The source voxels that they depend on.
+    from: Range<usize>,
+    /// The weights, with source voxels counted from the first of `from`.
+    weights: ResamplingWeights,
 }
 
 fn check_factor(factor: f64) -> Result<(), VolumeError> {
@@ -231,6 +301,7 @@ fn smallest([x, y, z]: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -318,6 +389,30 @@ mod tests {
             let expected =
                 (held(c - 2) + 4.0 * held(c - 1) + 6.0 * held(c) + 4.0 * held(c + 1) + held(c + 2)) / 16.0;
             assert!((found - expected).abs() < 1e-6, "voxel {i}: {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn an_updated_level_is_the_level_computed_anew() {
+        let mut random = Random::new(3);
+        let mut grid = volume([40, 31, 17], oblique(), |p| libm::sin(p.x + 0.3 * p.y) + p.z).grid(0).unwrap();
+        for factor in [1.3, 3f64.sqrt(), 2.0] {
+            let spacing = [1.0, 1.5, 2.5];
+            let mut coarse = grid.reduce(spacing, 1.0, factor).unwrap().0;
+            for _ in 0..40 {
+                let min = grid.dims.map(|n| random.below(n as u32) as usize);
+                let dims = [0, 1, 2]
+                    .map(|axis| 1 + random.below((grid.dims[axis] - min[axis]).min(6) as u32) as usize);
+                let changed = Region { min, dims };
+                let part = (0..changed.len()).map(|_| random.unit() as f32).collect();
+                grid.overwrite(changed, &Grid { dims, values: part });
+                let before = coarse.clone();
+                let updated =
+                    grid.update_reduced(&mut coarse, changed, spacing, [1.0, factor]).unwrap().unwrap();
+                assert_eq!(coarse, grid.reduce(spacing, 1.0, factor).unwrap().0);
+                assert_eq!(updated.enlarged(0, coarse.dims), updated);
+                assert_ne!(coarse, before);
+            }
         }
     }
 

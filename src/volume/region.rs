@@ -14,13 +14,13 @@ pub struct Region {
 
 impl Region {
     /// Returns the number of voxels in the region.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.dims.iter().product()
     }
 
     /// Returns an error about the argument `parameter` unless the region has a voxel and lies within a volume of `dims`
     /// voxels.
-    pub(super) fn check(&self, parameter: &'static str, dims: [usize; 3]) -> Result<(), VolumeError> {
+    pub(crate) fn check(&self, parameter: &'static str, dims: [usize; 3]) -> Result<(), VolumeError> {
         let Self { min, dims: size } = *self;
         let fits =
             |axis: usize| size[axis] >= 1 && size[axis] <= dims[axis] && min[axis] <= dims[axis] - size[axis];
@@ -34,9 +34,16 @@ impl Region {
         Err(VolumeError::invalid(parameter, problem))
     }
 
+    /// Returns the region enlarged by `margin` voxels on each side, within a volume of `dims` voxels.
+    pub fn enlarged(self, margin: usize, dims: [usize; 3]) -> Self {
+        let min = self.min.map(|first| first.saturating_sub(margin));
+        let end = |axis: usize| (self.min[axis] + self.dims[axis] + margin).min(dims[axis]);
+        Self { min, dims: [0, 1, 2].map(|axis| end(axis) - min[axis]) }
+    }
+
     /// Returns the ranges of indices of the region's rows along x, ordered by y, then z, in an array in which the frame
     /// of `dims` voxels starts at index `start`. The region must lie within the frame.
-    pub(super) fn rows(self, dims: [usize; 3], start: usize) -> impl Iterator<Item = Range<usize>> + Clone {
+    pub(crate) fn rows(self, dims: [usize; 3], start: usize) -> impl Iterator<Item = Range<usize>> + Clone {
         let Self { min, dims: [width, height, depth] } = self;
         (0..depth).flat_map(move |z| {
             (0..height).map(move |y| {
@@ -80,5 +87,13 @@ mod tests {
             let refused = Region { min, dims }.check("region", [4, 3, 5]).unwrap_err().to_string();
             assert!(refused.starts_with("region: must") && refused.contains("[4, 3, 5]"), "{refused}");
         }
+    }
+
+    #[test]
+    fn an_enlarged_region_ends_at_the_border() {
+        let region = Region { min: [1, 5, 0], dims: [2, 1, 3] };
+        let enlarged = Region { min: [0, 3, 0], dims: [4, 3, 3] };
+        assert_eq!(region.enlarged(2, [4, 6, 3]), enlarged);
+        assert_eq!(region.enlarged(0, [4, 6, 3]), region);
     }
 }

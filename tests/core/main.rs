@@ -28,6 +28,7 @@ mod mesh_edits;
 mod mesh_files;
 mod multires;
 mod multires_fuzz;
+mod refresh;
 mod remesh;
 mod scenes;
 mod textured_meshes;

@@ -311,6 +311,8 @@ export class DeformableModel implements Stepper {
   run(options?: RunOptions): Promise<StepReport>;
   /** Seeds components of this level that the surface leaves out; counted in events.seeds. */
   seed(): StepReport;
+  /** The volume has changed there: wakes, adds what is new, removes what has gone. */
+  refresh(region: { min: Vec3; dims: Vec3 }): void;
   /** Yields between slices. */
   coverage(options?: CoverageOptions): Promise<Coverage>;
   setParams(params: DeformableParams): void;

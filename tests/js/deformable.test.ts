@@ -486,3 +486,60 @@ test('a restored mesh has new version numbers', () => {
 test('two hundred steps give the same bits as the native core', async () => {
   expect(await spongeBits(vesicle)).toBe(SPONGE_BITS);
 });
+
+test('after a change of voxels, the surface follows with `refresh`, there and nowhere else', async () => {
+  using brushed = ball(32, 9);
+  const fitted = model({ volume: brushed, start: 'contour', params: ADAPTING });
+  await fitted.run();
+  const before = fitted.mesh.info().volume;
+  const lowest = (from: Mesh) =>
+    from.arrays().positions.reduce((least, x, i) => (i % 3 === 0 && x < least ? x : least), 0);
+  const far = lowest(fitted.mesh);
+  const region = { min: [22, 12, 12], dims: [6, 7, 7] } as const;
+  const box = { min: [...region.min], dims: [...region.dims] } as { min: vesicle.Vec3; dims: vesicle.Vec3 };
+  const saved = fitted.save();
+  fitted.refresh(box);
+  expect(fitted.save()).toEqual(saved);
+  brushed.write({ ...box, data: new Uint8Array(6 * 7 * 7).fill(200) });
+  fitted.refresh(box);
+  const report = await fitted.run();
+  expect(report).toMatchObject({ done: true, components: 1, euler: 2 });
+  expect(fitted.mesh.info().volume).toBeGreaterThan(before + 50);
+  expect(lowest(fitted.mesh)).toBe(far);
+  expect(fitted.mesh.check()).toMatchObject({ closed: true, selfIntersections: 0 });
+  const { recall, precision } = await fitted.coverage();
+  expect(Math.min(recall, precision)).toBeGreaterThan(0.99);
+  expect(failure(() => fitted.restore(saved)).code).toBe('bad-file');
+
+  const island = { min: [1, 1, 1], dims: [5, 5, 5] } as typeof box;
+  brushed.write({ ...island, data: new Uint8Array(125).fill(200) });
+  fitted.refresh(island);
+  expect(await fitted.run()).toMatchObject({ components: 2, euler: 4 });
+  brushed.write({ ...island, data: new Uint8Array(125) });
+  fitted.refresh(island);
+  expect(await fitted.run()).toMatchObject({ components: 1, euler: 2 });
+});
+
+test.each([
+  ['region', undefined],
+  ['region', { min: [0, 0, 0] }],
+  ['region.min', { min: [0.5, 0, 0], dims: [1, 1, 1] }],
+  ['region.dims', { min: [0, 0, 0], dims: [1, 1, -1] }],
+  ['region', { min: [0, 0, 0], dims: [1, 0, 1] }],
+  ['region', { min: [31, 0, 0], dims: [2, 1, 1] }],
+  ['frame', { min: [0, 0, 0], dims: [1, 1, 1], frame: 0 }],
+])('refresh refuses a wrong %s', (name, region) => {
+  const fitted = model();
+  const before = fitted.save();
+  const error = failure(() => fitted.refresh(wrong(region)));
+  expect(error.code).toBe('invalid-argument');
+  expect(error.message.split(':')[0]).toContain(name);
+  expect(fitted.save()).toEqual(before);
+});
+
+test('refresh needs the volume', () => {
+  const gone = ball(32, 9);
+  const fitted = model({ volume: gone });
+  gone.free();
+  expect(failure(() => fitted.refresh({ min: [0, 0, 0], dims: [1, 1, 1] })).code).toBe('freed');
+});

@@ -25,6 +25,7 @@ same<Same<ReturnType<worker.Volume['pyramid']>, Promise<worker.Volume[]>>>(true)
 same<Same<ReturnType<worker.DeformableModel['run']>, Promise<built.StepReport>>>(true);
 same<Same<ReturnType<worker.DeformableModel['coverage']>, Promise<built.Coverage>>>(true);
 same<Same<ReturnType<worker.DeformableModel['seed']>, Promise<built.StepReport>>>(true);
+same<Same<ReturnType<worker.DeformableModel['refresh']>, Promise<void>>>(true);
 same<Same<ReturnType<worker.Mesh['free']>, void>>(true);
 same<Same<ReturnType<typeof worker.Mesh.marchingCubes>, Promise<worker.Mesh>>>(true);
 same<Same<ReturnType<typeof worker.DeformableModel.create>, Promise<worker.DeformableModel>>>(true);

@@ -99,7 +99,8 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
   },
   deformable: async ({ DeformableModel, Mesh, Volume }) => {
     const start = await Mesh.icosphere([12, 12, 12], 3, 2);
-    const model = new DeformableModel({ volume: new Volume({ data, dims: DIMS }), start, levels: 1, params: PARAMS });
+    const volume = new Volume({ data, dims: DIMS });
+    const model = new DeformableModel({ volume, start, levels: 1, params: PARAMS });
     const heard: number[] = [];
     const report = await model.run({
       maxIterations: 12,
@@ -114,6 +115,9 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     await model.step(4);
     const shares: number[] = [];
     const coverage = await model.coverage({ onProgress: (share) => shares.push(share) });
+    await volume.write({ min: [4, 5, 6], dims: [2, 1, 2], data: data.slice(0, 4).fill(255) });
+    await model.refresh({ min: [4, 5, 6], dims: [2, 1, 2] });
+    await model.step(2);
     return [
       [heard, iteration, report.events, report.phase, state],
       [coverage, shares, (await model.seed()).events],

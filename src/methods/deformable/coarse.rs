@@ -50,6 +50,9 @@ const MIN_STEEPNESS: f32 = 0.1;
 /// [`MIN_STEEPNESS`].
 const MAX_AMPLIFICATION: f32 = 1e4;
 
+/// The largest factor by which a pyramid level multiplies α_I, the strength of the image force; a bound for saved states.
+pub(super) const MAX_FACTOR: f32 = if MAX_AMPLIFICATION > MAX_GAIN { MAX_AMPLIFICATION } else { MAX_GAIN };
+
 /// The number of iterations for which a coarse pyramid level keeps its full factor on α_I, the strength of the image
 /// force, with [`Integrator::Euler`] and [`Integrator::RungeKutta`]. A head takes 300. If the factor did not decay
 /// after that, a vertex where the image is steeper than usual could oscillate for ever: one on a tooth did, at an iso

@@ -64,14 +64,18 @@ pub(super) fn contour(
     smallest_part: f64,
 ) -> Result<TriangleMesh, MethodError> {
     let (grid, position) = image.grid();
-    let surface = match object {
+    Ok(placed(contour_of_grid(grid, iso, object)?, position).without_components_below(smallest_part))
+}
+
+/// Extracts the iso-surface of a grid in voxel indices, closed and facing away from the object.
+pub(super) fn contour_of_grid(grid: &Grid, iso: f32, object: ObjectIs) -> Result<TriangleMesh, MethodError> {
+    Ok(match object {
         ObjectIs::Brighter => marching_cubes(grid, iso)?,
         ObjectIs::Darker => {
             let values = grid.values.iter().map(|value| -value).collect();
             marching_cubes(&Grid { dims: grid.dims, values }, -iso)?
         }
-    };
-    Ok(placed(surface, position).without_components_below(smallest_part))
+    })
 }
 
 /// Simplifies a contour by clustering, which saves more than half of the edits that bring its edges within bounds:

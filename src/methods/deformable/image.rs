@@ -6,7 +6,7 @@
 use crate::math::Vec3;
 use crate::math::order::median;
 use crate::methods::MethodError;
-use crate::volume::{CellCache, Grid, VectorGrid, Volume};
+use crate::volume::{CellCache, Grid, Region, VectorGrid, Volume};
 
 /// The reduction factor ρ = √3: δ and the shortest side of a voxel grow by it with each level of the pyramid. It is
 /// that of √3 refinement, by which the mesh gets finer (15).
@@ -14,7 +14,7 @@ pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
 /// The largest absolute value of an intensity given by the caller, such as the iso value π_I, once it is normalised;
 /// within it no force overflows.
-const MAX_NORMALISED: f64 = 100.0;
+pub(super) const MAX_NORMALISED: f64 = 100.0;
 
 /// One level of the image pyramid, sampled at positions in model space.
 #[derive(Clone, Debug)]
@@ -127,6 +127,14 @@ impl LevelImage {
         }
     }
 
+    /// Updates the gradient image, if there is one, after the intensities in a region have changed.
+    fn update_gradient(&mut self, changed: Region) -> Result<(), MethodError> {
+        if let Some(gradient) = &mut self.gradient {
+            self.grid.update_sobel(gradient, changed)?;
+        }
+        Ok(())
+    }
+
     /// Returns the number of voxels of this level per model unit, along the axis on which it is largest; it converts
     /// lengths to voxels of the level.
     pub(super) fn voxels_per_unit(&self) -> f32 {
@@ -143,8 +151,12 @@ impl LevelImage {
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
     pub(super) levels: Vec<LevelImage>,
+    /// The spacing of the volume, from which those of the levels follow.
+    spacing: [f64; 3],
     low: f64,
     range: f64,
+    /// The sum of the hashes of all voxels of the finest level, by which a saved state is matched to its volume.
+    hash: u64,
 }
 
 impl Pyramid {
@@ -171,7 +183,76 @@ impl Pyramid {
             unit *= REDUCTION;
         }
         levels.push(LevelImage::new(grid, volume.dims()));
-        Ok(Self { levels, low: volume.range()[0], range: volume.span() })
+        let spacing = volume.spacing();
+        let mut pyramid = Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash: 0 };
+        pyramid.hash = pyramid.hash_of(Region { min: [0; 3], dims: volume.dims() });
+        Ok(pyramid)
+    }
+
+    /// Returns the smallest box around the voxels of a region at which `new`, intensities for the region, differs from
+    /// the finest level, and the part of `new` in that box; `None` if there are none.
+    ///
+    /// # Errors
+    /// [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn changes(&self, region: Region, new: &Grid) -> Result<Option<(Region, Grid)>, MethodError> {
+        let old = self.levels[0].grid.part(region)?;
+        let (mut low, mut high) = (region.dims, [0; 3]);
+        for (i, _) in new.values.iter().zip(&old.values).enumerate().filter(|(_, (new, old))| new != old) {
+            let [nx, ny, _] = region.dims;
+            for (axis, k) in [i % nx, i / nx % ny, i / nx / ny].into_iter().enumerate() {
+                low[axis] = low[axis].min(k);
+                high[axis] = high[axis].max(k + 1);
+            }
+        }
+        if high == [0; 3] {
+            return Ok(None);
+        }
+        let part = Region { min: low, dims: [0, 1, 2].map(|axis| high[axis] - low[axis]) };
+        let changed = Region { min: [0, 1, 2].map(|axis| region.min[axis] + low[axis]), ..part };
+        Ok(Some((changed, new.part(part)?)))
+    }
+
+    /// Replaces the intensities of the finest level in a region by those of `new`, and updates all that depends on them
+    /// on all levels, and only that.
+    ///
+    /// # Errors
+    /// [`MethodError::Volume`] if memory does not suffice; part of the levels is out of date then.
+    pub(super) fn update(&mut self, region: Region, new: &Grid) -> Result<(), MethodError> {
+        let before = self.hash_of(region);
+        self.levels[0].grid.overwrite(region, new);
+        self.hash = self.hash.wrapping_sub(before).wrapping_add(self.hash_of(region));
+        self.levels[0].update_gradient(region)?;
+        let (mut changed, mut spacing) = (region, self.spacing);
+        let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        for level in 1..self.levels.len() {
+            let (finer, coarser) = self.levels.split_at_mut(level);
+            let (from, to) = (&finer[level - 1].grid, &mut coarser[0]);
+            let updated = from.update_reduced(&mut to.grid, changed, spacing, [unit, REDUCTION])?;
+            let Some(updated) = updated else { return Ok(()) };
+            to.update_gradient(updated)?;
+            spacing =
+                [0, 1, 2].map(|axis| spacing[axis] * from.dims[axis] as f64 / to.grid.dims[axis] as f64);
+            (changed, unit) = (updated, unit * REDUCTION);
+        }
+        Ok(())
+    }
+
+    /// Returns the sum of the hashes of the voxels of the finest level in a region.
+    fn hash_of(&self, region: Region) -> u64 {
+        let grid = &self.levels[0].grid;
+        let rows = region.rows(grid.dims, 0);
+        let voxels = rows.flat_map(|row| row.clone().zip(&grid.values[row]));
+        voxels.fold(0, |sum, (k, value)| sum.wrapping_add(hash_of_voxel(k, *value)))
+    }
+
+    /// Returns the sum of the hashes of all voxels of the finest level, for the fingerprint of a saved state.
+    pub(super) fn hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Returns whether intensities are normalised by the range of `volume`.
+    pub(super) fn has_range_of(&self, volume: &Volume) -> bool {
+        [self.low, self.range] == [volume.range()[0], volume.span()]
     }
 
     /// Maps an intensity in the volume's units such that the range of the volume becomes 0..1. Results are clamped to
@@ -180,8 +261,23 @@ impl Pyramid {
         ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }
 
+    /// Returns the intensity in the volume's units that is normalised to 0, and the range that is normalised to 0..1.
+    pub(super) fn range(&self) -> [f64; 2] {
+        [self.low, self.range]
+    }
+
     /// Returns the dimensions of the finest level in voxels.
     pub(super) fn dims(&self) -> [usize; 3] {
         self.levels[0].grid.dims
     }
+}
+
+/// Returns the hash of one voxel, given its index in the grid and its intensity. The hashes of an image are added up, so
+/// that a change of one voxel changes the sum without reading the others.
+fn hash_of_voxel(index: usize, value: f32) -> u64 {
+    // The finaliser of SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014).
+    let mut x = (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ u64::from(value.to_bits());
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
 }

@@ -52,6 +52,8 @@ mod image;
 mod image_guide;
 mod motion;
 mod params;
+mod patch;
+mod refresh;
 mod renewal;
 mod schedule;
 mod seeds;
@@ -166,7 +168,8 @@ pub struct DeformableModel {
     domain: Domain,
     to_world: DAffine3,
     voxel: f64,
-    fingerprint: u64,
+    /// The index of the frame of the volume.
+    frame: usize,
     params: DeformableParams,
     attractors: Vec<Attractor>,
     /// Whether the start was [`Start::Contour`], even if that contour was empty; [`Seeding::Auto`] depends on it.
@@ -187,6 +190,8 @@ pub struct DeformableModel {
     convergence: Convergence,
     speed: SpeedSummary,
     components: u32,
+    /// The numbers of edits made by [`Self::refresh`] since the last step, which the next one reports.
+    refreshed: Changes,
     clock: fn() -> f64,
 }
 
@@ -255,7 +260,7 @@ impl DeformableModel {
         };
         let mut model = Self {
             to_world: volume.affine(),
-            fingerprint: state::fingerprint(volume, options.frame, options.levels),
+            frame: options.frame,
             pyramid,
             domain,
             voxel,
@@ -274,6 +279,7 @@ impl DeformableModel {
             convergence: Convergence::default(),
             speed: SpeedSummary::default(),
             components: 0,
+            refreshed: Changes::default(),
             clock: || 0.0,
         };
         model.watch_output();
@@ -300,7 +306,7 @@ impl DeformableModel {
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
-        let mut changes = Changes::default();
+        let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
             self.move_vertices(&mut times);
             if self.params.topology == Topology::Adaptive {
@@ -446,7 +452,7 @@ impl DeformableModel {
             done,
             phase: if done { "done".into() } else { format!("level {}", self.level) },
             progress: self.progress(),
-            residual: self.speed.energy,
+            residual: self.energy(),
             tolerance: self.params.energy_tolerance,
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,

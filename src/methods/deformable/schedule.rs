@@ -53,6 +53,22 @@ pub(super) struct Convergence {
     pub(super) began_on_contour: bool,
     /// The number of iterations of the run done before the current level began.
     pub(super) began: u32,
+    /// The number of vertices that refreshes after changes of the volume have added or woken, if the rest of the surface
+    /// had settled: only these decide on convergence, and the rest is not examined again. Otherwise 0.
+    pub(super) refreshed: u32,
+}
+
+impl Convergence {
+    /// Returns the state after a refresh of part of the surface. `count` is the number of vertices that it added or woke
+    /// if nothing else may have to move; if it is `None`, missing parts are searched for again, and all vertices are
+    /// examined before the run ends.
+    pub(super) fn continued(self, count: Option<usize>) -> Self {
+        let again = Self { quiet: 0, began_on_contour: false, done: false, ..self };
+        match count {
+            Some(count) => Self { refreshed: self.refreshed.saturating_add(count.max(1) as u32), ..again },
+            None => Self { was_examined: false, searches: 0, refreshed: 0, ..again },
+        }
+    }
 }
 
 impl DeformableModel {
@@ -70,10 +86,18 @@ impl DeformableModel {
         let speed = max_move / self.params.step_length();
         let full = (0.5 * mass * speed * speed).max(2.0 * energy_tolerance);
         // At the beginning of a level the energy is still that of the level before.
-        let energy = if self.iteration == self.convergence.began { full } else { self.speed.energy };
+        let energy = if self.iteration == self.convergence.began { full } else { self.energy() };
         let fraction = libm::log(full / energy.max(energy_tolerance)) / libm::log(full / energy_tolerance);
         let levels = self.pyramid.levels.len();
         ((levels - 1 - self.level) as f64 + fraction.clamp(0.0, 1.0)) / levels as f64
+    }
+
+    /// Returns the mean kinetic energy of the vertices along their normals, by which convergence is judged: of all
+    /// vertices, or of those that refreshes have added or woken if the others had settled.
+    pub(super) fn energy(&self) -> f64 {
+        let (all, some) = (self.mesh.vertex_count() as f64, f64::from(self.convergence.refreshed));
+        let is_local = some > 0.0 && some < all;
+        if is_local { self.speed.energy * (all / some) } else { self.speed.energy }
     }
 
     /// Wakes all sleeping vertices and restarts convergence on the current level, after a change that may move any
@@ -89,10 +113,15 @@ impl DeformableModel {
     /// ends the run. Returns the numbers of edits.
     pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let is_slow = self.convergence.began_on_contour || self.speed.fastest < self.settled_speed();
-        let quiet = is_slow && self.speed.energy < self.params.energy_tolerance;
+        let quiet = is_slow && self.energy() < self.params.energy_tolerance;
         self.convergence.quiet = if quiet { self.convergence.quiet + 1 } else { 0 };
         if self.convergence.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
+        }
+        if self.convergence.refreshed > 0 {
+            self.convergence.refreshed = 0;
+            self.convergence.done = true;
+            return Ok(self.check_moved(times));
         }
         if self.level == 0 {
             let changes = self.size_and_seed(times)?;
@@ -168,6 +197,21 @@ impl DeformableModel {
         changes.vanished += self.resolver.remove_negligible(&mut self.mesh, sampling, &*guide);
         drop(guide);
         self.mark_checked();
+        changes
+    }
+
+    /// Restores edge bounds and resolves contacts around the vertices that have moved since they were last checked, and
+    /// removes negligibly small components; does nothing if the topology is fixed. Returns the numbers of edits.
+    fn check_moved(&mut self, times: &mut Times) -> Changes {
+        if self.params.topology == Topology::Fixed {
+            return Changes::default();
+        }
+        let checked = self.mesh.vector(self.keys.checked_position);
+        let has_moved = |v: &VertexId| checked[v.index()] != self.mesh.position(*v);
+        let moved: Vec<VertexId> = self.mesh.vertices().filter(has_moved).collect();
+        let changes = self.restore_bounds(&moved, times);
+        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
+        moved.iter().for_each(|v| checked[v.index()] = positions[v.index()]);
         changes
     }
 

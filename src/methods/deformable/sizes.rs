@@ -62,14 +62,22 @@ impl DeformableModel {
         true
     }
 
-    /// Sets the sizes, local factors on δ, of the vertices of whole components by the curvature of the contour, with
-    /// bounded differences between neighbours, and scaled by the parameter `adaptivity`.
+    /// Sets the sizes, local factors on δ, of some vertices by the curvature of the contour, with bounded differences
+    /// between neighbours, and scaled by the parameter `adaptivity`, which must not be 0.
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
-        for _ in 0..PASSES {
-            self.bound_gradation(members, &mut sizes);
-        }
         let share = self.params.adaptivity as f32;
+        let edges = self.edges_at(members);
+        // Other vertices keep their sizes, and bound those of their neighbours.
+        let of = self.mesh.scalar(self.keys.size);
+        let mut is_member = vec![false; self.mesh.slots()];
+        members.iter().for_each(|v| is_member[v.index()] = true);
+        for v in edges.iter().flat_map(|&(u, v)| [u, v]).filter(|v| !is_member[v.index()]) {
+            sizes[v.index()] = 1.0 + of[v.index()] / share;
+        }
+        for _ in 0..PASSES {
+            self.bound_gradation(&edges, &mut sizes);
+        }
         let size = self.mesh.scalar_mut(self.keys.size);
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
     }
@@ -79,8 +87,9 @@ impl DeformableModel {
     /// below 1.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
-        let offsets = self.offsets_from_contour(members);
-        for (u, v) in self.mesh.edges_from(members.iter().copied()) {
+        let edges = self.edges_at(members);
+        let offsets = self.offsets_from_contour(&edges);
+        for (u, v) in edges {
             let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
@@ -118,10 +127,20 @@ impl DeformableModel {
         object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
     }
 
-    fn bound_gradation(&self, members: &[VertexId], sizes: &mut [f32]) {
+    /// Returns the edges with an end in `members`, each once as (lower id, higher id).
+    fn edges_at(&self, members: &[VertexId]) -> Vec<(VertexId, VertexId)> {
+        let mut is_member = vec![false; self.mesh.slots()];
+        members.iter().for_each(|v| is_member[v.index()] = true);
+        let edges_of = |&u: &VertexId| self.mesh.ring(u).as_slice().iter().map(move |&v| (u, v));
+        let edges = members.iter().flat_map(edges_of);
+        let once = edges.filter(|&(u, v)| u < v || !is_member[v.index()]);
+        once.map(|(u, v)| if u < v { (u, v) } else { (v, u) }).collect()
+    }
+
+    fn bound_gradation(&self, edges: &[(VertexId, VertexId)], sizes: &mut [f32]) {
         let before = sizes.to_vec();
         let per_length = GRADATION / (MEAN_EDGE * self.model_delta());
-        for (u, v) in self.mesh.edges_from(members.iter().copied()) {
+        for &(u, v) in edges {
             let growth = per_length * self.mesh.position(u).distance(self.mesh.position(v));
             for (a, b) in [(u.index(), v.index()), (v.index(), u.index())] {
                 let most = before[b] + growth;
@@ -130,11 +149,14 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the offset of each vertex in `members` from the contour along its normal, by slot, in voxels of the
-    /// finest level; positive inside the contour.
-    fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
-        let mut offsets = vec![0.0; self.mesh.slots()];
-        for &v in members {
+    /// Returns the offset of each end of `edges` from the contour along its normal, by slot, in voxels of the finest
+    /// level; positive inside the contour.
+    fn offsets_from_contour(&self, edges: &[(VertexId, VertexId)]) -> Vec<f32> {
+        let mut offsets = vec![f32::NAN; self.mesh.slots()];
+        for v in edges.iter().flat_map(|&(u, v)| [u, v]) {
+            if !offsets[v.index()].is_nan() {
+                continue;
+            }
             let normal = self.mesh.unit_normal(v);
             offsets[v.index()] = self.offset_from_contour(self.mesh.position(v), normal);
         }

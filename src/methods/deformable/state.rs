@@ -3,15 +3,18 @@
 use super::domain::Domain;
 use super::motion::SpeedSummary;
 use super::schedule::Convergence;
-use super::{Attractor, DeformableModel, DeformableParams, delta_at};
+use super::{Attractor, DeformableModel, DeformableParams, coarse, delta_at, image};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, encode};
-use crate::remesh::{Pending, Resolver};
-use crate::volume::Volume;
+use crate::remesh::{Changes, Pending, Resolver};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLDEF\x05";
+const MAGIC: Magic = *b"VSCLDEF\x06";
+
+/// The largest number of edits of each kind, made by refreshes since the last step, that is accepted in a saved state, so
+/// that their sums do not overflow.
+const MAX_EDITS: u32 = 1 << 28;
 
 /// The saved part of a run of the deformable model: everything but the volume and what is computed from it.
 #[derive(Serialize, Deserialize)]
@@ -22,30 +25,38 @@ struct State {
     from_contour: bool,
     finest_delta: f64,
     level: usize,
+    /// Level iso value and factor on the image force. They depend on the image at the beginning of the level, which may
+    /// have been refreshed since.
+    level_iso: f32,
+    image_force_factor: f32,
     mesh: Mesh,
     waiting: Pending,
     iteration: u32,
     convergence: Convergence,
     energy: f64,
     fastest: f32,
+    refreshed: Changes,
 }
 
 impl DeformableModel {
     /// Returns the state of the run as bytes, without the volume, for [`Self::restore`].
     pub fn save(&self) -> Vec<u8> {
         let state = State {
-            fingerprint: self.fingerprint,
+            fingerprint: self.fingerprint(),
             params: self.params.clone(),
             attractors: self.attractors.clone(),
             from_contour: self.from_contour,
             finest_delta: self.finest_delta,
             level: self.level,
+            level_iso: self.level_iso,
+            image_force_factor: self.image_force_factor,
             mesh: self.mesh.clone(),
             waiting: self.resolver.pending(),
             iteration: self.iteration,
             convergence: self.convergence,
             energy: self.speed.energy,
             fastest: self.speed.fastest,
+            refreshed: self.refreshed,
         };
         encode(&MAGIC, &state)
     }
@@ -58,7 +69,7 @@ impl DeformableModel {
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = decode(&MAGIC, bytes)?;
-        if state.fingerprint != self.fingerprint {
+        if state.fingerprint != self.fingerprint() {
             let problem = "the state belongs to another volume, frame or number of levels".into();
             return Err(MethodError::BadState { field: "volume", problem });
         }
@@ -81,6 +92,14 @@ impl DeformableModel {
         if state.level >= self.pyramid.levels.len() || !super::DELTA_RANGE.contains(&state.finest_delta) {
             return bad("level", "level or edge is out of range".into());
         }
+        let is_in_range = state.level_iso.abs() <= image::MAX_NORMALISED as f32
+            && (1.0..=coarse::MAX_FACTOR).contains(&state.image_force_factor);
+        if !is_in_range {
+            return bad("level", "iso value or factor on the image force is out of range".into());
+        }
+        if state.refreshed.most() > MAX_EDITS {
+            return bad("refreshed", format!("more than {MAX_EDITS} edits of a kind"));
+        }
         let domain = self.domain_for(state.finest_delta);
         let lost = |v: &VertexId| !domain.bounds.contains(state.mesh.position(*v));
         if let Some(v) = state.mesh.vertices().find(lost) {
@@ -91,6 +110,18 @@ impl DeformableModel {
             return bad("queue", format!("{v:?} does not exist"));
         }
         Ok(())
+    }
+
+    /// Returns a hash of the frame of the volume, its dimensions, affine transform and range, and the number of pyramid
+    /// levels, by which a saved state is matched to its model.
+    fn fingerprint(&self) -> u64 {
+        let mut hash = Hash::new();
+        let [frame, levels] = [self.frame, self.pyramid.levels.len() - 1];
+        self.pyramid.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));
+        self.to_world.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
+        self.pyramid.range().into_iter().for_each(|x| hash.mix(x.to_bits()));
+        hash.mix(self.pyramid.hash());
+        hash.value()
     }
 
     fn domain_for(&self, finest_delta: f64) -> Domain {
@@ -116,21 +147,11 @@ impl DeformableModel {
         next.convergence = state.convergence;
         next.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };
         next.components = next.mesh.component_count() as u32;
+        next.refreshed = state.refreshed;
         next.prepare_level()?;
+        next.level_iso = state.level_iso;
+        next.image_force_factor = state.image_force_factor;
         *self = next;
         Ok(())
     }
-}
-
-/// Returns a hash of a frame of the volume, its dimensions, affine transform and range, and the number of pyramid
-/// levels, by which a saved state is matched to its model.
-pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
-    let mut hash = Hash::new();
-    volume.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));
-    volume.affine().to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
-    volume.range().into_iter().for_each(|x| hash.mix(x.to_bits()));
-    if let Ok(values) = volume.intensities(frame) {
-        values.into_iter().for_each(|x| hash.mix(u64::from(x.to_bits())));
-    }
-    hash.value()
 }

@@ -24,6 +24,7 @@ mod one_ring;
 mod output;
 mod patch;
 mod refine;
+mod replace;
 mod separate;
 
 use crate::math::{Bounds, DAffine3, Vec3, higher, triangle};
