@@ -16,6 +16,7 @@ export {
   type RestructurePass,
   type SurfaceDistance,
   type TextureType,
+  type VoxelKind,
 } from './mesh.js';
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';

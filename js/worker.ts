@@ -88,6 +88,7 @@ export type {
   Vec3,
   VolumeInit,
   VoxelArray,
+  VoxelKind,
 } from './index.js';
 export { transfer } from './worker-remote.js';
 export type { NodeWorker } from './worker-session.js';

@@ -8,6 +8,7 @@ use crate::io::FormatError;
 use crate::mesh::MeshError;
 use crate::methods::MethodError;
 use crate::volume::VolumeError;
+use crate::voxelise::VoxeliseError;
 
 /// An error with the code and message that JavaScript receives.
 #[derive(Debug)]
@@ -63,6 +64,15 @@ impl From<VolumeError> for Failure {
             VolumeError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())
+    }
+}
+
+impl From<VoxeliseError> for Failure {
+    fn from(error: VoxeliseError) -> Self {
+        match error {
+            VoxeliseError::Mesh(error) => error.into(),
+            VoxeliseError::Volume(error) => error.into(),
+        }
     }
 }
 

@@ -21,6 +21,7 @@ mod multires;
 #[cfg(feature = "tracking")]
 mod tracking;
 mod volume;
+mod voxelise;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::throw_val;

@@ -59,7 +59,13 @@ impl Bounds {
     /// Returns the squared distance from `p` to the box, zero inside.
     #[inline]
     pub fn distance_squared(&self, p: Vec3) -> f64 {
-        let (low, high) = (self.min.as_dvec3() - p.as_dvec3(), p.as_dvec3() - self.max.as_dvec3());
+        self.distance_squared_f64(p.as_dvec3())
+    }
+
+    /// Returns the squared distance from `p`, a point in double precision, to the box, zero inside.
+    #[inline]
+    pub fn distance_squared_f64(&self, p: DVec3) -> f64 {
+        let (low, high) = (self.min.as_dvec3() - p, p - self.max.as_dvec3());
         low.max(high).max(DVec3::ZERO).length_squared()
     }
 
@@ -245,16 +251,75 @@ impl BoxTree {
         });
     }
 
-    /// The traversal that all queries share: visits items for whose boxes `entry` returns a distance within the bound,
-    /// which is `bound` at first, then the last value that `visit` returned. Boxes for which `entry` returns `None` are
-    /// skipped. Of two sibling nodes, the nearer is visited first.
-    fn descend(
+    /// Returns the number of nodes of the tree, for data kept per node.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Returns the box of a node.
+    #[inline]
+    pub fn node_bounds(&self, node: usize) -> &Bounds {
+        &self.nodes[node].bounds
+    }
+
+    /// Returns the items (indices of boxes, each with its box) below a node.
+    pub fn node_items(&self, node: usize) -> &[(Bounds, u32)] {
+        let [mut first, mut last] = [node; 2];
+        while self.nodes[first].count == 0 {
+            first += 1;
+        }
+        while self.nodes[last].count == 0 {
+            last = self.nodes[last].link as usize;
+        }
+        let [first, last] = [&self.nodes[first], &self.nodes[last]];
+        &self.items[first.link as usize..(last.link + last.count) as usize]
+    }
+
+    /// Calls `visit` with items of leaves, roughly from near to far, by the caller's own distance of each node, which is
+    /// at most that of any item below it. `visit` returns the new bound, which is `bound` at first; nodes whose distance
+    /// is higher are skipped.
+    pub fn nearest_by_node(
         &self,
-        mut bound: f64,
-        entry: impl Fn(&Bounds) -> Option<f64>,
+        bound: f64,
+        distance: impl Fn(usize) -> f64,
         mut visit: impl FnMut(u32) -> f64,
     ) {
-        let Some(start) = self.nodes.first().and_then(|root| entry(&root.bounds)) else { return };
+        self.descend_nodes(
+            bound,
+            |node| Some(distance(node)),
+            |items, bound| items.iter().fold(bound, |_, (_, item)| visit(*item)),
+        );
+    }
+
+    /// The traversal that queries by boxes share: visits items for whose boxes `entry` returns a distance within the
+    /// bound, which is `bound` at first, then the last value that `visit` returned. Boxes for which `entry` returns
+    /// `None` are skipped.
+    fn descend(&self, bound: f64, entry: impl Fn(&Bounds) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
+        self.descend_nodes(
+            bound,
+            |node| entry(&self.nodes[node].bounds),
+            |items, mut bound| {
+                for (bounds, item) in items {
+                    if entry(bounds).is_some_and(|d| d <= bound) {
+                        bound = visit(*item);
+                    }
+                }
+                bound
+            },
+        );
+    }
+
+    /// The traversal that all queries share: visits the items of leaves for which `entry` returns a distance within the
+    /// bound, which is `bound` at first, then the last value that `visit` returned. Nodes for which `entry` returns
+    /// `None` are skipped. Of two sibling nodes, the nearer is visited first.
+    #[inline]
+    fn descend_nodes(
+        &self,
+        mut bound: f64,
+        entry: impl Fn(usize) -> Option<f64>,
+        mut visit: impl FnMut(&[(Bounds, u32)], f64) -> f64,
+    ) {
+        let Some(start) = self.nodes.first().and_then(|_| entry(0)) else { return };
         let mut stack = Stack::new();
         stack.push((start, 0));
         while let Some((distance, i)) = stack.pop() {
@@ -262,22 +327,19 @@ impl BoxTree {
                 continue;
             }
             let node = &self.nodes[i];
-            for (bounds, item) in self.items_of(node) {
-                if entry(bounds).is_some_and(|d| d <= bound) {
-                    bound = visit(*item);
-                }
-            }
             if node.count == 0 {
                 self.push_children(i, &entry, &mut stack);
+            } else {
+                bound = visit(self.items_of(node), bound);
             }
         }
     }
 
-    /// Pushes those children of node `i` for whose boxes `entry` returns a distance onto the stack, the nearer one on
+    /// Pushes those children of node `i` for which `entry` returns a distance onto the stack, the nearer one on
     /// top.
-    fn push_children(&self, i: usize, entry: &impl Fn(&Bounds) -> Option<f64>, stack: &mut Stack) {
+    fn push_children(&self, i: usize, entry: &impl Fn(usize) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
-        let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
+        let [a, b] = children.map(|c| entry(c).map(|distance| (distance, c)));
         match (a, b) {
             (Some(a), Some(b)) => {
                 let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };

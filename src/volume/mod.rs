@@ -24,6 +24,7 @@
 
 mod binning;
 mod contour;
+mod coverage;
 mod cube_cases;
 mod enrich;
 mod error;
@@ -31,6 +32,7 @@ mod flow;
 mod grid;
 mod inside;
 mod pyramid;
+mod row_sweep;
 mod sampling;
 mod sequence;
 mod slices;
@@ -38,10 +40,12 @@ mod surface_extractor;
 mod voxels;
 
 pub use contour::{marching_cubes, marching_cubes_world};
+pub use coverage::coverage;
 pub use enrich::Enrichment;
 pub use error::VolumeError;
+pub(crate) use error::filled;
 pub use grid::{CellCache, Grid, VectorGrid};
-pub use inside::voxels_inside;
+pub use inside::{FillRule, for_each_inside, voxels_inside};
 pub(crate) use sampling::trilinear;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
@@ -141,6 +145,25 @@ impl Volume {
             unit: LengthUnit::Unknown,
             range,
         })
+    }
+
+    /// Returns a volume on the grid of this one, with the same dimensions, affine, space and length unit, but one frame,
+    /// whose intensities are `voxels`.
+    ///
+    /// # Errors
+    /// As [`Volume::new`].
+    pub fn with_voxels(&self, voxels: Voxels) -> Result<Volume, VolumeError> {
+        let [x, y, z] = self.dims();
+        let volume = Volume::new(VolumeInit {
+            voxels,
+            dims: [x, y, z, 1],
+            affine: self.affine,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: self.space,
+        })?;
+        Ok(volume.with_unit(self.unit))
     }
 
     /// Returns the volume with the length unit of its world coordinates set to `unit`.
