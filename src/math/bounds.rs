@@ -276,19 +276,17 @@ impl BoxTree {
     }
 
     /// Calls `visit` with items of leaves, roughly from near to far, by the caller's own distance of each node, which is
-    /// at most that of any item below it. `visit` returns the new bound, which is `bound` at first; nodes whose distance
-    /// is higher are skipped.
+    /// at most that of any item below it. `visit` returns the new bound, which is `bound` at first. Nodes whose distance
+    /// is higher are skipped; `distance` also receives the bound, and may return `None` for these.
     pub fn nearest_by_node(
         &self,
         bound: f64,
-        distance: impl Fn(usize) -> f64,
+        distance: impl Fn(usize, f64) -> Option<f64>,
         mut visit: impl FnMut(u32) -> f64,
     ) {
-        self.descend_nodes(
-            bound,
-            |node| Some(distance(node)),
-            |items, bound| items.iter().fold(bound, |_, (_, item)| visit(*item)),
-        );
+        self.descend_nodes(bound, distance, |items, bound| {
+            items.iter().fold(bound, |_, (_, item)| visit(*item))
+        });
     }
 
     /// The traversal that queries by boxes share: visits items for whose boxes `entry` returns a distance within the
@@ -297,7 +295,7 @@ impl BoxTree {
     fn descend(&self, bound: f64, entry: impl Fn(&Bounds) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
         self.descend_nodes(
             bound,
-            |node| entry(&self.nodes[node].bounds),
+            |node, _| entry(&self.nodes[node].bounds),
             |items, mut bound| {
                 for (bounds, item) in items {
                     if entry(bounds).is_some_and(|d| d <= bound) {
@@ -310,16 +308,16 @@ impl BoxTree {
     }
 
     /// The traversal that all queries share: visits the items of leaves for which `entry` returns a distance within the
-    /// bound, which is `bound` at first, then the last value that `visit` returned. Nodes for which `entry` returns
-    /// `None` are skipped. Of two sibling nodes, the nearer is visited first.
+    /// bound, which is `bound` at first, then the last value that `visit` returned. `entry` also receives the bound; nodes
+    /// for which it returns `None` are skipped. Of two sibling nodes, the nearer is visited first.
     #[inline]
     fn descend_nodes(
         &self,
         mut bound: f64,
-        entry: impl Fn(usize) -> Option<f64>,
+        entry: impl Fn(usize, f64) -> Option<f64>,
         mut visit: impl FnMut(&[(Bounds, u32)], f64) -> f64,
     ) {
-        let Some(start) = self.nodes.first().and_then(|_| entry(0)) else { return };
+        let Some(start) = self.nodes.first().and_then(|_| entry(0, bound)) else { return };
         let mut stack = Stack::new();
         stack.push((start, 0));
         while let Some((distance, i)) = stack.pop() {
@@ -328,7 +326,7 @@ impl BoxTree {
             }
             let node = &self.nodes[i];
             if node.count == 0 {
-                self.push_children(i, &entry, &mut stack);
+                self.push_children(i, |child| entry(child, bound), &mut stack);
             } else {
                 bound = visit(self.items_of(node), bound);
             }
@@ -337,7 +335,7 @@ impl BoxTree {
 
     /// Pushes those children of node `i` for which `entry` returns a distance onto the stack, the nearer one on
     /// top.
-    fn push_children(&self, i: usize, entry: &impl Fn(usize) -> Option<f64>, stack: &mut Stack) {
+    fn push_children(&self, i: usize, entry: impl Fn(usize) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
         let [a, b] = children.map(|c| entry(c).map(|distance| (distance, c)));
         match (a, b) {

@@ -111,21 +111,31 @@ impl CylinderTree {
         Ok(Self { boxes, cylinders, corners })
     }
 
+    /// Returns a lower bound of the squared distance from `p` to the triangles of a node; `None` if it is above `bound`.
+    #[inline]
+    fn node_distance(&self, node: usize, p: DVec3, bound: f64) -> Option<f64> {
+        let from_cylinder = self.cylinders[node].distance_squared(p);
+        if from_cylinder > bound {
+            return None;
+        }
+        let from_box = self.boxes.node_bounds(node).distance_squared_f64(p);
+        Some(if from_cylinder > from_box { from_cylinder } else { from_box })
+    }
+
     /// Returns the closest triangle to `p` and its squared distance, `guess` if no other triangle is closer.
     fn closest(&self, p: DVec3, guess: usize) -> (usize, f64) {
         let mut best = (guess, triangle::distance_squared(self.corners[guess], p));
-        let node_distance = |node: usize| {
-            let from_box = self.boxes.node_bounds(node).distance_squared_f64(p);
-            let from_cylinder = self.cylinders[node].distance_squared(p);
-            if from_cylinder > from_box { from_cylinder } else { from_box }
-        };
-        self.boxes.nearest_by_node(best.1, node_distance, |t| {
-            let squared = triangle::distance_squared(self.corners[t as usize], p);
-            if squared < best.1 {
-                best = (t as usize, squared);
-            }
-            best.1
-        });
+        self.boxes.nearest_by_node(
+            best.1,
+            |node, bound| self.node_distance(node, p, bound),
+            |t| {
+                let squared = triangle::distance_squared(self.corners[t as usize], p);
+                if squared < best.1 {
+                    best = (t as usize, squared);
+                }
+                best.1
+            },
+        );
         best
     }
 }
@@ -177,13 +187,17 @@ mod tests {
         let p = DVec3::new(0.05, 0.02, -0.03);
         let (guess, _) = tree.closest(p * 1.1, 0);
         let visited = std::cell::Cell::new(0);
+        let mut best = triangle::distance_squared(tree.corners[guess], p);
         tree.boxes.nearest_by_node(
-            triangle::distance_squared(tree.corners[guess], p),
-            |node| {
+            best,
+            |node, bound| {
                 visited.set(visited.get() + 1);
-                tree.cylinders[node].distance_squared(p)
+                tree.node_distance(node, p, bound)
             },
-            |t| triangle::distance_squared(tree.corners[t as usize], p),
+            |t| {
+                best = best.min(triangle::distance_squared(tree.corners[t as usize], p));
+                best
+            },
         );
         assert!(visited.get() < tree.cylinders.len() / 20, "{} of {}", visited.get(), tree.cylinders.len());
     }
