@@ -456,8 +456,8 @@ export class Mesh {
   }
 
   /**
-   * Transforms the mesh by an affine map. A reflection reverses the triangles, so that they still face outwards. Normals
-   * of a file are transformed, too, and texture coordinates and colours stay.
+   * Transforms the mesh by an affine map. A reflection reverses the triangles, so that they still face outwards.
+   * Normals of a file are transformed, too, and texture coordinates and colours stay.
    *
    * @param matrix - 4x4, column-major, with last row 0, 0, 0, 1, as in three.js and WebGL.
    * @throws {@link VesicleError} `invalid-argument`: another last row, a number that is not finite, a singular matrix
@@ -474,8 +474,8 @@ export class Mesh {
    * winding number, the number of times the surface encloses a point, is not 0, whether triangles face outwards or
    * inwards. The mesh must be closed, but may intersect itself.
    *
-   * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of two
-   * meshes that share a wall exactly one contains it.
+   * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of
+   * two meshes that share a wall exactly one contains it.
    *
    * @param points - Packed xyz of each point, in the mesh's coordinates.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`: a length that is no multiple of 3, or a number that
@@ -487,14 +487,14 @@ export class Mesh {
   }
 
   /**
-   * Voxelises the mesh on the grid of a volume: returns a volume with the dimensions, affine and space of `like`, and one
-   * frame. Inside is defined as for {@link Mesh.contains}; the mesh must be closed, but may intersect itself.
+   * Voxelises the mesh on the grid of a volume: returns a volume with the dimensions, affine and space of `like`, and
+   * one frame. Inside is defined as for {@link Mesh.contains}; the mesh must be closed, but may intersect itself.
    *
-   * - `'mask'` (default): `value` in each voxel whose centre is inside, 0 elsewhere, in the smallest unsigned integer type
-   *   that holds `value`. Exact for vertices mapped to voxel indices in double precision; a centre on the surface counts
-   *   as moved by an infinitesimal amount along the grid's axes.
-   * - `'coverage'`: the fraction of each voxel inside, 0..1, 32-bit floats. Triangles are clipped to the voxels, so it is
-   *   exact to single precision; only in voxels where the surface intersects itself may it be wrong.
+   * - `'mask'` (default): `value` in each voxel whose centre is inside, 0 elsewhere, in the smallest unsigned integer
+   *   type that holds `value`. Exact for vertices mapped to voxel indices in double precision; a centre on the surface
+   *   counts as moved by an infinitesimal amount along the grid's axes.
+   * - `'coverage'`: the fraction of each voxel inside, 0..1, 32-bit floats. Triangles are clipped to the voxels, so it
+   *   is exact to single precision; only in voxels where the surface intersects itself may it be wrong.
    * - `'distance'`: the signed distance of each voxel centre from the surface, in world units, negative inside, 32-bit
    *   floats. Exact to single precision. Takes longest: some microseconds a voxel.
    *

@@ -275,9 +275,9 @@ impl BoxTree {
         &self.items[first.link as usize..(last.link + last.count) as usize]
     }
 
-    /// Calls `visit` with items of leaves, roughly from near to far, by the caller's own distance of each node, which is
-    /// at most that of any item below it. `visit` returns the new bound, which is `bound` at first. Nodes whose distance
-    /// is higher are skipped; `distance` also receives the bound, and may return `None` for these.
+    /// Calls `visit` with items of leaves, roughly from near to far, by the caller's own distance of each node, which
+    /// is at most that of any item below it. `visit` returns the new bound, which is `bound` at first. Nodes whose
+    /// distance is higher are skipped; `distance` also receives the bound, and may return `None` for these.
     pub fn nearest_by_node(
         &self,
         bound: f64,
@@ -308,8 +308,8 @@ impl BoxTree {
     }
 
     /// The traversal that all queries share: visits the items of leaves for which `entry` returns a distance within the
-    /// bound, which is `bound` at first, then the last value that `visit` returned. `entry` also receives the bound; nodes
-    /// for which it returns `None` are skipped. Of two sibling nodes, the nearer is visited first.
+    /// bound, which is `bound` at first, then the last value that `visit` returned. `entry` also receives the bound;
+    /// nodes for which it returns `None` are skipped. Of two sibling nodes, the nearer is visited first.
     #[inline]
     fn descend_nodes(
         &self,

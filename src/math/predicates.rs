@@ -1,9 +1,9 @@
 //! Exact predicates on points, segments and triangles: the sign of a determinant is never affected by rounding.
 //!
 //! Determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation with an error bound decides
-//! nearly all calls, and exact arithmetic only those within the bound. Coordinates are `f32`, except in [`orient2d`] and
-//! [`orient3d_f64`]: products of three `f32` can neither overflow nor underflow in `f64`, so the results hold for all
-//! finite coordinates.
+//! nearly all calls, and exact arithmetic only those within the bound. Coordinates are `f32`, except in [`orient2d`]
+//! and [`orient3d_f64`]: products of three `f32` can neither overflow nor underflow in `f64`, so the results hold for
+//! all finite coordinates.
 //!
 //! Triangles, segments and boxes are closed sets: if they touch, they intersect.
 

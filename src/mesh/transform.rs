@@ -10,8 +10,8 @@ const MIN_COLUMN_VOLUME: f64 = 1e-8;
 /// Returns the affine map of a 4 × 4 matrix, column-major.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] (parameter `matrix`) if an entry is not finite, the last row is not 0, 0, 0, 1, or the
-/// map is singular: the determinant of its normalised columns is below 1e-8.
+/// [`MeshError::InvalidArgument`] (parameter `matrix`) if an entry is not finite, the last row is not 0, 0, 0, 1, or
+/// the map is singular: the determinant of its normalised columns is below 1e-8.
 pub fn invertible_map(matrix: &[f64; 16]) -> Result<DAffine3, MeshError> {
     if let Some(entry) = matrix.iter().find(|entry| !entry.is_finite()) {
         return Err(invalid(format!("all entries must be finite, got {entry}")));
@@ -30,8 +30,8 @@ pub fn invertible_map(matrix: &[f64; 16]) -> Result<DAffine3, MeshError> {
     Err(invalid("must be invertible: the first three columns lie in a plane".into()))
 }
 
-/// Returns the volume of the parallelepiped spanned by the normalised columns: 1 if they are orthogonal, 0 if they lie in
-/// a plane, NaN if one is zero.
+/// Returns the volume of the parallelepiped spanned by the normalised columns: 1 if they are orthogonal, 0 if they lie
+/// in a plane, NaN if one is zero.
 fn column_volume(matrix: DMat3) -> f64 {
     let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|column| {
         // Squares of very large and very small entries would overflow or underflow.
@@ -70,7 +70,8 @@ impl Mesh {
     /// are unchanged. Must not be called while edits are recorded.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] (parameter `matrix`) if a position would not be finite; the mesh is then unchanged.
+    /// [`MeshError::InvalidArgument`] (parameter `matrix`) if a position would not be finite; the mesh is then
+    /// unchanged.
     pub fn transform(&mut self, map: &DAffine3) -> Result<(), MeshError> {
         let mut moved = self.positions.clone();
         for v in self.vertices() {

@@ -47,9 +47,9 @@ const ORDINARY_EDGE: f64 = 1.5;
 
 /// Smooths a mesh: removes noise, and keeps its topology, and its volume if requested.
 ///
-/// A mesh without self-intersections has none afterwards: if the result has some, it is computed again with displacements
-/// shortened where triangles would intersect ([`Embedding::move_all`]), which takes about ten times as long. Where a mesh
-/// intersects itself already, its vertices are held. Attributes are unchanged.
+/// A mesh without self-intersections has none afterwards: if the result has some, it is computed again with
+/// displacements shortened where triangles would intersect ([`Embedding::move_all`]), which takes about ten times as
+/// long. Where a mesh intersects itself already, its vertices are held. Attributes are unchanged.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] for more than [`Smoothing::MAX_ITERATIONS`] iterations; the mesh is then unchanged.
@@ -223,8 +223,8 @@ mod tests {
     }
 
     fn deviation(mesh: &Mesh, radius: f32) -> f32 {
-        let squares = mesh.vertices().map(|v| (mesh.position(v).length() - radius).powi(2));
-        (squares.sum::<f32>() / mesh.vertex_count() as f32).sqrt()
+        let beyond = mesh.vertices().map(|v| mesh.position(v).length() - radius);
+        (beyond.map(|d| d * d).sum::<f32>() / mesh.vertex_count() as f32).sqrt()
     }
 
     #[test]

@@ -5,12 +5,12 @@ use crate::math::crossing::{crossing, is_beyond};
 use crate::math::{Bounds, DVec2, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Returns for each point whether it is inside a closed mesh: whether its winding number, the number of times the surface
-/// encloses it, is not 0. False for points that are not finite.
+/// Returns for each point whether it is inside a closed mesh: whether its winding number, the number of times the
+/// surface encloses it, is not 0. False for points that are not finite.
 ///
 /// Exact. A point on the surface counts as moved by an infinitesimal amount along x, y and z; see
-/// [`crossing`](crate::math::crossing). A mesh is closed if its edges have equally many triangles in both directions; it
-/// may intersect itself.
+/// [`crossing`](crate::math::crossing). A mesh is closed if its edges have equally many triangles in both directions;
+/// it may intersect itself.
 ///
 /// # Errors
 /// As [`TriangleMesh::check_closed`].

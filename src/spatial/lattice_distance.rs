@@ -39,8 +39,8 @@ pub fn lattice_distances(
     Ok(())
 }
 
-/// A bounding volume hierarchy of triangles in which each node has a flat cylinder besides its box, along the mean normal
-/// of its triangles.
+/// A bounding volume hierarchy of triangles in which each node has a flat cylinder besides its box, along the mean
+/// normal of its triangles.
 ///
 /// Boxes alone do not tell which of many triangles at nearly the same distance is the closest, as in the middle of a
 /// ball, where searches would visit hundreds of triangles. Cylinders around flat pieces of a surface are thin.
@@ -111,7 +111,8 @@ impl CylinderTree {
         Ok(Self { boxes, cylinders, corners })
     }
 
-    /// Returns a lower bound of the squared distance from `p` to the triangles of a node; `None` if it is above `bound`.
+    /// Returns a lower bound of the squared distance from `p` to the triangles of a node; `None` if it is above
+    /// `bound`.
     #[inline]
     fn node_distance(&self, node: usize, p: DVec3, bound: f64) -> Option<f64> {
         let from_cylinder = self.cylinders[node].distance_squared(p);

@@ -147,8 +147,8 @@ impl Volume {
         })
     }
 
-    /// Returns a volume on the grid of this one, with the same dimensions, affine, space and length unit, but one frame,
-    /// whose intensities are `voxels`.
+    /// Returns a volume on the grid of this one, with the same dimensions, affine, space and length unit, but one
+    /// frame, whose intensities are `voxels`.
     ///
     /// # Errors
     /// As [`Volume::new`].

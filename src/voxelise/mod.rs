@@ -53,10 +53,10 @@ pub enum VoxeliseError {
 
 /// Returns a volume on the grid of `like`, in one frame, with the given quantity of a closed mesh in world space.
 ///
-/// Inside is where the winding number, the number of times the surface encloses a point, is not 0, whether triangles face
-/// outwards or inwards. For [`VoxelKind::Mask`] and the sign of distances this is decided exactly ([`for_each_inside`]),
-/// for vertices mapped to voxel indices in double precision. See [`coverage`] and [`lattice_distances`] for the accuracy
-/// of the others.
+/// Inside is where the winding number, the number of times the surface encloses a point, is not 0, whether triangles
+/// face outwards or inwards. For [`VoxelKind::Mask`] and the sign of distances this is decided exactly
+/// ([`for_each_inside`]), for vertices mapped to voxel indices in double precision. See [`coverage`] and
+/// [`lattice_distances`] for the accuracy of the others.
 ///
 /// # Errors
 /// [`MeshError::NotClosed`] as [`TriangleMesh::check_closed`]; [`MeshError::InvalidArgument`] for distances from a mesh
@@ -80,7 +80,8 @@ fn in_voxels(mesh: &TriangleMesh, like: &Volume) -> Vec<DVec3> {
     mesh.positions.iter().map(|p| map.transform_point3(p.as_dvec3())).collect()
 }
 
-/// Returns voxels of intensity `value` inside a surface, and 0 outside, in the smallest unsigned type that holds `value`.
+/// Returns voxels of intensity `value` inside a surface, and 0 outside, in the smallest unsigned type that holds
+/// `value`.
 fn mask(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3], value: u32) -> Result<Voxels, VolumeError> {
     macro_rules! filled {
         ($value:expr) => {{
