@@ -32,6 +32,18 @@ export function positive(parameter: string, value: unknown): number {
   throw invalid(parameter, `must be > 0, got ${format(value)}`);
 }
 
+/** Returns `value` if it is a number, which may be infinite but not NaN, else throws `invalid-argument`. */
+export function ordered(parameter: string, value: unknown): number {
+  if (typeof value === 'number' && !Number.isNaN(value)) return value;
+  throw invalid(parameter, `must be a number, which may be infinite, got ${format(value)}`);
+}
+
+/** Returns `value` if it is true or false, else throws `invalid-argument`. */
+export function boolean(parameter: string, value: unknown): boolean {
+  if (typeof value === 'boolean') return value;
+  throw invalid(parameter, `must be true or false, got ${format(value)}`);
+}
+
 /** Returns `value` if it is an integer within the bounds (default 0 to 2^32 - 1), else throws `invalid-argument`. */
 export function integer(parameter: string, value: unknown, { min = 0, max = 0xffffffff }: Bounds = {}): number {
   if (Number.isInteger(value) && (value as number) >= min && (value as number) <= max) return value as number;

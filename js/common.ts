@@ -3,6 +3,16 @@ import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
 export { animationGlb } from './animation.js';
+export type {
+  LengthUnit,
+  MeshExtra,
+  MeshTexture,
+  Space,
+  TextureType,
+  Vec3,
+  VolumeInit,
+  VoxelArray,
+} from './data.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
 export {
   type CurvatureKind,
@@ -12,16 +22,14 @@ export {
   type MeshHit,
   type MeshInfo,
   type MeshReport,
-  type MeshTexture,
   type RestructurePass,
   type SurfaceDistance,
-  type TextureType,
   type VoxelKind,
 } from './mesh.js';
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
-export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
+export { Volume, type VolumeFormat } from './volume.js';
 
 /** Returns the version of the package. */
 export function version(): string {

@@ -1,6 +1,6 @@
 import { checkProperties } from './check.js';
+import type { Vec3 } from './data.js';
 import { checkListener, checkSignal } from './stepper.js';
-import type { Vec3 } from './volume.js';
 
 /**
  * Agreement between the surface of a {@link DeformableModel} and the iso-surface of its volume, as measured by

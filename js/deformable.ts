@@ -11,11 +11,12 @@ import {
   vec3,
 } from './check.js';
 import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
+import type { Vec3 } from './data.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, runInSlices, type Stepper, type StepReport } from './stepper.js';
 import { RawDeformable, RawStart } from './vesicle.js';
-import { type Vec3, type Volume, volumeHandle } from './volume.js';
+import { type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {

@@ -1,9 +1,10 @@
 import { checkProperties, denseCopy, finite, integer, numbers, shallowCopy, typedArray } from './check.js';
+import type { Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
-import { call, Handle } from './runtime.js';
+import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawCameras, RawImplicit, RawPoints } from './vesicle.js';
-import { type Vec3, type Volume, wrapVolume } from './volume.js';
+import { RawCameras, RawImplicit } from './vesicle.js';
+import { type Volume, wrapVolume } from './volume.js';
 
 /**
  * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. The unit of
@@ -142,26 +143,6 @@ const OPTIONS = [
   ...['points', 'normals', 'confidence', 'colors', 'exterior', 'cameras'],
   ...['maxPoints', 'keepComponents', 'params'],
 ];
-
-/**
- * Parses points from a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Returns packed arrays, as in
- * {@link ImplicitOptions}; colours are rgb, 0..1.
- *
- * @throws {@link VesicleError} `bad-file` naming the format and the field or line.
- */
-export function parsePoints(bytes: Uint8Array): {
-  points: Float32Array;
-  normals?: Float32Array;
-  colors?: Float32Array;
-} {
-  typedArray('bytes', bytes, Uint8Array);
-  return call(() => {
-    const raw = RawPoints.parse(bytes);
-    const [points, normals, colors] = [raw.points(), raw.normals(), raw.colors()];
-    raw.free();
-    return { points, ...(normals && { normals }), ...(colors && { colors }) };
-  });
-}
 
 /**
  * A smooth closed surface through sparse, noisy, uneven points with gaps: the zero set of a sum of radial basis

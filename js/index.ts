@@ -12,9 +12,11 @@ import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingP
 export * from './common.js';
 export { default } from './common.js';
 export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';
+export type { PointData } from './data.js';
 export * from './deformable.js';
 export * from './implicit.js';
 export * from './multires.js';
+export * from './points.js';
 export * from './tracking.js';
 
 const specsOf = paramSpecsOf({

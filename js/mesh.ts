@@ -12,9 +12,11 @@ import {
   typedArray,
   vec3,
 } from './check.js';
+import type { MeshExtra, MeshTexture, Vec3 } from './data.js';
 import { call, Handle } from './runtime.js';
-import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
-import { type Vec3, type Volume, volumeHandle, wrapVolume } from './volume.js';
+import { checkTexture, rawTexture, textureOf } from './texture.js';
+import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
+import { type Volume, volumeHandle, wrapVolume } from './volume.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -31,20 +33,6 @@ export interface MeshArrays {
   uvs?: Float32Array;
   /** Colour of each vertex, packed rgb, 0..1, if the mesh has colours. */
   colors?: Float32Array;
-}
-
-/** Image formats of a {@link MeshTexture}, as media types. */
-export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
-
-/**
- * The texture of a mesh, as an image file. Texture coordinates start at its upper left corner, u to the right and v
- * downwards, 1 at the far edges, and the image repeats beyond, as in glTF: in three.js, with `flipY = false`.
- */
-export interface MeshTexture {
-  /** Image format of `bytes`. */
-  type: TextureType;
-  /** Content of the image file. */
-  bytes: Uint8Array;
 }
 
 /**
@@ -163,8 +151,6 @@ const RESTRUCTURE_PASSES: readonly RestructurePass[] = ['collapse', 'split', 'fl
 
 const CURVATURES: readonly CurvatureKind[] = ['mean', 'gaussian'];
 
-const TEXTURES: readonly TextureType[] = ['image/png', 'image/jpeg', 'image/webp'];
-
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
 /**
@@ -224,28 +210,25 @@ export class Mesh {
    *
    * @param positions - xyz of each vertex.
    * @param indices - abc of each triangle, counter-clockwise seen from outside.
-   * @param extra - `uvs`: texture coordinates of each vertex; `texture`: the image they refer to.
+   * @param extra - What else the mesh has.
    * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index out of
-   *   range, a texture without `uvs`, bytes that are no image of the stated type.
+   *   range, a texture without texture coordinates, bytes that are no image of the stated type.
    */
-  static fromArrays(
-    positions: Float32Array,
-    indices: Uint32Array,
-    extra: { uvs?: Float32Array; texture?: MeshTexture } = {},
-  ): Mesh {
-    const { uvs, texture } = checkProperties('extra', extra, ['uvs', 'texture']);
+  static fromArrays(positions: Float32Array, indices: Uint32Array, extra: MeshExtra = {}): Mesh {
     const vertices = finite('positions', positions, 3).length / 3;
     checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
-    if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
-      throw invalid('uvs', `must have two numbers per vertex, ${2 * vertices}, got ${uvs.length}`);
-    }
-    if (texture !== undefined && uvs === undefined) throw invalid('texture', 'needs texture coordinates, uvs');
-    checkTexture(texture);
-    return made(() => RawMesh.fromArrays(positions, indices, uvs, rawTexture(texture)));
+    const given = checkExtra(extra, vertices, indices.length / 3);
+    const { normals, uvs, cornerUvs, colors, texture } = given;
+    return made(() => {
+      const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
+      return RawMesh.fromArrays(positions, indices, rest);
+    });
   }
 
   /**
    * Parses a mesh file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
+   *
+   * Entry points with one method lack it: use `parseMesh` of `vesicle/import`.
    *
    * The base colour texture inside a glb (png, jpeg or webp) becomes {@link Mesh.texture}. Texture coordinates are
    * those of the file: v points downwards in glb, and upwards in obj and ply.
@@ -309,12 +292,7 @@ export class Mesh {
    */
   get texture(): MeshTexture | undefined {
     const raw = this.#handle.use((mesh) => mesh.texture());
-    if (!raw) return undefined;
-    try {
-      return call(() => ({ type: raw.kind() as TextureType, bytes: raw.bytes() }));
-    } finally {
-      raw.free();
-    }
+    return raw && call(() => textureOf(raw));
   }
 
   /** Returns the mesh in its present state as newly allocated arrays. */
@@ -442,6 +420,8 @@ export class Mesh {
    *
    * Texture coordinates and colours are removed.
    *
+   * Entry points with one method lack it.
+   *
    * @param options - `iterations`: 0 to 10,000. `keepVolume`: whether each connected component keeps the volume that it
    *   encloses, by a small offset along the normals; default true. Where its vertices cannot move without
    *   self-intersections, the volume may differ.
@@ -458,6 +438,8 @@ export class Mesh {
   /**
    * Transforms the mesh by an affine map. A reflection reverses the triangles, so that they still face outwards.
    * Normals of a file are transformed, too, and texture coordinates and colours stay.
+   *
+   * Entry points with one method lack it.
    *
    * @param matrix - 4x4, column-major, with last row 0, 0, 0, 1, as in three.js and WebGL.
    * @throws {@link VesicleError} `invalid-argument`: another last row, a number that is not finite, a singular matrix
@@ -476,6 +458,8 @@ export class Mesh {
    *
    * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of
    * two meshes that share a wall exactly one contains it.
+   *
+   * Entry points with one method lack it.
    *
    * @param points - Packed xyz of each point, in the mesh's coordinates.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`: a length that is no multiple of 3, or a number that
@@ -497,6 +481,8 @@ export class Mesh {
    *   is exact to single precision; only in voxels where the surface intersects itself may it be wrong.
    * - `'distance'`: the signed distance of each voxel centre from the surface, in world units, negative inside, 32-bit
    *   floats. Exact to single precision. Takes longest: some microseconds a voxel.
+   *
+   * Entry points with one method lack it.
    *
    * @param like - Volume whose grid is used; its intensities have no influence.
    * @param options - `value`: of a mask, 1 to 4,294,967,295; default 1.
@@ -623,25 +609,32 @@ function made(make: () => RawMesh): Mesh {
   return wrapMesh(new Handle('Mesh', make));
 }
 
+/** Arrays of a {@link MeshExtra}: name, and how many numbers they have per vertex or per triangle. */
+const EXTRA_ARRAYS = [
+  ['normals', 3, 'vertex'],
+  ['uvs', 2, 'vertex'],
+  ['cornerUvs', 6, 'triangle'],
+  ['colors', 3, 'vertex'],
+] as const;
+
+function checkExtra(extra: MeshExtra, vertices: number, triangles: number): MeshExtra {
+  const given = checkProperties('extra', extra, [...EXTRA_ARRAYS.map(([name]) => name), 'texture']);
+  for (const [name, stride, part] of EXTRA_ARRAYS) {
+    const array = given[name];
+    const length = stride * (part === 'vertex' ? vertices : triangles);
+    if (array === undefined || finite(name, array, 1).length === length) continue;
+    throw invalid(name, `must have ${stride} numbers per ${part}, ${length}, got ${array.length}`);
+  }
+  const { uvs, cornerUvs, texture } = given;
+  if (texture !== undefined && !(uvs ?? cornerUvs)) throw invalid('texture', 'needs texture coordinates, uvs');
+  checkTexture(texture);
+  return given;
+}
+
 function checkIndices(indices: Uint32Array, vertices: number): void {
   const wrong = indices.findIndex((index) => index >= vertices);
   if (wrong < 0) return;
   throw invalid('indices', `${indices[wrong]} at index ${wrong}; there are ${vertices} vertices`);
-}
-
-function checkTexture(texture: MeshTexture | undefined): void {
-  if (texture === undefined) return;
-  const { type, bytes } = checkProperties('texture', texture, ['type', 'bytes']);
-  choice('texture.type', type, TEXTURES);
-  typedArray('texture.bytes', bytes, Uint8Array);
-}
-
-/**
- * Copies a texture into the WebAssembly module. The function of the module that receives the raw texture takes
- * ownership of it.
- */
-function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
-  return texture && new RawTexture(texture.type, texture.bytes);
 }
 
 function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64Array<ArrayBuffer> {

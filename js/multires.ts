@@ -1,9 +1,9 @@
 import { checkProperties, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
+import type { Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawMultires, TriangleCopy } from './vesicle.js';
-import type { Vec3 } from './volume.js';
 
 /**
  * A solid ellipsoid that supports the low-frequency surface of a {@link MultiresolutionModel} and drives its

@@ -66,8 +66,12 @@ async function readFile(path: URL): Promise<BufferSource> {
   return readFile(path);
 }
 
-function restart(): void {
-  reset();
+/**
+ * Replaces the instance by a new one: objects of the old one are lost, its memory can be collected, and a crash is
+ * forgotten.
+ */
+export function restart(): void {
+  if (instance) reset();
   generation += 1;
   crash = undefined;
 }

@@ -1,9 +1,10 @@
 import { checkProperties, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
+import type { Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawTracker, TriangleCopy } from './vesicle.js';
-import { type Vec3, type Volume, volumeHandle } from './volume.js';
+import { type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {

@@ -1,4 +1,5 @@
 import {
+  boolean,
   checkProperties,
   choice,
   denseCopy,
@@ -6,53 +7,25 @@ import {
   invalid,
   number,
   numbers,
+  ordered,
   positive,
+  shallowCopy,
   typedArray,
   vec3,
 } from './check.js';
+import type { LengthUnit, Space, Vec3, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 import { RawFrames, RawVolume } from './vesicle.js';
 
-/** Three numbers: a point, a direction, or one number for each of x, y and z. */
-export type Vec3 = [number, number, number];
+const INIT = [
+  ...['data', 'dims', 'affine', 'spacing', 'origin'],
+  ...['slope', 'intercept', 'frameSeconds', 'space', 'unit'],
+];
+const UNITS: readonly LengthUnit[] = ['m', 'mm', 'um'];
 
-/** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
-export type VoxelArray =
-  | Uint8Array
-  | Int8Array
-  | Uint16Array
-  | Int16Array
-  | Uint32Array
-  | Int32Array
-  | Float32Array
-  | Float64Array;
+/** File formats that {@link Volume.toBytes} writes. */
+export type VolumeFormat = 'nifti' | 'nrrd' | 'mha';
 
-/** Orientation of the world axes: right-anterior-superior, or left-posterior-superior. */
-export type Space = 'RAS' | 'LPS';
-
-/** Constructor options of a {@link Volume}. */
-export interface VolumeInit {
-  /** Stored value of each voxel: x fastest, then y, z, t. Copied once. */
-  data: VoxelArray;
-  /** Number of voxels along x, y, z, and the number of frames of a 4D volume. */
-  dims: Vec3 | [number, number, number, number];
-  /** Transform from voxel index to world: 16 numbers, column-major. Default from `spacing` and `origin`. */
-  affine?: ArrayLike<number>;
-  /** Voxel size, world units; default 1. Not together with `affine`. */
-  spacing?: Vec3;
-  /** World position of the centre of the first voxel; default 0. Not together with `affine`. */
-  origin?: Vec3;
-  /** Slope of intensity = stored value * slope + intercept. Default 1; not 0. */
-  slope?: number;
-  /** Intercept of intensity = stored value * slope + intercept. Default 0. */
-  intercept?: number;
-  /** Seconds from one frame to the next; 4D only. */
-  frameSeconds?: number;
-  /** Orientation of the world axes. Default RAS; meshes are returned in the same space. */
-  space?: Space;
-}
-
-const INIT = ['data', 'dims', 'affine', 'spacing', 'origin', 'slope', 'intercept', 'frameSeconds', 'space'];
 const ELEMENTS = [
   ...[Uint8Array, Int8Array, Uint16Array, Int16Array],
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
@@ -98,6 +71,8 @@ export class Volume {
    * or `.mhd` and data), detected from the bytes. NIfTI files may be gzipped as a whole, the voxels of NRRD and
    * MetaImage compressed inside the file.
    *
+   * Entry points with one method lack it: use `parseVolume` of `vesicle/import`.
+   *
    * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
    */
@@ -126,9 +101,34 @@ export class Volume {
     });
   }
 
-  /** Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767. */
+  /**
+   * Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767, or slope, intercept or time
+   * between frames would change when rounded to single precision, as NIfTI-1 stores them.
+   */
   toNifti(): Uint8Array {
     return this.#handle.use((raw) => raw.toNifti());
+  }
+
+  /**
+   * Encodes the volume as a file: NIfTI (as {@link Volume.toNifti}), NRRD (`.nrrd`) or MetaImage (`.mha`), with all
+   * frames.
+   *
+   * NIfTI keeps stored values, slope and intercept. The two others have neither slope nor intercept: if these are not 1
+   * and 0, the intensities are stored instead, in `float32`, or `float64` for 32-bit integers and `float64`. NIfTI is in
+   * RAS, MetaImage in LPS, NRRD in the volume's space. MetaImage does not say what the distance between frames means, so
+   * {@link Volume.parse} reads no time from it.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param options - `gzip`: compress; the whole file for NIfTI (`.nii.gz`), the voxels inside the file for the others.
+   *   Default false.
+   * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`.
+   */
+  toBytes(format: VolumeFormat, options: { gzip?: boolean } = {}): Uint8Array {
+    choice('format', format, ['nifti', 'nrrd', 'mha']);
+    const { gzip = false } = checkProperties('options', options, ['gzip']);
+    boolean('gzip', gzip);
+    return this.#handle.use((raw) => raw.toBytes(format, gzip));
   }
 
   /** Number of voxels along x, y and z. */
@@ -245,6 +245,8 @@ export class Volume {
    * Inserts in-between slices along the axis of the largest spacing, by symmetric optical flow between neighbouring
    * slices, in all frames. The original slices stay unchanged, at their positions; voxels keep their type.
    *
+   * Entry points with one method lack it, but for `vesicle/tracking`.
+   *
    * @param options - `factor`: number by which the distance between slices is divided, 1 to 16; default the integer
    *   that makes voxels closest to cubes; 1 changes nothing. `method`: `'linear'` interpolates linearly instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
@@ -254,6 +256,144 @@ export class Volume {
     if (factor !== undefined) integer('factor', factor, { min: 1 });
     choice('method', method, ['flow', 'linear']);
     return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
+  }
+
+  /**
+   * Returns the labels in one frame of a label map and their numbers of voxels, by ascending value. Labels are
+   * intensities, integers other than 0, which is the background.
+   *
+   * Entry points with one method lack it.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: voxels of floats, an intensity that is not an integer (because of
+   *   slope or intercept), more than 65,536 labels, or no such frame.
+   */
+  labels(frame = 0): { value: number; voxels: number }[] {
+    integer('frame', frame);
+    const pairs = this.#handle.use((raw) => raw.labels(frame));
+    return Array.from({ length: pairs.length / 2 }, (_, i) => ({
+      value: pairs[2 * i] as number,
+      voxels: pairs[2 * i + 1] as number,
+    }));
+  }
+
+  /**
+   * Returns the mask of the voxels of a label map that have a label, or one of several: 1 there, 0 elsewhere, as bytes
+   * on the same grid, in all frames.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param value - The label or labels; each must be one of the labels of some frame.
+   * @throws {@link VesicleError} `invalid-argument`: a value that is no label (the message lists those there are), or a
+   *   volume that is no label map, as for {@link Volume.labels}; `too-large`.
+   */
+  label(value: number | number[]): Volume {
+    const list = Array.isArray(value) ? denseCopy('value', value) : [value];
+    const values = Float64Array.from(list, (label) => number('value', label));
+    return wrap(() => this.#handle.use((raw) => raw.label(values)));
+  }
+
+  /**
+   * Returns the mask of the voxels whose intensity is from `low` to `high`, both included: 1 there, 0 elsewhere, as
+   * bytes on the same grid, in all frames. Voxels that are NaN are 0.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param low - May be `-Infinity`.
+   * @param high - May be `Infinity`.
+   * @throws {@link VesicleError} `invalid-argument`: NaN, or `low` above `high`; `too-large`.
+   */
+  threshold(low: number, high: number): Volume {
+    ordered('low', low);
+    ordered('high', high);
+    return wrap(() => this.#handle.use((raw) => raw.threshold(low, high)));
+  }
+
+  /**
+   * Returns the Dice coefficient, 2 |A ∩ B| / (|A| + |B|), of the voxels of two volumes whose intensity is not 0, or of
+   * those that have a label, over all frames: 1 if they are the same or there are none, 0 if no voxel is in both.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param options - `label`: compare the voxels of this label; an integer other than 0.
+   * @throws {@link VesicleError} `invalid-argument`: volumes that differ in dimensions, number of frames, space, or in
+   *   position by more than a thousandth of a voxel; a label for volumes of floats.
+   */
+  dice(other: Volume, options: { label?: number } = {}): number {
+    const { label } = checkProperties('options', options, ['label']);
+    if (label !== undefined) number('label', label);
+    const handle = volumeHandle('other', other);
+    return this.#handle.use((raw) => handle.use((compared) => raw.dice(compared, label)));
+  }
+
+  /**
+   * Returns the voxels of a box, in all frames, as a volume of its own. World positions, voxel type, slope and intercept
+   * stay.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param box - Voxel indices: from `min`, included, to `max`, excluded, along x, y and z.
+   * @throws {@link VesicleError} `invalid-argument`: a box that is empty, extends beyond the volume, or has no finite
+   *   voxel; `too-large`.
+   */
+  crop(box: { min: Vec3; max: Vec3 }): Volume {
+    const { min, max } = checkProperties('box', shallowCopy('box', box), ['min', 'max']);
+    const [from, to] = [counts('box.min', min), counts('box.max', max)];
+    return wrap(() => this.#handle.use((raw) => raw.crop(from, to)));
+  }
+
+  /**
+   * Resamples all frames to another grid. The voxel type, slope and intercept stay; integers are rounded.
+   *
+   * Nothing is smoothed: for a much coarser grid, use {@link Volume.binned} or {@link Volume.pyramid} first. Between the
+   * centres of the outermost voxels and the edges of the volume the border is replicated.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param grid - One of these. `dims`: numbers of voxels in the same field of view, whose edges stay in place.
+   *   `spacing`: voxel size, world units, in the same field of view; the result has the nearest size of which a whole
+   *   number of voxels fills it. `like`: the grid of another volume, in its space; what is outside this volume gets
+   *   intensity 0, or the one nearest to 0 that the voxel type can store.
+   * @param how - `'linear'` (default) interpolates intensities as {@link Volume.sample} does, `'nearest'` takes the
+   *   nearest voxel. Use `'nearest'` for label maps.
+   * @throws {@link VesicleError} `invalid-argument`: none or several of the grids, a size out of range, or a volume whose
+   *   file states another unit of length; `too-large`.
+   */
+  resample(grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume }, how: 'linear' | 'nearest' = 'linear'): Volume {
+    const resample = resampling(grid);
+    const nearest = choice('how', how, ['linear', 'nearest']) === 'nearest';
+    return wrap(() => this.#handle.use((raw) => resample(raw, nearest)));
+  }
+
+  /**
+   * Returns one frame as a 3D volume.
+   *
+   * Entry points with one method lack it.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no such frame, or one without a finite voxel; `too-large`.
+   */
+  frame(index: number): Volume {
+    integer('frame', index);
+    return wrap(() => this.#handle.use((raw) => raw.frame(index)));
+  }
+
+  /**
+   * Changes voxels of one frame in place, such as those under a brush. {@link Volume.range} follows. Objects made from
+   * the volume before, such as models and the levels of a pyramid, keep the voxels as they were.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param region - `min`: index of the first voxel along x, y and z; `dims`: numbers of voxels; `data`: their stored
+   *   values, x fastest, in the type of the volume's voxels.
+   * @throws {@link VesicleError} `invalid-argument`: an empty region or one beyond the volume, data of another type or
+   *   length, intensities beyond the range of `float32`, no finite voxel left, or no such frame; `too-large`. The volume
+   *   is then unchanged.
+   */
+  write(region: { min: Vec3; dims: Vec3; data: VoxelArray }, frame = 0): void {
+    const { min, dims, data } = checkProperties('region', shallowCopy('region', region), ['min', 'dims', 'data']);
+    const [first, sizes] = [counts('region.min', min), counts('region.dims', dims)];
+    const voxels = voxelArray('region.data', data);
+    integer('frame', frame);
+    this.#handle.use((raw) => raw.write(first, sizes, voxels, frame));
   }
 
   /** Frees the memory; the volume cannot be used afterwards. Objects made from it stay valid. */
@@ -274,12 +414,10 @@ function wrap(make: () => RawVolume): Volume {
 
 function fromInit(init: VolumeInit): RawVolume {
   const given = checkProperties('init', init, INIT);
-  const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
-  if (!ELEMENTS.some((kind) => data instanceof kind)) {
-    throw invalid('data', `must be a typed array: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
-  }
-  return new RawVolume(
-    data,
+  const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS', unit } = given;
+  if (unit !== undefined) choice('unit', unit, UNITS);
+  const volume = new RawVolume(
+    voxelArray('data', data),
     dims(given.dims),
     affine(given),
     number('slope', slope),
@@ -287,6 +425,40 @@ function fromInit(init: VolumeInit): RawVolume {
     frameSeconds === undefined ? 0 : positive('frameSeconds', frameSeconds),
     choice('space', space, ['RAS', 'LPS']),
   );
+  return unit === undefined ? volume : volume.withUnit(unit);
+}
+
+function voxelArray(parameter: string, data: unknown): VoxelArray {
+  const kind = ELEMENTS.find((element) => data instanceof element) as (new (length: number) => VoxelArray) | undefined;
+  if (kind) return typedArray(parameter, data, kind);
+  throw invalid(parameter, `must be a typed array: ${ELEMENTS.map((element) => element.name).join(', ')}`);
+}
+
+/** Returns one integer of at least 0 for each of x, y and z. */
+function counts(parameter: string, given: unknown): Uint32Array {
+  return Uint32Array.from(vec3(parameter, given), (count) => integer(parameter, count));
+}
+
+/** Returns the call that resamples to the one grid that is given. */
+function resampling(
+  grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume },
+): (raw: RawVolume, nearest: boolean) => RawVolume {
+  type Grids = { dims: Vec3; spacing: Vec3; like: Volume };
+  const names = ['dims', 'spacing', 'like'] as const;
+  const given = checkProperties<Partial<Grids>>('grid', shallowCopy('grid', grid), names);
+  if (names.filter((name) => given[name] !== undefined).length !== 1) {
+    throw invalid('grid', 'give one of dims, spacing, like');
+  }
+  if (given.dims !== undefined) {
+    const dims = counts('dims', given.dims);
+    return (raw, nearest) => raw.resampleToDims(dims, nearest);
+  }
+  if (given.spacing !== undefined) {
+    const spacing = vec3('spacing', given.spacing);
+    return (raw, nearest) => raw.resampleToSpacing(spacing, nearest);
+  }
+  const like = volumeHandle('like', given.like as Volume);
+  return (raw, nearest) => like.use((other) => raw.resampleLike(other, nearest));
 }
 
 function dims(given: unknown): Uint32Array {

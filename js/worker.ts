@@ -35,8 +35,8 @@
  *
  * **Errors.** A {@link VesicleError} has its code. After a {@link VesicleCrash}, or if the worker ended by itself (also
  * a `VesicleCrash`), all pending and later promises reject, until `init` starts a new worker; objects created before
- * throw `freed` from then on. Calls with arguments that
- * `postMessage` cannot send, or with buffers that {@link transfer} cannot transfer, reject with `invalid-argument`.
+ * throw `freed` from then on. Calls with arguments that `postMessage` cannot send, or with buffers that
+ * {@link transfer} cannot transfer, reject with `invalid-argument`.
  *
  * **Memory.** `free()` frees an object's memory in the worker; so does garbage collection of unreachable objects, at
  * some later time. {@link terminate} ends the worker. In Node a worker without pending requests does not keep the
@@ -86,6 +86,7 @@ export type {
   TrackingParams,
   UncoveredRegion,
   Vec3,
+  VolumeFormat,
   VolumeInit,
   VoxelArray,
   VoxelKind,

@@ -5,7 +5,7 @@ import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { makeElement } from './element.mjs';
-import { METHODS, makeEntries } from './entries.mjs';
+import { METHODS, makeEntries, PARTS } from './entries.mjs';
 import { makeInline } from './inline.mjs';
 import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
@@ -16,18 +16,25 @@ const WHOLE = { target: 'target', name: 'vesicle_bg' };
 
 /** The whole library for engines without vector instructions. */
 const PLAIN = {
-  ...{ target: 'target/plain', name: 'vesicle_plain_bg' },
+  ...{ target: 'target/methods', name: 'vesicle_plain_bg' },
   // After what .cargo/config.toml says of the target: the last word counts.
   env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
 
-/** The library with one method. */
-const only = (method, target) => ({ target, name: `${method}/vesicle_bg`, features: [method, 'import', 'enrich'] });
+/** The library with one method, without the readers of files. */
+const only = (method, target) => ({
+  ...{ target, name: `${method}/vesicle_bg` },
+  // Few slices are what makes sequences hard to track.
+  features: [method, ...(method === 'tracking' ? ['enrich'] : [])],
+});
+
+/** The readers of files alone, which have glue of another name, since they have other classes. */
+const READERS = { target: 'target/methods', name: 'import/vesicle_bg', features: ['import'], glue: 'files' };
 
 /** Modules by lane; the lanes are compiled in parallel, since each module is linked by one thread. */
 const LANES = [
   [WHOLE, ...METHODS.slice(0, 2).map((method) => only(method, 'target'))],
-  [PLAIN, ...METHODS.slice(2).map((method) => only(method, 'target/methods'))],
+  [PLAIN, ...METHODS.slice(2).map((method) => only(method, 'target/methods')), READERS],
 ];
 
 const MODULES = LANES.flat();
@@ -35,7 +42,9 @@ const MODULES = LANES.flat();
 /** Folder of a module's glue, and of the module as the glue needs it. */
 const folder = ({ name }) => at('target/modules', name);
 
-const optimised = (module) => join(folder(module), 'vesicle_bg.wasm');
+const glueName = ({ glue = 'vesicle' }) => glue;
+
+const optimised = (module) => join(folder(module), `${glueName(module)}_bg.wasm`);
 
 // Documents that the README links to.
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
@@ -75,9 +84,10 @@ async function make(module) {
   if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === wanted) return;
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
-    ...['run', '--locked', '--quiet', '--package', 'xtask', '--', 'bindgen', compiled],
+    ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
+    ...['--', 'bindgen', compiled, '--target', 'web', '--out-dir', folder(module), '--out-name', glueName(module)],
     // A trap loses the instance; the reset function lets a page start a new one without reloading.
-    ...['--target', 'web', '--out-dir', folder(module), '--experimental-reset-state-function'],
+    '--experimental-reset-state-function',
     // The face says where the module is, so that a bundler meets only one address of it.
     ...['--omit-default-module-path', '--remove-producers-section'],
   ]);
@@ -91,8 +101,14 @@ async function compareGlue() {
   if (!one.equals(other)) throw new Error('the glue of the plain module differs from that of the module with vectors');
 }
 
+/**
+ * Passes of binaryen: all twice, since the first round leaves work for the second. The one between them lets constant
+ * offsets be part of loads; nothing is stored below address 1,024, the far end of the stack.
+ */
+const OPTIMISATION = ['-O3', '--low-memory-unused', '-O3'];
+
 async function optimise(module) {
-  await must(tool('wasm-opt'), ['-O3', module, '-o', `${module}.opt`]);
+  await must(tool('wasm-opt'), [...OPTIMISATION, module, '-o', `${module}.opt`]);
   await copyFile(`${module}.opt`, module);
   await rm(`${module}.opt`);
 }
@@ -102,7 +118,10 @@ async function assemble() {
   await mkdir(at('pkg'));
   for (const file of ['vesicle.js', 'vesicle.d.ts']) await copyFile(join(folder(WHOLE), file), at('pkg', file));
   await must(tool('tsc'), ['-p', at('js')]);
-  await makeEntries((method) => folder(MODULES.find(({ name }) => name.startsWith(method))));
+  await makeEntries((entry) => {
+    const module = MODULES.find(({ name }) => name.startsWith(`${entry}/`));
+    return join(folder(module), glueName(module));
+  });
   for (const module of MODULES) await copyFile(optimised(module), at('pkg', `${module.name}.wasm`));
   await makeInline();
   await makeElement();
@@ -113,9 +132,9 @@ async function assemble() {
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
 
-const entry = (method) => [
-  [`./${method}`, { types: `./${method}/index.d.ts`, default: `./${method}/index.js` }],
-  [`./${method}/vesicle_bg.wasm`, `./${method}/vesicle_bg.wasm`],
+const entry = (part) => [
+  [`./${part}`, { types: `./${part}/index.d.ts`, default: `./${part}/index.js` }],
+  [`./${part}/vesicle_bg.wasm`, `./${part}/vesicle_bg.wasm`],
 ];
 
 async function manifest() {
@@ -133,7 +152,7 @@ async function manifest() {
     types: './index.d.ts',
     exports: {
       '.': { types: './index.d.ts', default: './index.js' },
-      ...Object.fromEntries(METHODS.flatMap(entry)),
+      ...Object.fromEntries(PARTS.flatMap(entry)),
       './inline': { types: './index.d.ts', default: './inline.js' },
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },

@@ -2,15 +2,15 @@
 // with.
 import { readFile, writeFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
-import { METHODS } from './entries.mjs';
+import { PARTS } from './entries.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
-const MODULES = ['vesicle_bg.wasm', 'vesicle_plain_bg.wasm', ...METHODS.map((method) => `${method}/vesicle_bg.wasm`)];
+const MODULES = ['vesicle_bg.wasm', 'vesicle_plain_bg.wasm', ...PARTS.map((part) => `${part}/vesicle_bg.wasm`)];
 
 /** Entry points, each bundled with all that it imports; wasm modules are fetched separately. */
 const ENTRIES = {
   vesicle: 'index.js',
-  ...Object.fromEntries(METHODS.map((method) => [`vesicle/${method}`, `${method}/index.js`])),
+  ...Object.fromEntries(PARTS.map((part) => [`vesicle/${part}`, `${part}/index.js`])),
   'vesicle/inline': 'inline.js',
   'vesicle/worker': 'worker.js',
   'vesicle/worker-host': 'worker-host.js',

@@ -51,8 +51,9 @@ const cargoTests =
     return { output, ...atLeastOneFailed(code, countCargo(output)) };
   };
 
-const vitest = (folder) => async () => {
-  const report = at('target', `${folder.replace('/', '-')}.json`);
+/** Returns a stage that runs the tests of a folder, or those of one project of its configuration. */
+const vitest = (folder, project) => async () => {
+  const report = at('target', `${[folder.replace('/', '-'), project].filter(Boolean).join('-')}.json`);
   await rm(report, { force: true });
   const config = at(folder, 'vitest.config.ts');
   const args = [
@@ -60,6 +61,7 @@ const vitest = (folder) => async () => {
     ...['--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
     // A busy machine is slow, not wrong.
     ...(existsSync(config) ? ['--config', config] : ['--testTimeout=300000']),
+    ...(project ? ['--project', project] : []),
   ];
   const { code, output } = await run(tool('vitest'), args, { echo });
   if (!existsSync(report)) return { passed: 0, failed: 1, output };
@@ -74,40 +76,39 @@ function atLeastOneFailed(code, { passed, failed }) {
 }
 
 /**
- * Stages by group and lane, each with its budget: the seconds that it may take in a fresh clone on two cores. The lanes
- * of a group run in parallel; groups, and the stages of a lane, one after the other.
+ * Stages by group and lane, each with its budget: the seconds that it may take in a fresh clone on two cores, beside the
+ * other lane. The lanes of a group run in parallel; groups, and the stages of a lane, one after the other.
  */
 const GROUPS = [
   [
     [
       ['format', check('cargo', ['fmt', '--all', '--check']), 5],
-      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 40],
-      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY]), 40],
+      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 100],
+      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY]), 100],
       [
         'rust docs',
         check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
-        15,
+        20,
       ],
       // Shows the tests' measurements in the log.
-      ['native', cargoTests('--', '--show-output'), 300],
+      ['native', cargoTests('--', '--show-output'), 600],
+      // Has one thread only.
+      ['wasm', cargoTests('--lib', '--tests', ...WASM), 700],
     ],
-  ],
-  [
-    // Has one thread only.
-    [['wasm', cargoTests('--lib', '--tests', ...WASM), 540]],
     [
-      ['build', works(build), 600],
+      ['build', works(build), 700],
       ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
       ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
-      ['package', vitest('tests/js'), 100],
+      ['package', vitest('tests/js'), 200],
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
+      ['app', vitest('tests/app', 'together'), 700],
     ],
   ],
-  [[['app', vitest('tests/app'), 480]]],
+  [[['app alone', vitest('tests/app', 'alone'), 200]]],
 ];
 
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
@@ -126,7 +127,7 @@ const LONG = [
 
 /** Checks that each feature compiles alone, natively and for wasm32. */
 async function checkFeatures() {
-  for (const feature of ['', 'deformable', 'implicit', 'tracking', 'multires', 'import', 'enrich']) {
+  for (const feature of ['', 'deformable', 'implicit', 'tracking', 'multires', 'import', 'enrich', 'labels']) {
     for (const target of [[], WASM]) {
       const args = ['clippy', '--locked', '-p', 'vesicle', '--lib', '--no-default-features', '--features', feature];
       await must('cargo', [...args, ...target, ...DENY]);
@@ -141,7 +142,7 @@ async function attempt([name, work, budget]) {
     process.stderr.write(`${error.message}\n`);
     return { passed: 0, failed: 1 };
   });
-  await writeFile(at(LOGS, `${name.replace(' ', '-')}.log`), output);
+  await writeFile(at(LOGS, `${name.replaceAll(' ', '-')}.log`), output);
   if (counts.failed && !echo) process.stdout.write(`\n── ${name}: failed\n${failuresIn(output)}\n`);
   return { name, budget, ...withinTwice(budget, { seconds: (performance.now() - started) / 1000, ...counts }) };
 }

@@ -5,7 +5,8 @@
 //! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial.
 //!
 //! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
-//! files to the bindings, `enrich` the interpolation of slices. All are on by default.
+//! files to the bindings, `enrich` the interpolation of slices, `labels` label maps, the writers of volume files,
+//! voxelisation, and smoothing and transforms of meshes. All are on by default.
 
 #![cfg_attr(
     not(all(
@@ -14,9 +15,15 @@
         feature = "tracking",
         feature = "multires",
         feature = "import",
-        feature = "enrich"
+        feature = "enrich",
+        feature = "labels"
     )),
-    allow(dead_code, reason = "what some methods share is unused in a build without them")
+    allow(
+        dead_code,
+        unused_macros,
+        unused_imports,
+        reason = "what some methods share is unused without them"
+    )
 )]
 
 pub mod io;

@@ -48,7 +48,10 @@ function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[])
   return found;
 }
 
-/** Names the built files of the app, for the service worker to keep: without third-party libraries of the live pages, and with one of the two modules. */
+/** The modules of the whole library, which only the live pages and the benchmarks load; the labs have smaller ones. */
+const WHOLE = /pkg\/vesicle_(plain_)?bg\.wasm$/;
+
+/** Names the built files of the app, for the service worker to keep: what the labs load, now or later. */
 function listFiles(): Plugin {
   const isEmbed = ({ facadeModuleId }: Rolldown.OutputChunk) => facadeModuleId?.includes('/embed/') === true;
   return {
@@ -65,8 +68,12 @@ function listFiles(): Plugin {
         entries.filter((one) => !isEmbed(one)),
       );
       const theirs = reached(bundle, entries.filter(isEmbed));
+      const isWhole = (name: string) => {
+        const file = bundle[name];
+        return file?.type === 'asset' && file.originalFileNames.some((from) => WHOLE.test(from));
+      };
       const wanted = (name: string) =>
-        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !name.includes('_plain_');
+        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !isWhole(name);
       const listed = Object.keys(bundle).filter(wanted).sort();
       this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(listed, null, 1)}\n` });
     },
@@ -104,6 +111,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle\/(three|niivue|vtk)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: /^vesicle\/import$/, replacement: here('../pkg/import/index.js') },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],

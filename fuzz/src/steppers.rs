@@ -15,7 +15,7 @@ use vesicle::methods::multires::{
 };
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::methods::{MethodError, deformable};
-use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::{Volume, VolumeInit, Voxels};
 
 /// Asserts that a mesh is closed, oriented and manifold, has the predicted Euler characteristic, and has no
 /// self-intersections.
@@ -53,15 +53,7 @@ fn volume(bytes: &mut Choices, dims: [usize; 4]) -> Volume {
     };
     let values = (0..nx * ny * nz * frames).map(value).collect();
     let affine = DAffine3::from_rotation_z(bytes.within(-3.0, 3.0)) * DAffine3::from_scale(spacing);
-    let init = VolumeInit {
-        voxels: Voxels::F32(values),
-        dims,
-        affine,
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
-    };
+    let init = VolumeInit { affine, ..VolumeInit::new(Voxels::F32(values), dims) };
     Volume::new(init).unwrap_or_else(|_| flat())
 }
 
@@ -69,15 +61,7 @@ fn volume(bytes: &mut Choices, dims: [usize; 4]) -> Volume {
 fn flat() -> Volume {
     let voxels = Voxels::U8(vec![1; 27]);
     let affine = DAffine3::IDENTITY;
-    let init = VolumeInit {
-        voxels,
-        dims: [3, 3, 3, 1],
-        affine,
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
-    };
+    let init = VolumeInit { affine, ..VolumeInit::new(voxels, [3, 3, 3, 1]) };
     Volume::new(init).unwrap()
 }
 

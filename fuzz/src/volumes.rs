@@ -1,8 +1,8 @@
 //! Fuzz targets of the readers of volumes, and of the functions on a volume that was read.
 
-use vesicle::io::{parse_volume, write_nifti};
+use vesicle::io::{Compression, VolumeFormat, parse_volume, write_volume};
 use vesicle::math::DVec3;
-use vesicle::volume::{Enrichment, Volume, marching_cubes_world};
+use vesicle::volume::{Enrichment, Interpolation, ResampleGrid, Volume, marching_cubes_world};
 
 /// Largest number of voxels of a volume that [`check`] also samples, contours and writes.
 const FULL_CHECK_LIMIT: usize = 4096;
@@ -106,7 +106,7 @@ fn check(volume: &Volume) {
     write(volume);
 }
 
-/// Computes pyramid, binned volume and interpolated slices; errors are accepted, panics are findings.
+/// Computes pyramid, binned volume, interpolated slices, masks and resampled volumes; errors are accepted, panics are findings.
 fn derive(volume: &Volume) {
     let levels = volume.max_pyramid_levels(2.0).unwrap_or(0);
     let _ = volume.pyramid(levels.min(3), 2.0);
@@ -114,13 +114,27 @@ fn derive(volume: &Volume) {
     for method in [Enrichment::Flow, Enrichment::Linear] {
         let _ = volume.enrich_slices(Some(2), method);
     }
+    if let Some(label) = volume.labels(0).ok().and_then(|labels| labels.first().copied()) {
+        // Other frames may have intensities that are no labels.
+        assert!(volume.label(&[label.value]).is_err() || volume.dice(volume, Some(label.value)) == Ok(1.0));
+    }
+    let [low, high] = volume.range();
+    assert_eq!(volume.threshold(low, high).unwrap().dims(), volume.dims());
+    for how in [Interpolation::Linear, Interpolation::Nearest] {
+        let _ = volume.resample(ResampleGrid::Dims([3, 2, 4]), how);
+        let _ = volume.resample(ResampleGrid::Like(volume), how);
+    }
 }
 
-/// Writes the volume as NIfTI and, if that can be read again, asserts that dimensions and frames are the same.
+/// Writes the volume in each format and, if that can be read again, asserts that dimensions and frames are the same.
 fn write(volume: &Volume) {
-    let file = write_nifti(volume).unwrap();
-    if let Ok(again) = parse_volume(&file, None) {
-        assert_eq!(again.dims(), volume.dims());
-        assert_eq!(again.frames(), volume.frames());
+    for format in [VolumeFormat::Nifti, VolumeFormat::Nrrd, VolumeFormat::Mha] {
+        for compression in [Compression::None, Compression::Deflate] {
+            let file = write_volume(volume, format, compression).unwrap();
+            if let Ok(again) = parse_volume(&file, None) {
+                assert_eq!(again.dims(), volume.dims());
+                assert_eq!(again.frames(), volume.frames());
+            }
+        }
     }
 }

@@ -6,8 +6,8 @@
  * @module vesicle/niivue
  */
 import { invalid } from '../check.js';
+import type { Space, VolumeInit } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
-import type { Space, VolumeInit } from '../volume.js';
 import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';

@@ -1,7 +1,7 @@
 // Shared by the adapters: reads a mesh when it has changed, and validates the host's volumes.
 import { choice, invalid } from '../check.js';
+import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
-import type { Space, Vec3, VolumeInit, VoxelArray } from '../volume.js';
 
 /**
  * A changing surface that an adapter can show: a `Mesh`, the `mesh` of a model, or arrays of your own with two

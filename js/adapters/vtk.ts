@@ -6,7 +6,7 @@
  * @module vesicle/vtk
  */
 import { choice, invalid } from '../check.js';
-import type { Space, VolumeInit } from '../volume.js';
+import type { Space, VolumeInit } from '../data.js';
 import { affineOf, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';

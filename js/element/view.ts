@@ -2,8 +2,8 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { type MeshSource, ThreeSurface } from '../adapters/three.js';
+import type { Vec3 } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
-import type { Vec3 } from '../volume.js';
 
 const FIELD_OF_VIEW = 40;
 /** Upper bound of the device pixel ratio at which a `<vesicle-lab>` renders its surface. */

@@ -1,9 +1,9 @@
 /**
  * `vesicle` with the deformable model as its only method, in a smaller WebAssembly module of its own.
  *
- * All else is as in `vesicle`, and results are bit-identical. Objects belong to their module: a `Mesh` or `Volume` of
- * another entry point is a different type, and is passed on as bytes (`Mesh.parse(mesh.toBytes('ply'))`) or arrays
- * (`Mesh.fromArrays`, `new Volume`). Errors are those of `vesicle`.
+ * All else is as in `vesicle`, but without the readers of files and `enrichSlices`, and results are bit-identical.
+ * Objects belong to their module: a `Mesh` or `Volume` of another entry point is a different type, and is passed on as
+ * arrays (`Mesh.fromArrays`, `new Volume`), which `vesicle/import` returns for files. Errors are those of `vesicle`.
  *
  * @module vesicle/deformable
  */

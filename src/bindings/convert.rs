@@ -8,8 +8,9 @@ use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::math::{DAffine3, DVec3, Vec2, Vec3};
 use crate::methods::{ParamInput, ParamSpec, Parameters};
+use crate::volume::{LengthUnit, Space};
 
 #[wasm_bindgen]
 extern "C" {
@@ -55,6 +56,14 @@ pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
     Ok(floats(array)?.chunks_exact(2).map(Vec2::from_slice).collect())
 }
 
+/// Converts an array of u and v of the three corners of each triangle in turn to texture coordinates; an incomplete last
+/// triangle is dropped.
+pub fn corner_coordinates(array: &Float32Array) -> Result<Vec<[Vec2; 3]>, Failure> {
+    let all = coordinates(array)?;
+    let (corners, _) = all.as_chunks::<3>();
+    Ok(corners.to_vec())
+}
+
 /// Converts an array of the three vertex indices of each triangle in turn to triangles; an incomplete last triple is
 /// dropped.
 pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
@@ -74,6 +83,43 @@ pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
 /// Converts points to an array of x, y and z of each in turn.
 pub fn packed(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(|point| point.to_array()).collect()
+}
+
+/// Converts texture coordinates to an array of u and v of each in turn.
+pub fn flat(coordinates: &[Vec2]) -> Vec<f32> {
+    coordinates.iter().flat_map(|uv| uv.to_array()).collect()
+}
+
+/// Returns the sixteen numbers of the 4 × 4 matrix of an affine transform, column by column.
+pub fn columns(affine: DAffine3) -> Vec<f64> {
+    let columns = affine.to_cols_array();
+    let (columns, _) = columns.as_chunks::<3>();
+    let last_row = [0.0, 0.0, 0.0, 1.0];
+    columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
+}
+
+/// Returns the name of a space of world coordinates.
+pub fn space_name(space: Space) -> &'static str {
+    match space {
+        Space::Ras => "RAS",
+        Space::Lps => "LPS",
+    }
+}
+
+/// Returns the name of a unit of length; that of the unknown one is empty.
+pub fn unit_name(unit: LengthUnit) -> &'static str {
+    match unit {
+        LengthUnit::Unknown => "",
+        LengthUnit::Metre => "m",
+        LengthUnit::Millimetre => "mm",
+        LengthUnit::Micrometre => "um",
+    }
+}
+
+/// Returns the unit of length of a name, as [`unit_name`] returns it; unknown for any other.
+pub fn unit_named(name: &str) -> LengthUnit {
+    let known = [LengthUnit::Metre, LengthUnit::Millimetre, LengthUnit::Micrometre];
+    known.into_iter().find(|&unit| unit_name(unit) == name).unwrap_or_default()
 }
 
 /// Converts a serialisable value to plain objects and arrays, in which `None` is `undefined`.

@@ -8,6 +8,7 @@ use crate::io::FormatError;
 use crate::mesh::MeshError;
 use crate::methods::MethodError;
 use crate::volume::VolumeError;
+#[cfg(feature = "labels")]
 use crate::voxelise::VoxeliseError;
 
 /// An error with the code and message that JavaScript receives.
@@ -67,6 +68,7 @@ impl From<VolumeError> for Failure {
     }
 }
 
+#[cfg(feature = "labels")]
 impl From<VoxeliseError> for Failure {
     fn from(error: VoxeliseError) -> Self {
         match error {

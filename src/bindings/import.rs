@@ -1,21 +1,19 @@
-//! Bindings of the readers of volume, mesh and point files.
+//! Bindings of the readers of volume and mesh files, as constructors of the classes.
 
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, packed};
-use super::error::Failure;
-use super::mesh::{RawMesh, RawTexture, triangle_list};
+use super::mesh::{RawMesh, triangle_list};
+use super::readers::{read_mesh, read_volume};
+use super::texture::RawTexture;
 use super::volume::RawVolume;
-use crate::io::{PointCloud, parse_mesh, parse_points, parse_textured_mesh, parse_volume};
 
 #[wasm_bindgen]
 impl RawVolume {
     /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of
     /// its own.
     pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
-        let payload = data.as_ref().map(bytes).transpose()?;
-        Ok(RawVolume(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
+        Ok(RawVolume(read_volume(file, data.as_ref())?))
     }
 }
 
@@ -24,38 +22,6 @@ impl RawMesh {
     /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
     /// given.
     pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
-        let file = bytes(file)?;
-        let mesh = match texture {
-            Some(texture) => parse_textured_mesh(&file, texture.0),
-            None => parse_mesh(&file),
-        };
-        Ok(RawMesh(triangle_list(mesh.map_err(Failure::from)?)))
-    }
-}
-
-/// The raw handle of a point cloud that was read from a file.
-#[wasm_bindgen]
-pub struct RawPoints(PointCloud);
-
-#[wasm_bindgen]
-impl RawPoints {
-    /// Reads a point cloud from the bytes of a PLY, OBJ or text file.
-    pub fn parse(file: &Uint8Array) -> Result<RawPoints, JsValue> {
-        Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
-    }
-
-    /// Returns the positions of the points as packed xyz.
-    pub fn points(&self) -> Vec<f32> {
-        packed(&self.0.points)
-    }
-
-    /// Returns the normals as packed xyz, if the file has them.
-    pub fn normals(&self) -> Option<Vec<f32>> {
-        self.0.normals.as_deref().map(packed)
-    }
-
-    /// Returns the colours as red, green and blue of each point in turn, in 0..1, if the file has them.
-    pub fn colors(&self) -> Option<Vec<f32>> {
-        self.0.colors.as_deref().map(packed)
+        Ok(RawMesh(triangle_list(read_mesh(file, texture)?)))
     }
 }

@@ -2,20 +2,18 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
-use std::sync::Arc;
 
-use js_sys::{Float32Array, Reflect, Uint8Array, Uint32Array};
+use js_sys::{Float32Array, Reflect, Uint32Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, coordinates, packed, point, points, to_js, triangles};
+use super::convert::{coordinates, corner_coordinates, flat, packed, point, points, to_js, triangles};
 use super::error::Failure;
+use super::texture::RawTexture;
 use super::volume::RawVolume;
 use crate::io::{MeshFormat, write_mesh};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{
-    Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic_distances, measure, report,
-};
+use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report};
 use crate::methods::LiveSurface;
 use crate::remesh::{
     Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
@@ -38,6 +36,33 @@ pub(super) enum MeshKind {
 #[wasm_bindgen]
 pub struct RawMesh(pub(super) MeshKind);
 
+/// Arrays and texture of a mesh, besides positions and triangles.
+#[wasm_bindgen]
+pub struct RawExtra(TriangleMesh);
+
+#[wasm_bindgen]
+impl RawExtra {
+    /// Copies what is given: normal, texture coordinates and colour of each vertex, texture coordinates of the three
+    /// corners of each triangle, and a texture.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        normals: Option<Float32Array>,
+        uvs: Option<Float32Array>,
+        corner_uvs: Option<Float32Array>,
+        colors: Option<Float32Array>,
+        texture: Option<RawTexture>,
+    ) -> Result<RawExtra, JsValue> {
+        Ok(RawExtra(TriangleMesh {
+            normals: normals.as_ref().map(points).transpose()?,
+            uvs: uvs.as_ref().map(coordinates).transpose()?,
+            corner_uvs: corner_uvs.as_ref().map(corner_coordinates).transpose()?,
+            colors: colors.as_ref().map(points).transpose()?,
+            texture: texture.map(|texture| texture.0),
+            ..TriangleMesh::default()
+        }))
+    }
+}
+
 /// A snapshot of a mesh's arrays, from which each can be copied to JavaScript.
 #[wasm_bindgen]
 pub struct RawArrays(Rc<TriangleMesh>);
@@ -59,21 +84,14 @@ impl RawMesh {
     }
 
     /// Creates a triangle list from copies of arrays: x, y and z of each vertex in turn, three vertex indices per
-    /// triangle, and, if given, u and v of each vertex and a texture.
+    /// triangle, and what else is given.
     #[wasm_bindgen(js_name = fromArrays)]
     pub fn from_arrays(
         positions: &Float32Array,
         indices: &Uint32Array,
-        uvs: Option<Float32Array>,
-        texture: Option<RawTexture>,
+        extra: RawExtra,
     ) -> Result<RawMesh, JsValue> {
-        let mesh = TriangleMesh {
-            positions: points(positions)?,
-            triangles: triangles(indices)?,
-            uvs: uvs.as_ref().map(coordinates).transpose()?,
-            texture: texture.map(|texture| texture.0),
-            ..TriangleMesh::default()
-        };
+        let mesh = TriangleMesh { positions: points(positions)?, triangles: triangles(indices)?, ..extra.0 };
         Ok(RawMesh(triangle_list(mesh)))
     }
 
@@ -316,35 +334,6 @@ impl RawMesh {
     }
 }
 
-/// The texture of a mesh: an image file in memory.
-#[wasm_bindgen]
-pub struct RawTexture(pub(super) Arc<Texture>);
-
-#[wasm_bindgen]
-impl RawTexture {
-    /// Creates a texture from the bytes of an image file; a failure if their media type is not `kind`.
-    #[wasm_bindgen(constructor)]
-    pub fn new(kind: &str, file: &Uint8Array) -> Result<RawTexture, JsValue> {
-        let texture = Texture::new(bytes(file)?).map_err(Failure::from)?;
-        let found = texture.kind().media_type();
-        if found != kind {
-            let problem = format!("declared as {kind}, but the bytes are {found}");
-            return Err(Failure::invalid("texture", &problem).into());
-        }
-        Ok(RawTexture(Arc::new(texture)))
-    }
-
-    /// Returns the media type of the image, such as `image/png`.
-    pub fn kind(&self) -> String {
-        self.0.kind().media_type().to_owned()
-    }
-
-    /// Returns the bytes of the image file.
-    pub fn bytes(&self) -> Vec<u8> {
-        self.0.bytes().to_vec()
-    }
-}
-
 #[wasm_bindgen]
 impl RawArrays {
     /// Returns the number of vertices of the snapshot.
@@ -375,8 +364,7 @@ impl RawArrays {
 
     /// Returns the texture coordinates as u and v of each vertex in turn, if the mesh has any.
     pub fn uvs(&self) -> Option<Vec<f32>> {
-        let uvs = self.0.uvs.as_ref()?;
-        Some(uvs.iter().flat_map(|uv| uv.to_array()).collect())
+        self.0.uvs.as_deref().map(flat)
     }
 
     /// Returns the colours as red, green and blue of each vertex in turn, in 0..1, if the mesh has any.

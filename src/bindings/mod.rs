@@ -3,6 +3,7 @@
 //! These exports are private to the npm package. Its public classes are the TypeScript ones in `js/`, which hold these
 //! as raw handles and check all arguments first.
 
+#[cfg(feature = "processing")]
 mod animation;
 mod convert;
 #[cfg(feature = "deformable")]
@@ -10,17 +11,28 @@ mod deformable;
 #[cfg(feature = "enrich")]
 mod enrich;
 mod error;
+#[cfg(all(feature = "import", not(feature = "processing")))]
+mod files;
 #[cfg(feature = "implicit")]
 mod implicit;
-#[cfg(feature = "import")]
+#[cfg(all(feature = "import", feature = "processing"))]
 mod import;
+#[cfg(feature = "labels")]
+mod labels;
+#[cfg(feature = "processing")]
 mod mesh;
+#[cfg(feature = "processing")]
 mod method;
 #[cfg(feature = "multires")]
 mod multires;
+#[cfg(feature = "import")]
+mod readers;
+mod texture;
 #[cfg(feature = "tracking")]
 mod tracking;
+#[cfg(feature = "processing")]
 mod volume;
+#[cfg(feature = "labels")]
 mod voxelise;
 
 use wasm_bindgen::prelude::wasm_bindgen;

@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{copy_array, point};
+use super::convert::{columns, copy_array, point, space_name, unit_named};
 use super::error::Failure;
 use crate::io::write_nifti;
 use crate::math::DAffine3;
@@ -49,7 +49,13 @@ impl RawVolume {
         Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
     }
 
-    /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if a dimension exceeds 32,767.
+    /// Returns the volume with the length of a world unit set to `m`, `mm` or `um`; anything else means unknown.
+    #[wasm_bindgen(js_name = withUnit)]
+    pub fn with_unit(self, unit: &str) -> RawVolume {
+        RawVolume(self.0.with_unit(unit_named(unit)))
+    }
+
+    /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if that cannot represent the volume.
     #[wasm_bindgen(js_name = toNifti)]
     pub fn to_nifti(&self) -> Result<Vec<u8>, JsValue> {
         Ok(write_nifti(&self.0).map_err(Failure::from)?)
@@ -73,20 +79,13 @@ impl RawVolume {
     /// Returns the transform from voxel indices to world space: the sixteen numbers of a 4 × 4 matrix, column by
     /// column.
     pub fn affine(&self) -> Vec<f64> {
-        let columns = self.0.affine().to_cols_array();
-        let (columns, _) = columns.as_chunks::<3>();
-        let last_row = [0.0, 0.0, 0.0, 1.0];
-        columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
+        columns(self.0.affine())
     }
 
     /// Returns which anatomical directions the axes of world space have: `RAS` (right, anterior, superior) or `LPS`
     /// (left, posterior, superior).
     pub fn space(&self) -> String {
-        match self.0.space() {
-            Space::Ras => "RAS",
-            Space::Lps => "LPS",
-        }
-        .to_owned()
+        space_name(self.0.space()).to_owned()
     }
 
     /// Returns the smallest and the largest finite intensity of all frames.
@@ -158,7 +157,7 @@ impl RawFrames {
 }
 
 /// Copies a typed array of any element type that volumes support, without converting its values.
-fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
+pub(super) fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     macro_rules! of {
         ($($array:ty => $voxels:ident),*) => {
             $(if let Some(array) = data.dyn_ref::<$array>() {

@@ -62,7 +62,7 @@ impl DocumentBuilder {
     /// primitive's `attributes` object in JSON.
     fn attributes(&mut self, mesh: &TriangleMesh) -> String {
         let bounds = Bounds::from_points(&mesh.positions);
-        let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
+        let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{},{},{}]", p.x, p.y, p.z));
         let position =
             self.vectors(mesh.positions.iter().copied(), VERTICES, &format!(r#","min":{min},"max":{max}"#));
         // glTF requires unit normals: a vertex without one gets +z.
@@ -113,7 +113,7 @@ impl DocumentBuilder {
         let start = self.bytes.len();
         push_floats(&mut self.bytes, times);
         let [first, last] = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));
-        let bounds = format!(r#","min":[{first:?}],"max":[{last:?}]"#);
+        let bounds = format!(r#","min":[{first}],"max":[{last}]"#);
         self.accessor(start, None, [5126, times.len()], "SCALAR", &bounds)
     }
 

@@ -211,7 +211,7 @@ const fn crc_tables() -> [[u32; 256]; 8] {
 }
 
 /// Returns the CRC-32 checksum of the bytes, as gzip uses it.
-fn crc32(bytes: &[u8]) -> u32 {
+pub(super) fn crc32(bytes: &[u8]) -> u32 {
     let step = |crc: u32, byte: u8| (crc >> 8) ^ CRC[0][((crc ^ u32::from(byte)) & 255) as usize];
     let (eights, rest) = bytes.as_chunks::<8>();
     let crc = eights.iter().fold(!0, |crc: u32, eight| {

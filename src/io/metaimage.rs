@@ -12,7 +12,7 @@ use super::text::{Field, Lines};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
-const FORMAT: &str = "MetaImage";
+pub(super) const FORMAT: &str = "MetaImage";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 
 /// Returns whether the bytes start like a MetaImage header: with a `key = value` line of one of its usual first keys.

@@ -2,6 +2,7 @@
 
 mod animation;
 mod base64;
+mod deflate;
 mod detect;
 mod error;
 mod glb;
@@ -11,8 +12,10 @@ mod gltf_material;
 mod gzip;
 mod mesh_file;
 mod metaimage;
+mod metaimage_writer;
 mod mz3;
 mod nifti;
+mod nifti_writer;
 mod nrrd;
 mod obj;
 mod ply;
@@ -21,11 +24,13 @@ mod points;
 mod raw;
 mod stl;
 mod text;
+mod volume_file;
 mod vtp;
 
 pub use animation::{AnimationWriter, write_animation};
 pub use detect::parse_volume;
 pub use error::FormatError;
 pub use mesh_file::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh};
-pub use nifti::write_nifti;
+pub use nifti_writer::write_nifti;
 pub use points::{PointCloud, parse_points};
+pub use volume_file::{Compression, VolumeFormat, write_volume};

@@ -1,4 +1,4 @@
-//! Reader and writer of NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with the voxels in an .img of
+//! Reader of NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with the voxels in an .img of
 //! their own).
 //!
 //! World space is RAS. The affine is the sform if its code is positive, else the qform if its code is positive, else
@@ -10,14 +10,14 @@ use super::FormatError;
 use super::gzip::{gunzip, gunzip_start, is_gzip};
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_error};
 use crate::math::{DAffine3, DMat3, DVec3};
-use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+use crate::volume::{LengthUnit, Space, Volume, VolumeInit};
 
-const FORMAT: &str = "NIfTI";
+pub(super) const FORMAT: &str = "NIfTI";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 /// Size of a NIfTI-1 header in bytes, which is also the first number in the header and identifies the version.
-const SIZE_1: usize = 348;
+pub(super) const SIZE_1: usize = 348;
 /// Size of a NIfTI-2 header in bytes, which is also the first number in the header and identifies the version.
-const SIZE_2: usize = 540;
+pub(super) const SIZE_2: usize = 540;
 /// Size in bytes of the larger NIfTI header with the extension flag after it: the part of a file that is read or
 /// inflated to parse its header.
 const HEADER_ROOM: usize = SIZE_2 + 4;
@@ -464,134 +464,4 @@ impl Header {
         });
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
-}
-
-/// Returns the volume as an uncompressed little-endian NIfTI file: voxels as stored, world space converted to RAS, and
-/// the affine as sform.
-///
-/// The file is NIfTI-1, which stores the affine, slope and intercept in `f32`, or NIfTI-2 if a dimension or the number
-/// of frames exceeds 32,767.
-///
-/// # Errors
-/// [`FormatError::TooLarge`] if there is not enough memory for the file.
-pub fn write_nifti(volume: &Volume) -> Result<Vec<u8>, FormatError> {
-    let [nx, ny, nz] = volume.dims();
-    let dims = [nx, ny, nz, volume.frames()];
-    let (code, size) = datatype(volume.voxels());
-    let total = HEADER_ROOM + size * volume.voxels().len();
-    let mut out = Vec::new();
-    out.try_reserve_exact(total).map_err(|_| FormatError::too_large(FORMAT, "file", total as u64))?;
-    let header = if dims.iter().all(|&n| n <= i16::MAX as usize) { header_1 } else { header_2 };
-    header(&mut out, volume, dims, code, size);
-    append_voxels(&mut out, volume.voxels());
-    Ok(out)
-}
-
-/// Returns NIfTI's code of a voxel type and its size in bytes.
-fn datatype(voxels: &Voxels) -> (i16, usize) {
-    match voxels {
-        Voxels::U8(_) => (2, 1),
-        Voxels::I8(_) => (256, 1),
-        Voxels::U16(_) => (512, 2),
-        Voxels::I16(_) => (4, 2),
-        Voxels::U32(_) => (768, 4),
-        Voxels::I32(_) => (8, 4),
-        Voxels::F32(_) => (16, 4),
-        Voxels::F64(_) => (64, 8),
-    }
-}
-
-/// Appends the voxels to the bytes of a NIfTI file, as little-endian numbers.
-fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
-    match voxels {
-        Voxels::U8(values) => out.extend_from_slice(values),
-        Voxels::I8(values) => out.extend(values.iter().map(|v| v.cast_unsigned())),
-        Voxels::U16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        Voxels::I16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        Voxels::U32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        Voxels::I32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        Voxels::F32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-        Voxels::F64(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
-    }
-}
-
-/// Writes bytes into a NIfTI header at offset `at`; nothing if they do not fit.
-fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
-    if let Some(target) = out.get_mut(at..at + N) {
-        target.copy_from_slice(&bytes);
-    }
-}
-
-/// Writes a NIfTI-1 header for the volume to the empty `out`; `code` and `size` are the voxels' [`datatype`].
-fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
-    out.resize(352, 0);
-    put(out, 0, (SIZE_1 as i32).to_le_bytes());
-    for (i, v) in dim_field(dims).iter().enumerate() {
-        put(out, 40 + 2 * i, (*v as i16).to_le_bytes());
-    }
-    put(out, 70, code.to_le_bytes());
-    put(out, 72, (8 * size as i16).to_le_bytes());
-    for (i, v) in pixdim_field(volume).iter().enumerate() {
-        put(out, 76 + 4 * i, (*v as f32).to_le_bytes());
-    }
-    for (at, v) in [(108, 352.0), (112, volume.slope()), (116, volume.intercept())] {
-        put(out, at, (v as f32).to_le_bytes());
-    }
-    put(out, 123, [units_field(volume)]);
-    put(out, 254, 1i16.to_le_bytes());
-    for (i, v) in rows_in_ras(volume).iter().enumerate() {
-        put(out, 280 + 4 * i, (*v as f32).to_le_bytes());
-    }
-    put(out, 344, *b"n+1\0");
-}
-
-/// Writes a NIfTI-2 header for the volume to the empty `out`; `code` and `size` are the voxels' [`datatype`].
-fn header_2(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
-    out.resize(544, 0);
-    put(out, 0, (SIZE_2 as i32).to_le_bytes());
-    put(out, 4, *b"n+2\0\r\n\x1A\n");
-    put(out, 12, code.to_le_bytes());
-    put(out, 14, (8 * size as i16).to_le_bytes());
-    for (i, v) in dim_field(dims).iter().enumerate() {
-        put(out, 16 + 8 * i, (*v as i64).to_le_bytes());
-    }
-    for (i, v) in pixdim_field(volume).iter().enumerate() {
-        put(out, 104 + 8 * i, v.to_le_bytes());
-    }
-    put(out, 168, 544i64.to_le_bytes());
-    put(out, 176, volume.slope().to_le_bytes());
-    put(out, 184, volume.intercept().to_le_bytes());
-    put(out, 348, 1i32.to_le_bytes());
-    for (i, v) in rows_in_ras(volume).iter().enumerate() {
-        put(out, 400 + 8 * i, v.to_le_bytes());
-    }
-    put(out, 500, i32::from(units_field(volume)).to_le_bytes());
-}
-
-fn dim_field([nx, ny, nz, frames]: [usize; 4]) -> [usize; 8] {
-    [if frames > 1 { 4 } else { 3 }, nx, ny, nz, frames, 1, 1, 1]
-}
-
-fn pixdim_field(volume: &Volume) -> [f64; 8] {
-    let [x, y, z] = volume.spacing();
-    [1.0, x, y, z, volume.frame_seconds(), 0.0, 0.0, 0.0]
-}
-
-/// Returns the code of the volume's length unit together with that of seconds, for the field `xyzt_units`.
-fn units_field(volume: &Volume) -> u8 {
-    8 + match volume.unit() {
-        LengthUnit::Unknown => 0,
-        LengthUnit::Metre => 1,
-        LengthUnit::Millimetre => 2,
-        LengthUnit::Micrometre => 3,
-    }
-}
-
-/// Returns the upper three rows of the affine map from voxel indices to RAS world space, row-major, for the header's
-/// sform.
-fn rows_in_ras(volume: &Volume) -> [f64; 12] {
-    let a = volume.affine();
-    let sign = if volume.space() == Space::Lps { [-1.0, -1.0, 1.0] } else { [1.0; 3] };
-    let columns = [a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis, a.translation];
-    std::array::from_fn(|i| columns[i % 4][i / 4] * sign[i / 4])
 }

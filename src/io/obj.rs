@@ -227,7 +227,7 @@ fn line(text: &mut String, keyword: &str, numbers: &[f32]) {
     text.push_str(keyword);
     for x in numbers {
         // Writing to a string cannot fail.
-        let _ = write!(text, " {x:?}");
+        let _ = write!(text, " {x}");
     }
     text.push('\n');
 }

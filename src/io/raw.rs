@@ -1,4 +1,4 @@
-//! Conversion of the numbers in a volume file, binary or text, to voxels.
+//! Conversion of the numbers in a volume file, binary or text, to voxels, and of voxels to binary numbers.
 
 use super::FormatError;
 use crate::volume::{VolumeError, Voxels};
@@ -147,6 +147,30 @@ fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> 
             let problem = format!("64-bit voxels must be at most {MAX_EXACT} (2^53) in size, got {v}");
             Err(FormatError::invalid(name.format, name.field, problem))
         }
+    }
+}
+
+/// Returns the size in bytes of a stored voxel.
+pub(super) fn number_size(voxels: &Voxels) -> usize {
+    match voxels {
+        Voxels::U8(_) | Voxels::I8(_) => 1,
+        Voxels::U16(_) | Voxels::I16(_) => 2,
+        Voxels::U32(_) | Voxels::I32(_) | Voxels::F32(_) => 4,
+        Voxels::F64(_) => 8,
+    }
+}
+
+/// Appends the voxels to the bytes of a file, as little-endian numbers.
+pub(super) fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
+    match voxels {
+        Voxels::U8(values) => out.extend_from_slice(values),
+        Voxels::I8(values) => out.extend(values.iter().map(|v| v.cast_unsigned())),
+        Voxels::U16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::I16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::U32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::I32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::F32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::F64(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Axis-aligned bounding boxes, and a bounding volume hierarchy for overlap, nearest-box and ray queries.
 
-use super::order::{combined_rank, rank_f32};
+use super::order::{combined_rank, rank_f32, select_least};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
 
@@ -395,7 +395,7 @@ fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     let (axis, middle) = (bounds.widest_axis(), items.len() / 2);
     let mut ranked: Vec<(u64, u32)> =
         items.iter().map(|(b, i)| combined_rank(rank_f32(b.min[axis] + b.max[axis]), *i)).zip(0..).collect();
-    ranked.select_nth_unstable(middle);
+    select_least(&mut ranked, middle);
     let before = items.to_vec();
     items.iter_mut().zip(ranked).for_each(|(item, (_, i))| *item = before[i as usize]);
     let (left, right) = items.split_at_mut(middle);

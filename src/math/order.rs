@@ -46,15 +46,22 @@ pub fn sort_pairs(pairs: &mut [(u64, u32)]) {
     pairs.sort_unstable();
 }
 
+/// Moves the `count` least pairs of a rank and an index to the start, in any order, and the next one to position
+/// `count`, which must exist. Never inlined, as [`sort_distinct`].
+#[inline(never)]
+pub fn select_least(pairs: &mut [(u64, u32)], count: usize) {
+    pairs.select_nth_unstable(count);
+}
+
 /// Returns the median of numbers in the order of `f32::total_cmp`, the upper one of two; `None` without numbers.
 pub fn median(numbers: impl Iterator<Item = f32>) -> Option<f32> {
-    let mut ranks: Vec<u64> = numbers.map(|x| rank_f32(x).into()).collect();
-    if ranks.is_empty() {
+    let mut pairs: Vec<(u64, u32)> = numbers.map(|x| (0, rank_f32(x))).collect();
+    if pairs.is_empty() {
         return None;
     }
-    let middle = ranks.len() / 2;
-    let (_, &mut rank, _) = ranks.select_nth_unstable(middle);
-    Some(ranked_f32(rank as u32))
+    let middle = pairs.len() / 2;
+    select_least(&mut pairs, middle);
+    Some(ranked_f32(pairs[middle].1))
 }
 
 /// Sorts items in ascending order of the integer that `rank` returns for each; items of equal rank keep their order. At

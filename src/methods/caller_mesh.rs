@@ -4,7 +4,7 @@ use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 
 /// The smallest mean edge length accepted of a caller's mesh, in the units of its coordinates. With shorter edges,
-/// areas in single precision are rounded to few digits, or to 0.
+/// areas in single precision are rounded to few digits, or to 0. The message of [`check_edges`] names it.
 const MIN_MEAN_EDGE: f64 = 1e-12;
 
 /// Converts a caller's mesh to a [`Mesh`] after checking that it has triangles, is a closed manifold, passes
@@ -30,7 +30,7 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {
-        let problem = format!("the mean edge length must be ≥ {MIN_MEAN_EDGE:e}, got {edge:.1e}");
+        let problem = "the mean edge length must be ≥ 1e-12: use a smaller unit of length";
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! A hashed grid of points for neighbour queries; points can be inserted between queries.
 
 use crate::math::Vec3;
-use crate::math::order::{combined_rank, sort_ranks};
+use crate::math::order::{select_least, sort_pairs};
 
 /// Marks the end of a linked list of points, of which each hash bucket has one.
 const NONE: u32 = u32::MAX;
@@ -103,15 +103,15 @@ impl PointGrid {
             }
             reach *= 1.5;
         }
-        let mut ranked: Vec<u64> =
-            found.iter().map(|&(squared, i)| combined_rank(squared.to_bits(), i)).collect();
+        // Bits of non-negative numbers are ordered like the numbers.
+        let mut ranked: Vec<(u64, u32)> =
+            found.iter().map(|&(squared, i)| (squared.to_bits().into(), i)).collect();
         if ranked.len() > count {
-            ranked.select_nth_unstable(count);
+            select_least(&mut ranked, count);
             ranked.truncate(count);
         }
-        sort_ranks(&mut ranked);
-        // Bits of non-negative numbers are ordered like the numbers.
-        ranked.into_iter().map(|rank| (f32::from_bits((rank >> 32) as u32), rank as u32)).collect()
+        sort_pairs(&mut ranked);
+        ranked.into_iter().map(|(squared, i)| (f32::from_bits(squared as u32), i)).collect()
     }
 
     fn visit_cell(

@@ -97,13 +97,10 @@ mod tests {
             }
         }
         Volume::new(VolumeInit {
-            voxels: Voxels::F32(values),
-            dims: [7, 6, 4, 2],
             affine,
-            slope: 1.0,
-            intercept: 0.0,
             frame_seconds: 0.5,
             space: Space::Lps,
+            ..VolumeInit::new(Voxels::F32(values), [7, 6, 4, 2])
         })
         .unwrap()
     }

@@ -256,7 +256,7 @@ mod tests {
     use super::*;
     use crate::math::{DMat3, DVec3, Random};
     use crate::mesh::count_self_intersections;
-    use crate::volume::{Space, VolumeInit, Voxels};
+    use crate::volume::{VolumeInit, Voxels};
     use std::collections::BTreeMap;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -411,13 +411,8 @@ mod tests {
         let grid = ball(16, 5.0);
         let volume = |x: f64| {
             Volume::new(VolumeInit {
-                voxels: Voxels::F32(grid.values.clone()),
-                dims: [16, 16, 16, 1],
                 affine: DAffine3::from_scale(DVec3::new(x, 2.0, 1.0)),
-                slope: 1.0,
-                intercept: 0.0,
-                frame_seconds: 0.0,
-                space: Space::Ras,
+                ..VolumeInit::new(Voxels::F32(grid.values.clone()), [16, 16, 16, 1])
             })
             .unwrap()
         };

@@ -25,19 +25,28 @@
 mod binning;
 mod contour;
 mod coverage;
+mod crop;
 mod cube_cases;
+mod dice;
 mod enrich;
 mod error;
 mod flow;
 mod grid;
 mod inside;
+mod labels;
 mod pyramid;
+mod region;
+mod resample;
 mod row_sweep;
+mod same_grid;
 mod sampling;
 mod sequence;
 mod slices;
 mod surface_extractor;
+mod threshold;
+mod unscaled;
 mod voxels;
+mod write;
 
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use coverage::coverage;
@@ -46,6 +55,9 @@ pub use error::VolumeError;
 pub(crate) use error::filled;
 pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::{FillRule, for_each_inside, voxels_inside};
+pub use labels::LabelCount;
+pub use region::Region;
+pub use resample::{Interpolation, ResampleGrid};
 pub(crate) use sampling::trilinear;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
@@ -96,6 +108,15 @@ pub struct VolumeInit {
     pub frame_seconds: f64,
     /// Orientation of the world axes relative to the patient.
     pub space: Space,
+}
+
+impl VolumeInit {
+    /// Returns the arguments of a volume whose stored values are its intensities, with voxels of size 1 from the origin
+    /// on, in RAS, and without a time between frames.
+    pub fn new(voxels: Voxels, dims: [usize; 4]) -> Self {
+        let affine = DAffine3::IDENTITY;
+        Self { voxels, dims, affine, slope: 1.0, intercept: 0.0, frame_seconds: 0.0, space: Space::Ras }
+    }
 }
 
 /// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
@@ -153,16 +174,9 @@ impl Volume {
     /// # Errors
     /// As [`Volume::new`].
     pub fn with_voxels(&self, voxels: Voxels) -> Result<Volume, VolumeError> {
-        let [x, y, z] = self.dims();
-        let volume = Volume::new(VolumeInit {
-            voxels,
-            dims: [x, y, z, 1],
-            affine: self.affine,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: self.space,
-        })?;
+        let [nx, ny, nz] = self.dims();
+        let Self { affine, space, .. } = *self;
+        let volume = Volume::new(VolumeInit { affine, space, ..VolumeInit::new(voxels, [nx, ny, nz, 1]) })?;
         Ok(volume.with_unit(self.unit))
     }
 
@@ -191,6 +205,13 @@ impl Volume {
     /// Returns the map from voxel index to world coordinates.
     pub fn affine(&self) -> DAffine3 {
         self.affine
+    }
+
+    /// Returns the map from voxel index to world coordinates in the given space: RAS and LPS differ in the signs of x
+    /// and y.
+    pub fn affine_in(&self, space: Space) -> DAffine3 {
+        let sign = if space == self.space { 1.0 } else { -1.0 };
+        DAffine3::from_scale(DVec3::new(sign, sign, 1.0)) * self.affine
     }
 
     /// Returns the map from world coordinates to voxel index.
@@ -289,6 +310,25 @@ impl Volume {
         }
         let p = self.inverse.transform_point3(world);
         Ok(trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
+    }
+
+    /// Returns the arguments of [`Volume::new`] for a volume with other voxels and everything else as in this one.
+    fn init_with(&self, voxels: Voxels) -> VolumeInit {
+        VolumeInit {
+            voxels,
+            dims: self.dims,
+            affine: self.affine,
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+        }
+    }
+
+    /// Returns the volume of the 0/1 mask `values`, one per voxel of all frames, on the grid of this volume.
+    fn mask(&self, values: Vec<u8>) -> Result<Volume, VolumeError> {
+        let init = VolumeInit { slope: 1.0, intercept: 0.0, ..self.init_with(Voxels::U8(values)) };
+        Ok(Volume::new(init)?.with_unit(self.unit))
     }
 
     /// Returns the number of voxels in one frame.
@@ -400,7 +440,7 @@ fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> 
     if furthest <= f64::from(f32::MAX) {
         return Ok(());
     }
-    let problem = format!("maps a corner of the volume to {furthest:e}, beyond the range of f32 (3.4e38)");
+    let problem = format!("maps a corner of the volume to {furthest}, beyond the range of f32 (3.4e38)");
     Err(VolumeError::invalid("affine", problem))
 }
 
@@ -417,12 +457,21 @@ fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 
     let Some(stored) = voxels.finite_range() else {
         return Err(VolumeError::invalid("data", "at least one voxel must be finite"));
     };
+    scaled_range(stored, slope, intercept)
+}
+
+/// Returns the intensities at the ends of a range of stored values, the lower one first; an error if `f32` cannot
+/// represent them.
+fn scaled_range(stored: [f64; 2], slope: f64, intercept: f64) -> Result<[f64; 2], VolumeError> {
     let ends = stored.map(|v| v * slope + intercept);
-    let range = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
-    if range.iter().all(|v| v.abs() <= f64::from(f32::MAX)) {
-        return Ok(range);
+    let [low, high] = if ends[0] <= ends[1] { ends } else { [ends[1], ends[0]] };
+    if [low, high].iter().all(|v| v.abs() <= f64::from(f32::MAX)) {
+        return Ok([low, high]);
     }
-    Err(VolumeError::invalid("data", format!("intensities {range:?} exceed the range of f32 (3.4e38)")))
+    Err(VolumeError::invalid(
+        "data",
+        format!("intensities from {low} to {high} exceed the range of f32 (3.4e38)"),
+    ))
 }
 
 #[cfg(test)]

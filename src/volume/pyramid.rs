@@ -85,13 +85,10 @@ impl Volume {
             values.extend_from_slice(&frame.values);
         }
         let volume = Volume::new(VolumeInit {
-            voxels: Voxels::F32(values),
-            dims: [dims[0], dims[1], dims[2], frames.len()],
             affine: self.affine * index_map,
-            slope: 1.0,
-            intercept: 0.0,
             frame_seconds: self.frame_seconds,
             space: self.space,
+            ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], frames.len()])
         })?;
         Ok(volume.with_unit(self.unit))
     }
@@ -245,13 +242,9 @@ mod tests {
             values.push(f(affine.transform_point3(index)) as f32);
         }
         Volume::new(VolumeInit {
-            voxels: Voxels::F32(values),
-            dims: [dims[0], dims[1], dims[2], 1],
             affine,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
             space: crate::volume::Space::Ras,
+            ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], 1])
         })
         .unwrap()
     }

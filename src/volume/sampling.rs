@@ -76,20 +76,21 @@ pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
 
 /// Returns the value trilinearly interpolated at `p`, in continuous voxel indices, in `f64`; `value` returns the value
 /// of a voxel by its index in the frame. Outside the grid the border is replicated.
+#[inline]
 pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
-    let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
-    let at = |corner: [usize; 3]| {
-        let [x, y, z] = [0, 1, 2].map(|axis| axes[axis].0[corner[axis]]);
-        value(x + dims[0] * (y + dims[1] * z))
-    };
-    let mix = |a: f64, b: f64, axis: usize| a + (b - a) * axes[axis].1;
-    let along_x = |y, z| mix(at([0, y, z]), at([1, y, z]), 0);
-    let along_xy = |z| mix(along_x(0, z), along_x(1, z), 1);
-    mix(along_xy(0), along_xy(1), 2)
+    let [row, plane] = [dims[0], dims[0] * dims[1]];
+    let (x, fx) = locate_f64(p.x, dims[0]);
+    let (y, fy) = locate_f64(p.y, dims[1]);
+    let (z, fz) = locate_f64(p.z, dims[2]);
+    let mix = |a: f64, b: f64, fraction: f64| a + (b - a) * fraction;
+    let along_x = |start: usize| mix(value(start + x[0]), value(start + x[1]), fx);
+    let along_xy = |start: usize| mix(along_x(start + y[0] * row), along_x(start + y[1] * row), fy);
+    mix(along_xy(z[0] * plane), along_xy(z[1] * plane), fz)
 }
 
 /// Returns the indices of the two voxels around coordinate `x` on an axis of `n` voxels and the fractional position
 /// between them, with `x` clamped to [0, n-1].
+#[inline]
 pub(super) fn locate_f64(x: f64, n: usize) -> ([usize; 2], f64) {
     let last = (n - 1) as f64;
     let x = if x > 0.0 { x } else { 0.0 };

@@ -1,13 +1,9 @@
 //! Concatenation of 3D volumes into a 4D volume.
 
 use super::error::VolumeError;
+use super::same_grid::grid_difference;
 use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
-use crate::math::DVec3;
-
-/// Largest accepted distance between corresponding corners of two frames of a sequence, in voxels: allows for rounding
-/// in file headers only.
-const GRID_TOLERANCE: f64 = 1e-3;
 
 impl Volume {
     /// Concatenates volumes on one grid, in order, into the frames of a 4D volume. A 4D volume contributes all its
@@ -68,25 +64,16 @@ fn check_same_grid(first: &Volume, frame: &Volume, index: usize) -> Result<(), V
         let problem = format!("frame {index} differs from frame 0 in {what}; all frames must share one grid");
         Err(VolumeError::invalid("frames", problem))
     };
-    if frame.dims() != first.dims() {
-        return differs("dimensions");
+    if frame.unit != first.unit {
+        return differs("unit");
     }
-    if frame.space != first.space || frame.unit != first.unit {
-        return differs("space or unit");
-    }
-    let last = DVec3::from(first.dims().map(|n| n as f64));
-    let corners = [DVec3::ZERO, last.with_y(0.0).with_z(0.0), last.with_x(0.0).with_z(0.0), last];
-    let moved = |p: DVec3| first.inverse.transform_point3(frame.affine.transform_point3(p)).distance(p);
-    if corners.iter().any(|&p| moved(p) > GRID_TOLERANCE) {
-        return differs("position");
-    }
-    Ok(())
+    grid_difference(first, frame).map_or(Ok(()), differs)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DAffine3;
+    use crate::math::{DAffine3, DVec3};
     use crate::volume::{LengthUnit, Space};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;

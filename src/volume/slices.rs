@@ -79,24 +79,15 @@ impl Volume {
 
 #[cfg(test)]
 mod tests {
-    use crate::math::DAffine3;
-    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+
+    use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Returns a volume in which voxel (x, y, z) of frame t has the value x + 10y + 100z + 50t.
     fn volume() -> Volume {
         let value = |i: usize| (i % 4 + 10 * (i / 4 % 3) + 100 * (i / 12 % 2) + 50 * (i / 24)) as u8;
-        Volume::new(VolumeInit {
-            voxels: Voxels::U8((0..48).map(value).collect()),
-            dims: [4, 3, 2, 2],
-            affine: DAffine3::IDENTITY,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        })
-        .unwrap()
+        Volume::new(VolumeInit::new(Voxels::U8((0..48).map(value).collect()), [4, 3, 2, 2])).unwrap()
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Stored voxel values, in the numeric type of the file or the caller.
 
 use super::error::{VolumeError, reserve};
+use std::ops::Range;
 
 /// Array of voxel values as stored: x fastest, then y, z and time.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +41,73 @@ macro_rules! each {
 }
 pub(crate) use each;
 
+/// Evaluates an expression to a vector of numbers of the type of the vector inside `$voxels`, bound to `$values`, and
+/// returns it as [`Voxels`] of that type.
+macro_rules! map_each {
+    ($voxels:expr, $values:ident => $body:expr) => {
+        match $voxels {
+            Voxels::U8($values) => Voxels::U8($body),
+            Voxels::I8($values) => Voxels::I8($body),
+            Voxels::U16($values) => Voxels::U16($body),
+            Voxels::I16($values) => Voxels::I16($body),
+            Voxels::U32($values) => Voxels::U32($body),
+            Voxels::I32($values) => Voxels::I32($body),
+            Voxels::F32($values) => Voxels::F32($body),
+            Voxels::F64($values) => Voxels::F64($body),
+        }
+    };
+}
+pub(crate) use map_each;
+
+/// Evaluates an expression with `$a` and `$b` bound to the typed vectors inside a pair of [`Voxels`] of one type, or
+/// `$otherwise` if their types differ.
+macro_rules! each_pair {
+    ($pair:expr, ($a:ident, $b:ident) => $body:expr, $otherwise:expr) => {
+        match $pair {
+            (Voxels::U8($a), Voxels::U8($b)) => $body,
+            (Voxels::I8($a), Voxels::I8($b)) => $body,
+            (Voxels::U16($a), Voxels::U16($b)) => $body,
+            (Voxels::I16($a), Voxels::I16($b)) => $body,
+            (Voxels::U32($a), Voxels::U32($b)) => $body,
+            (Voxels::I32($a), Voxels::I32($b)) => $body,
+            (Voxels::F32($a), Voxels::F32($b)) => $body,
+            (Voxels::F64($a), Voxels::F64($b)) => $body,
+            _ => $otherwise,
+        }
+    };
+}
+
+/// A number type in which voxels are stored.
+pub(crate) trait VoxelNumber: Copy + PartialOrd + Into<f64> {
+    /// Returns the number of this type nearest to `value`: integer types round ties away from zero, clamp to their
+    /// range, and give 0 for NaN.
+    fn nearest(value: f64) -> Self;
+}
+
+macro_rules! integer_voxels {
+    ($($number:ty),+) => { $(
+        impl VoxelNumber for $number {
+            fn nearest(value: f64) -> Self {
+                // `as` saturates at the ends of the type's range.
+                value.round() as $number
+            }
+        }
+    )+ };
+}
+integer_voxels!(u8, i8, u16, i16, u32, i32);
+
+impl VoxelNumber for f32 {
+    fn nearest(value: f64) -> Self {
+        value as f32
+    }
+}
+
+impl VoxelNumber for f64 {
+    fn nearest(value: f64) -> Self {
+        value
+    }
+}
+
 impl Voxels {
     /// Returns the number of voxels.
     pub fn len(&self) -> usize {
@@ -61,68 +129,88 @@ impl Voxels {
         each!(self, values => finite_range(values))
     }
 
+    /// Returns the number of finite stored values.
+    pub(crate) fn finite_count(&self) -> usize {
+        each!(self, values => finite_count(values))
+    }
+
+    /// Returns whether any stored value equals `value`, which must be one that this type can store.
+    pub(crate) fn contains(&self, value: f64) -> bool {
+        each!(self, values => contains(values, value))
+    }
+
     /// Converts `values` to the voxel type of `self`; for integer types, values are rounded and clamped to the range of
     /// the type, and NaN becomes 0.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub(crate) fn like(&self, values: &[f64]) -> Result<Voxels, VolumeError> {
-        // `as` saturates at the ends of the type's range.
-        macro_rules! whole {
-            ($kind:ident, $number:ty) => {{
-                let mut out = reserve(values.len())?;
-                out.extend(values.iter().map(|v| v.round() as $number));
-                Voxels::$kind(out)
-            }};
+        Ok(map_each!(self, stored => converted_like(stored, values)?))
+    }
+
+    /// Returns the voxels in the ranges of indices `runs`, one range after another; `count` is their number in all.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub(crate) fn gathered(
+        &self,
+        count: usize,
+        runs: impl Iterator<Item = Range<usize>>,
+    ) -> Result<Voxels, VolumeError> {
+        Ok(map_each!(self, values => {
+            let mut out = reserve(count)?;
+            runs.for_each(|run| out.extend_from_slice(&values[run]));
+            out
+        }))
+    }
+
+    /// Copies voxels of the same type, in order, to the ranges of indices `runs`, as many as there are; returns `false`,
+    /// and changes nothing, if the types differ.
+    pub(crate) fn overwrite(&mut self, runs: impl Iterator<Item = Range<usize>>, data: &Voxels) -> bool {
+        each_pair!((self, data), (to, from) => {
+            let mut rest = from.as_slice();
+            for run in runs {
+                let (row, after) = rest.split_at(run.len());
+                to[run].copy_from_slice(row);
+                rest = after;
+            }
+            true
+        }, false)
+    }
+
+    /// Returns a copy.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub(crate) fn try_clone(&self) -> Result<Voxels, VolumeError> {
+        self.gathered(self.len(), std::iter::once(0..self.len()))
+    }
+
+    /// Returns the name of the number type, for error messages.
+    pub(crate) fn type_name(&self) -> &'static str {
+        match self {
+            Voxels::U8(_) => "unsigned 8-bit integers",
+            Voxels::I8(_) => "signed 8-bit integers",
+            Voxels::U16(_) => "unsigned 16-bit integers",
+            Voxels::I16(_) => "signed 16-bit integers",
+            Voxels::U32(_) => "unsigned 32-bit integers",
+            Voxels::I32(_) => "signed 32-bit integers",
+            Voxels::F32(_) => "32-bit floats",
+            Voxels::F64(_) => "64-bit floats",
         }
-        Ok(match self {
-            Voxels::U8(_) => whole!(U8, u8),
-            Voxels::I8(_) => whole!(I8, i8),
-            Voxels::U16(_) => whole!(U16, u16),
-            Voxels::I16(_) => whole!(I16, i16),
-            Voxels::U32(_) => whole!(U32, u32),
-            Voxels::I32(_) => whole!(I32, i32),
-            Voxels::F32(_) => {
-                let mut out = reserve(values.len())?;
-                out.extend(values.iter().map(|&v| v as f32));
-                Voxels::F32(out)
-            }
-            Voxels::F64(_) => {
-                let mut out = reserve(values.len())?;
-                out.extend_from_slice(values);
-                Voxels::F64(out)
-            }
-        })
     }
 
     /// Appends voxels of the same type; returns `false`, and changes nothing, if the types differ.
     fn append(&mut self, other: &Voxels) -> bool {
-        match (self, other) {
-            (Voxels::U8(to), Voxels::U8(from)) => to.extend_from_slice(from),
-            (Voxels::I8(to), Voxels::I8(from)) => to.extend_from_slice(from),
-            (Voxels::U16(to), Voxels::U16(from)) => to.extend_from_slice(from),
-            (Voxels::I16(to), Voxels::I16(from)) => to.extend_from_slice(from),
-            (Voxels::U32(to), Voxels::U32(from)) => to.extend_from_slice(from),
-            (Voxels::I32(to), Voxels::I32(from)) => to.extend_from_slice(from),
-            (Voxels::F32(to), Voxels::F32(from)) => to.extend_from_slice(from),
-            (Voxels::F64(to), Voxels::F64(from)) => to.extend_from_slice(from),
-            _ => return false,
-        }
-        true
+        each_pair!((self, other), (to, from) => {
+            to.extend_from_slice(from);
+            true
+        }, false)
     }
 
     /// Returns an empty array of the same type with capacity for `count` voxels.
     fn empty_like(&self, count: usize) -> Result<Voxels, VolumeError> {
-        Ok(match self {
-            Voxels::U8(_) => Voxels::U8(reserve(count)?),
-            Voxels::I8(_) => Voxels::I8(reserve(count)?),
-            Voxels::U16(_) => Voxels::U16(reserve(count)?),
-            Voxels::I16(_) => Voxels::I16(reserve(count)?),
-            Voxels::U32(_) => Voxels::U32(reserve(count)?),
-            Voxels::I32(_) => Voxels::I32(reserve(count)?),
-            Voxels::F32(_) => Voxels::F32(reserve(count)?),
-            Voxels::F64(_) => Voxels::F64(reserve(count)?),
-        })
+        self.gathered(count, std::iter::empty())
     }
 
     /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ or `parts` is
@@ -142,17 +230,29 @@ fn number_at<T: Copy + Into<f64>>(values: &[T], index: usize) -> Option<f64> {
     values.get(index).map(|&v| v.into())
 }
 
-fn finite_range<T: Copy + PartialOrd + Into<f64>>(values: &[T]) -> Option<[f64; 2]> {
-    let mut finite = values.iter().copied().filter(|&v| v.into().is_finite());
-    let first = finite.next()?;
+fn finite_count<T: VoxelNumber>(values: &[T]) -> usize {
+    values.iter().filter(|&&v| v.into().is_finite()).count()
+}
+
+fn contains<T: VoxelNumber>(values: &[T], value: f64) -> bool {
+    values.contains(&T::nearest(value))
+}
+
+/// Converts `values` to the number type of `_stored`.
+fn converted_like<T: VoxelNumber>(_stored: &[T], values: &[f64]) -> Result<Vec<T>, VolumeError> {
+    let mut out = reserve(values.len())?;
+    out.extend(values.iter().map(|&value| T::nearest(value)));
+    Ok(out)
+}
+
+fn finite_range<T: VoxelNumber>(values: &[T]) -> Option<[f64; 2]> {
+    let is_finite = |v: T| v.into().is_finite();
+    let first = values.iter().copied().find(|&v| is_finite(v))?;
     let (mut low, mut high) = (first, first);
-    for v in finite {
-        if v < low {
-            low = v;
-        }
-        if v > high {
-            high = v;
-        }
+    // Without branches, which keeps the loop vectorisable.
+    for &v in values {
+        low = if is_finite(v) && v < low { v } else { low };
+        high = if is_finite(v) && v > high { v } else { high };
     }
     Some([low.into(), high.into()])
 }

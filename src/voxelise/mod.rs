@@ -1,20 +1,12 @@
 //! Voxelisation: volumes from closed meshes, on the grid of a given volume.
 //!
 //! ```
-//! use vesicle::math::{DAffine3, Vec3};
+//! use vesicle::math::Vec3;
 //! use vesicle::mesh::Mesh;
-//! use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+//! use vesicle::volume::{Volume, VolumeInit, Voxels};
 //! use vesicle::voxelise::{VoxelKind, voxelise};
 //!
-//! let grid = Volume::new(VolumeInit {
-//!     voxels: Voxels::U8(vec![0; 1000]),
-//!     dims: [10, 10, 10, 1],
-//!     affine: DAffine3::IDENTITY,
-//!     slope: 1.0,
-//!     intercept: 0.0,
-//!     frame_seconds: 0.0,
-//!     space: Space::Ras,
-//! })?;
+//! let grid = Volume::new(VolumeInit::new(Voxels::U8(vec![0; 1000]), [10, 10, 10, 1]))?;
 //! let ball = Mesh::icosphere(Vec3::splat(4.5), 3.0, 0.5)?.to_triangles();
 //! let mask = voxelise(&ball, &grid, VoxelKind::Mask { value: 7 })?;
 //! assert_eq!(mask.range(), [0.0, 7.0]);
@@ -91,10 +83,10 @@ fn mask(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3], value: u32) -> Resul
         }};
     }
     if value == 0 {
-        return Err(VolumeError::InvalidArgument {
-            parameter: "value",
-            problem: format!("must be an integer from 1 to {}, got 0", u32::MAX),
-        });
+        return Err(VolumeError::invalid(
+            "value",
+            format!("must be an integer from 1 to {}, got 0", u32::MAX),
+        ));
     }
     Ok(match (u8::try_from(value), u16::try_from(value)) {
         (Ok(value), _) => Voxels::U8(filled!(value)),

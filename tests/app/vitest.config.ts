@@ -8,7 +8,12 @@ const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `$
 
 export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
-  resolve: { alias: { vesicle: at('../../pkg/index.js') } },
+  resolve: {
+    alias: [
+      { find: /^vesicle$/, replacement: at('../../pkg/index.js') },
+      { find: /^vesicle\/import$/, replacement: at('../../pkg/import/index.js') },
+    ],
+  },
   test: {
     globalSetup: at('setup.ts'),
     dir: at('.'),

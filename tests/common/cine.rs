@@ -5,7 +5,7 @@
 use crate::common::Random;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::TriangleMesh;
-use vesicle::volume::{Grid, Space, Volume, VolumeInit, Voxels, marching_cubes};
+use vesicle::volume::{Grid, Volume, VolumeInit, Voxels, marching_cubes};
 
 /// Intensities before noise.
 const BLOOD: f64 = 200.0;
@@ -124,13 +124,9 @@ impl Cine {
             }
         }
         Volume::new(VolumeInit {
-            voxels: Voxels::U8(values),
-            dims: [nx, ny, nz, self.frames],
             affine: DAffine3::from_scale(self.spacing),
-            slope: 1.0,
-            intercept: 0.0,
             frame_seconds: 0.04,
-            space: Space::Ras,
+            ..VolumeInit::new(Voxels::U8(values), [nx, ny, nz, self.frames])
         })
         .unwrap()
     }

@@ -1,7 +1,7 @@
 //! Synthetic volumes with known surfaces.
 
 use vesicle::math::{DAffine3, Vec3};
-use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::{Volume, VolumeInit, Voxels};
 
 /// Returns a volume whose intensity at voxel index `p` is `value(p)`.
 pub fn volume(dims: [usize; 3], value: impl Fn(Vec3) -> f32) -> Volume {
@@ -13,16 +13,7 @@ pub fn volume(dims: [usize; 3], value: impl Fn(Vec3) -> f32) -> Volume {
 
 /// Returns a volume of unscaled voxels, placed in the world by `affine`.
 pub fn placed(voxels: Voxels, [nx, ny, nz]: [usize; 3], affine: DAffine3) -> Volume {
-    Volume::new(VolumeInit {
-        voxels,
-        dims: [nx, ny, nz, 1],
-        affine,
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
-    })
-    .unwrap()
+    Volume::new(VolumeInit { affine, ..VolumeInit::new(voxels, [nx, ny, nz, 1]) }).unwrap()
 }
 
 /// Returns an intensity that falls with the distance from a skeleton: 1 up to half of `radius`, 0.5 at `radius`, 0

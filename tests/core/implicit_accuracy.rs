@@ -121,6 +121,7 @@ fn as_good_as_poisson(noise: usize, params: &ImplicitParams) {
 /// shapes get up to five spurious components. Only one seed of three is run; the errors of the others differ by at most
 /// 7 %.
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn the_accuracy_at_the_defaults_is_as_recorded() {
     let mut cases = 0;
     for (noise, known) in (0..3).flat_map(|noise| ALL.iter().map(move |known| (noise, known))) {
@@ -138,16 +139,19 @@ fn the_accuracy_at_the_defaults_is_as_recorded() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn without_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(0, &usual());
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn with_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(1, &usual());
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn with_twice_the_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(2, &smoother());
 }

@@ -269,6 +269,7 @@ fn change(
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn every_run_gives_a_valid_surface_or_an_error() {
     let mut tally = Tally::default();
     for seed in seeds(SEEDS) {

@@ -168,6 +168,7 @@ fn seeding_after_merges_on_a_coarse_level_leaves_no_handles() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn random_shapes_have_the_right_components_and_holes() {
     let mut all = [0, 0];
     for seed in seeds(SEEDS) {

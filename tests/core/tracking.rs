@@ -6,7 +6,7 @@ use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_self_intersections,
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
-use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -198,13 +198,9 @@ fn tube(mirrored: bool) -> Volume {
     }
     let side = if mirrored { -1.5 } else { 1.5 };
     Volume::new(VolumeInit {
-        voxels: Voxels::U8(values),
-        dims: [28, 28, 30, 6],
         affine: DAffine3::from_scale(DVec3::new(side, 1.5, 1.5)),
-        slope: 1.0,
-        intercept: 0.0,
         frame_seconds: 0.1,
-        space: Space::Ras,
+        ..VolumeInit::new(Voxels::U8(values), [28, 28, 30, 6])
     })
     .unwrap()
 }
@@ -391,15 +387,7 @@ fn invalid_input_is_refused_by_name() {
     for bounds in [[DVec3::ONE, DVec3::ZERO], [DVec3::NAN, DVec3::ONE]] {
         assert_eq!(refused(TrackingOptions { bounds: Some(Bounds::World(bounds)), ..good() }).0, "box");
     }
-    let huge = Volume::new(VolumeInit {
-        voxels: Voxels::U8(vec![0; 280 * 280 * 280 * 2]),
-        dims: [280, 280, 280, 2],
-        affine: DAffine3::IDENTITY,
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
-    });
+    let huge = Volume::new(VolumeInit::new(Voxels::U8(vec![0; 280 * 280 * 280 * 2]), [280, 280, 280, 2]));
     let (parameter, problem) = refused(TrackingOptions { volume: huge.unwrap(), bounds: None, ..good() });
     assert!(parameter == "box" && problem.contains("a smaller box"), "{problem}");
     for voxels in [[[0; 3], [36; 3]], [[9; 3], [8; 3]], [[0; 3], [3, 3, 30]]] {

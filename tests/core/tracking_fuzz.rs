@@ -8,7 +8,7 @@ use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
-use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::{Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -40,13 +40,8 @@ fn random_volume(random: &mut Random) -> Volume {
     let spacing = DVec3::new(length(), length(), length());
     let turned = DAffine3::from_rotation_z(random.within(-3.0, 3.0));
     Volume::new(VolumeInit {
-        voxels: Voxels::F32(values),
-        dims: [nx, ny, nz, nt],
         affine: turned * DAffine3::from_scale(spacing),
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
+        ..VolumeInit::new(Voxels::F32(values), [nx, ny, nz, nt])
     })
     .unwrap()
 }

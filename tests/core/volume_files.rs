@@ -568,17 +568,12 @@ fn writing_and_reading_again_keeps_voxels_and_world() {
 #[test]
 fn dimensions_beyond_nifti_1_are_written_as_nifti_2() {
     let long = Volume::new(VolumeInit {
-        voxels: Voxels::I8((0..40_000).map(|i| (i % 100) as i8).collect()),
-        dims: [40_000, 1, 1, 1],
         affine: DAffine3::from_scale_rotation_translation(
             DVec3::splat(0.1),
             glam::DQuat::IDENTITY,
             DVec3::ONE,
         ),
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
+        ..VolumeInit::new(Voxels::I8((0..40_000).map(|i| (i % 100) as i8).collect()), [40_000, 1, 1, 1])
     })
     .unwrap();
     let bytes = write_nifti(&long).unwrap();

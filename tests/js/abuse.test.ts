@@ -115,6 +115,9 @@ const NAMES = [
     'texture',
     'cameras',
     'confidence',
+    'label',
+    'like',
+    'gzip',
   ],
 ];
 

@@ -48,6 +48,7 @@ export interface VolumeInit {
   frameSeconds?: number; // 4D only
   space?: 'RAS' | 'LPS'; // default RAS; meshes come back in the same space
 }
+export type VolumeFormat = 'nifti' | 'nrrd' | 'mha';
 export class Volume {
   constructor(init: VolumeInit);
   /**
@@ -59,6 +60,8 @@ export class Volume {
   static fromFrames(frames: Volume[], options?: { frameSeconds?: number }): Volume;
   /** NIfTI-1 bytes, for saving what was computed. */
   toNifti(): Uint8Array;
+  /** .nii or .nii.gz, .nrrd, .mha; the last two hold intensities if slope or intercept are not 1 and 0. */
+  toBytes(format: VolumeFormat, options?: { gzip?: boolean }): Uint8Array;
   readonly dims: Vec3;
   readonly frames: number;
   /** 0 if the volume has no time axis. */
@@ -81,6 +84,21 @@ export class Volume {
   binned(factors: Vec3): Volume;
   /** In-between slices by symmetric optical flow, so that spacing becomes close to isotropic. */
   enrichSlices(options?: { factor?: number; method?: 'flow' | 'linear' }): Volume;
+  /** Intensities other than 0, ascending; integer types and at most 65,536 labels. */
+  labels(frame?: number): { value: number; voxels: number }[];
+  /** 0/1 mask of one label or several. */
+  label(value: number | number[]): Volume;
+  /** 0/1 mask; both bounds are included and may be infinite. */
+  threshold(low: number, high: number): Volume;
+  /** Of one label, or of all voxels that are not 0; 1 if there are none. */
+  dice(other: Volume, options?: { label?: number }): number;
+  /** Index space, max excluded. */
+  crop(box: { min: Vec3; max: Vec3 }): Volume;
+  /** In the same field of view, or on another volume's grid with 0 outside this one. */
+  resample(grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume }, how?: 'linear' | 'nearest'): Volume;
+  frame(index: number): Volume;
+  /** In place; data in the type of the voxels, x fastest. */
+  write(region: { min: Vec3; dims: Vec3; data: VoxelArray }, frame?: number): void;
   free(): void;
   [Symbol.dispose](): void;
 }

@@ -7,6 +7,7 @@ import { fileURLToPath } from 'node:url';
 import { beforeAll, describe, expect, test } from 'vitest';
 import * as deformable from '../../pkg/deformable/index.js';
 import * as implicit from '../../pkg/implicit/index.js';
+import * as files from '../../pkg/import/index.js';
 import * as vesicle from '../../pkg/index.js';
 import * as multires from '../../pkg/multires/index.js';
 import * as tracking from '../../pkg/tracking/index.js';
@@ -14,6 +15,14 @@ import { beats, REACH, SECONDS } from './beating.js';
 import { BUMPS_BITS, bumpsBits } from './bumps.js';
 import { LAMP_BITS, lampBits } from './lamp.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
+
+/** Members of volumes that only the whole library has. */
+const LABEL_MAPS = ['crop', 'dice', 'frame', 'label', 'labels', 'resample', 'threshold', 'toBytes', 'write'];
+
+/** Members of meshes that only the whole library has. */
+const VOXELISATION = ['contains', 'smooth', 'toVolume', 'transform'];
+
+type VolumeInit = ConstructorParameters<typeof vesicle.Volume>[0];
 
 const root = fileURLToPath(new URL('../..', import.meta.url));
 
@@ -95,25 +104,138 @@ describe('an entry point with one method', () => {
     for (const other of METHODS.filter((one) => one !== method)) expect(() => specs(other)).toThrow(/^method: /);
   });
 
-  test.each(METHODS)('%s works with files, meshes and slices', (method) => {
+  test.each(METHODS)('%s works with meshes and volumes', (method) => {
     const { Mesh, Volume } = entries[method];
-    const sphere = Mesh.icosphere([0, 0, 0], 1, 0.3);
-    const copy = Mesh.parse(sphere.toBytes('ply'));
-    expect(copy.info().area).toBeCloseTo(sphere.info().area, 6);
+    const copy = Mesh.icosphere([0, 0, 0], 1, 0.3);
     copy.remesh({ min: 0.1, max: 0.3 });
     expect(copy.check()).toMatchObject({ closed: true, selfIntersections: 0 });
     const volume = new Volume({ data: Uint8Array.from({ length: 64 }, (_, i) => i), dims: [4, 4, 4] });
-    expect(Volume.parse(volume.toNifti()).enrichSlices({ factor: 2 }).dims).toEqual([4, 4, 7]);
+    expect(volume.pyramid(2, { factor: 2 }).map(({ dims }) => dims)).toEqual([
+      [4, 4, 4],
+      [2, 2, 2],
+    ]);
+  });
+
+  test('has no readers of files, nor, but for tracking, interpolation of slices', () => {
+    const { Mesh, Volume } = vesicle;
+    expect('parse' in Mesh && 'parse' in Volume && 'enrichSlices' in Volume.prototype).toBe(true);
+    for (const method of METHODS) {
+      const own = entries[method];
+      expect('parse' in own.Mesh || 'parse' in own.Volume).toBe(false);
+      expect('enrichSlices' in own.Volume.prototype).toBe(method === 'tracking');
+      const missing = (whole: object, part: object) =>
+        Object.getOwnPropertyNames(whole).filter((name) => !(name in part) && name !== 'enrichSlices');
+      expect(missing(Volume.prototype, own.Volume.prototype).sort()).toEqual(LABEL_MAPS);
+      expect(missing(Mesh.prototype, own.Mesh.prototype).sort()).toEqual(VOXELISATION);
+    }
+    // @ts-expect-error: the types have no readers either.
+    expect(() => deformable.Volume.parse(new Uint8Array(8))).toThrow(TypeError);
+    const image = { data: Float32Array.from({ length: 64 }, (_, i) => i), dims: [4, 4, 4] } as const;
+    const slices = new tracking.Volume({ ...image, dims: [...image.dims] }).enrichSlices({ factor: 2 });
+    expect(slices.dims).toEqual([4, 4, 7]);
   });
 
   test('throws the errors of vesicle, and takes no object of another module', () => {
     const mesh = vesicle.Mesh.icosphere([0, 0, 0], 1, 0.3);
     const work = () => new multires.MultiresolutionModel({ ellipsoids: [], detail: mesh as never });
     expect(work).toThrow(vesicle.VesicleError);
-    expect(() => multires.Mesh.parse(new Uint8Array(3))).toThrow(vesicle.VesicleError);
+    expect(() => multires.Mesh.icosphere([0, 0, 0], -1, 0.3)).toThrow(vesicle.VesicleError);
     const volume = new vesicle.Volume({ data: new Uint8Array(8), dims: [2, 2, 2] });
     expect(() => deformable.Mesh.marchingCubes(volume as never, 0.5)).toThrow(/^volume: must be a Volume/);
     // @ts-expect-error: a volume of another module is another type.
     expect(() => deformable.Mesh.marchingCubes(volume, 0.5)).toThrow(vesicle.VesicleError);
+  });
+});
+
+describe('vesicle/import', () => {
+  beforeAll(async () => {
+    for (const one of [vesicle, files, deformable]) await one.default();
+  });
+
+  const volumes: [string, VolumeInit][] = [
+    ...[Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, Float32Array, Float64Array].map(
+      (kind): [string, VolumeInit] => [kind.name, { data: new kind([...Array(24).keys()]), dims: [2, 3, 4] }],
+    ),
+    [
+      'a sequence with all that it can state',
+      {
+        data: Int16Array.from({ length: 48 }, (_, i) => 100 - 5 * i),
+        dims: [2, 3, 4, 2],
+        affine: [0, 2, 0, 0, -1.5, 0, 0, 0, 0, 0, 3, 0, 10, 20, 30, 1],
+        ...{ slope: 0.5, intercept: -8, frameSeconds: 0.25, space: 'RAS', unit: 'um' },
+      },
+    ],
+  ];
+
+  test.each(volumes)('reads the same volume as vesicle: %s', (_, init) => {
+    const bytes = new vesicle.Volume(init).toNifti();
+    const data = files.parseVolume(bytes);
+    expect(data.data).toEqual(init.data);
+    expect(data).toMatchObject({ dims: init.dims, slope: init.slope ?? 1, intercept: init.intercept ?? 0 });
+    expect(data.unit).toBe(init.unit);
+    // The unit, too, is in the file.
+    expect(new deformable.Volume(data).toNifti()).toEqual(vesicle.Volume.parse(bytes).toNifti());
+  });
+
+  test('reads the same meshes as vesicle, with all their arrays', () => {
+    const positions = Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1);
+    const indices = Uint32Array.of(0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3);
+    const image = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a);
+    const texture = { type: 'image/png', bytes: image } as const;
+    const seams = { cornerUvs: Float32Array.from({ length: 24 }, (_, i) => i / 24), texture };
+    const colors = { colors: Float32Array.from({ length: 12 }, (_, i) => i / 12) };
+    for (const extra of [{}, colors, seams]) {
+      const whole = vesicle.Mesh.fromArrays(positions, indices, extra);
+      for (const format of ['glb', 'ply', 'obj', 'stl'] as const) {
+        const bytes = whole.toBytes(format);
+        const { positions: points, indices: corners, ...rest } = files.parseMesh(bytes);
+        const copy = deformable.Mesh.fromArrays(points, corners, rest);
+        expect(copy.toBytes('glb')).toEqual(vesicle.Mesh.parse(bytes).toBytes('glb'));
+      }
+    }
+    const bytes = vesicle.Mesh.fromArrays(positions, indices, { uvs: new Float32Array(8) }).toBytes('obj');
+    expect(files.parseMesh(bytes, { texture }).texture).toEqual(texture);
+  });
+
+  test('reads the same points as vesicle', () => {
+    const bytes = new TextEncoder().encode('0 0 0 1 0 0\n1 2 3 0 1 0\n');
+    expect(files.parsePoints(bytes)).toEqual(vesicle.parsePoints(bytes));
+  });
+
+  test('explains what is wrong with a file, and reads the next', () => {
+    const bytes = new vesicle.Volume({ data: new Uint8Array(8), dims: [2, 2, 2] }).toNifti();
+    expect(() => files.parseVolume(bytes.subarray(0, 355))).toThrow(vesicle.VesicleError);
+    expect(() => files.parseVolume('' as never)).toThrow(/^bytes: must be a Uint8Array/);
+    expect(() => files.parseMesh(bytes)).toThrow(vesicle.VesicleError);
+    expect(files.parseVolume(bytes).dims).toEqual([2, 2, 2]);
+  });
+
+  test('gives back the memory of large files', () => {
+    const script = `
+      import { readFile } from 'node:fs/promises';
+      import { setFlagsFromString } from 'node:v8';
+      import { runInNewContext } from 'node:vm';
+      import * as vesicle from './pkg/index.js';
+      setFlagsFromString('--expose-gc');
+      const collect = runInNewContext('gc');
+      await vesicle.default();
+      const bytes = new vesicle.Volume({ data: new Uint8Array(3e7), dims: [300, 400, 250] }).toNifti();
+      const memories = [];
+      const watched = (instance) => {
+        memories.push(new WeakRef(instance.exports.memory));
+        return instance;
+      };
+      const { instantiate, Instance } = WebAssembly;
+      WebAssembly.instantiate = async (...given) => watched(await instantiate(...given));
+      WebAssembly.Instance = function (...given) { return watched(new Instance(...given)); };
+      WebAssembly.Instance.prototype = Instance.prototype;
+      const files = await import('./pkg/import/index.js');
+      await files.default();
+      const voxels = [0, 1].map(() => files.parseVolume(bytes).data.length);
+      await new Promise((resolve) => setTimeout(resolve));
+      collect();
+      const left = memories.map((memory) => memory.deref()?.buffer.byteLength ?? 0);
+      console.log(voxels, memories.length > 2, Math.max(...left) < 5e6);`;
+    expect(node(script)).toBe('[ 30000000, 30000000 ] true true');
   });
 });

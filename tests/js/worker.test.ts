@@ -60,6 +60,21 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
       await (await volume.enrichSlices({ factor: 2 })).intensities(),
     ];
   },
+  labels: async ({ Volume }) => {
+    const map = new Volume({ data: data.map((value) => Math.round(value / 100)), dims: DIMS, slope: 2 });
+    const other = new Volume({ data: data.map((value) => Math.round(value / 150)), dims: DIMS, slope: 2 });
+    const region = { min: [1, 2, 3], dims: [2, 1, 1], data: Uint8Array.of(1, 3) } as const;
+    await map.write({ ...region, min: [...region.min], dims: [...region.dims] });
+    const part = await map.crop({ min: [2, 4, 6], max: [20, 20, 20] });
+    return [
+      await Promise.all([map.labels(), map.range, map.dice(other), map.dice(other, { label: 2 })]),
+      await (await map.label([2, 4])).intensities(),
+      await (await map.threshold(1, 3)).intensities(),
+      await (await map.resample({ like: part }, 'nearest')).intensities(),
+      await (await part.resample({ dims: [5, 6, 7] })).intensities(),
+      await (await map.frame(0)).toBytes('nrrd', { gzip: true }),
+    ];
+  },
   mesh: async ({ Mesh, Volume }) => {
     const ball = await Mesh.icosphere([0, 0, 0], 1, 0.4);
     const { positions, indices } = await ball.arrays();

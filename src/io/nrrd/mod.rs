@@ -1,11 +1,11 @@
-//! Reader of NRRD versions 1 to 5: header and voxels in one file, or the voxels in a data file of their own.
+//! Reader and writer of NRRD.
 //!
-//! Up to three axes are spatial; one more, at any position among them, may count frames. Vectors and colours per voxel
-//! are rejected. Encodings: raw, text, hex, gzip. The space left-posterior-superior stays LPS; right-anterior-superior
-//! is RAS; left-anterior-superior becomes RAS by the sign of x; in other spaces, or if none is named, coordinates are
-//! kept and treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions, axes have
-//! the lengths in `spacings`, or 1 if `spacings` are unknown, too. The files of a list of data files are concatenated
-//! in order.
+//! Versions 1 to 5 are read, with header and voxels in one file, or the voxels in a data file of their own. Up to three
+//! axes are spatial; one more, at any position among them, may count frames. Vectors and colours per voxel are rejected.
+//! Encodings: raw, text, hex, gzip. The space left-posterior-superior stays LPS; right-anterior-superior is RAS;
+//! left-anterior-superior becomes RAS by the sign of x; in other spaces, or if none is named, coordinates are kept and
+//! treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions, axes have the lengths
+//! in `spacings`, or 1 if `spacings` are unknown, too. The files of a list of data files are concatenated in order.
 
 mod axes;
 mod axis;
@@ -14,6 +14,7 @@ mod frames;
 #[cfg(test)]
 mod tests;
 mod world;
+mod writer;
 
 use super::FormatError;
 use super::gzip::gunzip;
@@ -24,6 +25,7 @@ use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 use axes::Axes;
 use fields::Fields;
 use frames::deinterleave_frames;
+pub(super) use writer::write;
 
 const FORMAT: &str = "NRRD";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
@@ -104,13 +106,10 @@ impl Header {
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let voxels = self.voxels(self.after_lines(source)?)?;
         let volume = Volume::new(VolumeInit {
-            voxels: deinterleave_frames(voxels, self.run, self.dims[3])?,
-            dims: self.dims,
             affine: self.affine,
-            slope: 1.0,
-            intercept: 0.0,
             frame_seconds: self.frame_seconds,
             space: self.space,
+            ..VolumeInit::new(deinterleave_frames(voxels, self.run, self.dims[3])?, self.dims)
         });
         Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }

@@ -104,23 +104,18 @@ pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DAffine3;
-    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+
+    use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Makes the pyramid of a test image whose intensity rises along x from 0 to 1 in `steps` equal steps.
     fn ramp(steps: f32) -> Pyramid {
         let value = |i: usize| ((i % 40) as f32 / 39.0 * steps).round_ties_even() / steps;
-        let volume = Volume::new(VolumeInit {
-            voxels: Voxels::F32((0..40 * 40 * 40).map(value).collect()),
-            dims: [40, 40, 40, 1],
-            affine: DAffine3::IDENTITY,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        });
+        let volume = Volume::new(VolumeInit::new(
+            Voxels::F32((0..40 * 40 * 40).map(value).collect()),
+            [40, 40, 40, 1],
+        ));
         Pyramid::new(&volume.unwrap(), 0, 1).unwrap()
     }
 

@@ -248,23 +248,18 @@ impl DeformableModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, Random, Vec3};
+    use crate::math::{Random, Vec3};
     use crate::methods::deformable::DeformableOptions;
-    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+    use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn volume(n: usize, mut value: impl FnMut(Vec3) -> f32) -> Volume {
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32);
-        Volume::new(VolumeInit {
-            voxels: Voxels::F32((0..n * n * n).map(|k| value(at(k))).collect()),
-            dims: [n, n, n, 1],
-            affine: DAffine3::IDENTITY,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        })
+        Volume::new(VolumeInit::new(
+            Voxels::F32((0..n * n * n).map(|k| value(at(k))).collect()),
+            [n, n, n, 1],
+        ))
         .unwrap()
     }
 

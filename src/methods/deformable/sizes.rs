@@ -174,9 +174,9 @@ impl DeformableModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DAffine3;
+
     use crate::methods::deformable::{DeformableOptions, DeformableParams};
-    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+    use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -186,16 +186,7 @@ mod tests {
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
         let distance = |p: Vec3| (p.length() - 9.0).max((p - Vec3::Z * 14.0).length() - 12.0);
         let voxels = (0..n * n * n).map(|k| (0.5 - 0.25 * distance(at(k))).clamp(0.0, 1.0)).collect();
-        let volume = Volume::new(VolumeInit {
-            voxels: Voxels::F32(voxels),
-            dims: [n, n, n, 1],
-            affine: DAffine3::IDENTITY,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        })
-        .unwrap();
+        let volume = Volume::new(VolumeInit::new(Voxels::F32(voxels), [n, n, n, 1])).unwrap();
         let params = DeformableParams { iso: 0.5, ..DeformableParams::for_volume(&volume) };
         let options = DeformableOptions { levels: 0, params: Some(params), ..Default::default() };
         DeformableModel::new(&volume, options).unwrap()

@@ -7,7 +7,7 @@ use super::measure::Fitness;
 use super::{ImplicitSurface, Solved, color};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::methods::MethodError;
-use crate::volume::{Space, Volume, VolumeError, VolumeInit, Voxels};
+use crate::volume::{Volume, VolumeError, VolumeInit, Voxels};
 
 impl ImplicitSurface {
     /// Returns the implicit function f minus the iso-value at `points`, which are in world units (those of the input
@@ -87,13 +87,8 @@ impl ImplicitSurface {
             row.iter_mut().for_each(|value| *value -= level);
         })?;
         Ok(Volume::new(VolumeInit {
-            voxels: Voxels::F32(values),
-            dims: [dims[0], dims[1], dims[2], 1],
             affine: map,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
+            ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], 1])
         })?)
     }
 

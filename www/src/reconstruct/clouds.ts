@@ -3,6 +3,7 @@
  * every machine.
  */
 import type { Vec3 } from '../protocol';
+import { normal, uniform } from '../random';
 import type { Cloud } from './protocol';
 
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
@@ -12,22 +13,6 @@ export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
  * 1 in size; some shapes use a fraction of it.
  */
 const NOISE = 0.02;
-
-/** Returns a generator of pseudo-random numbers from 0 to below 1 (mulberry32), reproducible by its seed. */
-export function seeded(seed: number): () => number {
-  let state = seed;
-  return () => {
-    state = (state + 0x6d2b79f5) | 0;
-    let mixed = Math.imul(state ^ (state >>> 15), 1 | state);
-    mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
-    return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32;
-  };
-}
-
-/** Returns a normally distributed number of mean 0 and standard deviation 1 (Box and Muller). */
-function gauss(random: () => number): number {
-  return Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
-}
 
 const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: () => number) => Vec3 | undefined }> = {
   torus: { seed: 1, count: 3000, point: onTorus },
@@ -39,7 +24,7 @@ const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: 
 /** Returns the points of a computed example shape, without normals and colours; the same at every call. */
 export function computedCloud(shape: PointShape): Cloud {
   const { seed, count, point } = SHAPES[shape];
-  const random = seeded(seed);
+  const random = uniform(seed);
   const points = new Float32Array(3 * count);
   for (let i = 0; i < count; ) {
     const at = point(random);
@@ -58,7 +43,7 @@ function onTorus(random: () => number): Vec3 | undefined {
   const [around, across] = [2 * Math.PI * random(), 2 * Math.PI * random()];
   const [big, small] = [1, 0.35];
   if (random() > (big + small * Math.cos(across)) / (big + small)) return undefined;
-  const thick = small + NOISE * gauss(random);
+  const thick = small + NOISE * normal(random);
   const out = big + thick * Math.cos(across);
   return [out * Math.cos(around), out * Math.sin(around), thick * Math.sin(across)];
 }
@@ -66,7 +51,7 @@ function onTorus(random: () => number): Vec3 | undefined {
 /** Returns a random point near one of two disjoint spheres of radius 0.6. */
 function onTwoBalls(random: () => number): Vec3 {
   const [x, y, z] = direction(random);
-  const radius = 0.6 + 0.5 * NOISE * gauss(random);
+  const radius = 0.6 + 0.5 * NOISE * normal(random);
   return [radius * x + (random() < 0.5 ? -0.8 : 0.8), radius * y, radius * z];
 }
 
@@ -88,7 +73,7 @@ function onCorner(random: () => number): Vec3 {
   at[face] = 1;
   at[(face + 1) % 3] = u;
   at[(face + 2) % 3] = v;
-  const along = (NOISE / 2) * gauss(random);
+  const along = (NOISE / 2) * normal(random);
   return at.map((x) => x + along / Math.sqrt(3)) as Vec3;
 }
 
@@ -99,6 +84,6 @@ function onCorner(random: () => number): Vec3 {
 function onUnevenBall(random: () => number): Vec3 | undefined {
   const [x, y, z] = direction(random);
   if (Math.abs(z) > 0.8 || random() > 0.12 + 0.88 * (0.5 + 0.5 * x) ** 2) return undefined;
-  const radius = 1 + 0.3 * NOISE * gauss(random);
+  const radius = 1 + 0.3 * NOISE * normal(random);
   return [radius * x, radius * y, radius * z];
 }

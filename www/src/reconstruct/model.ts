@@ -1,5 +1,6 @@
 /** Builds point clouds and surface models for the requests of the Reconstruct lab's page. Used by the worker only. */
-import { type ImplicitOptions, ImplicitSurface, type PointEdits, parsePoints } from 'vesicle';
+import { type ImplicitOptions, ImplicitSurface, type PointEdits } from 'vesicle';
+import startReaders, { parsePoints } from 'vesicle/import';
 import type { Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
@@ -9,8 +10,10 @@ import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup }
 const LEAST_DIM = 8;
 
 /** Returns the point cloud of a source: computed from a shape, or read from a file. */
-export function cloudFrom(source: CloudSource): Cloud {
-  return 'shape' in source ? computedCloud(source.shape) : parsePoints(source.file.bytes);
+export async function cloudFrom(source: CloudSource): Promise<Cloud> {
+  if ('shape' in source) return computedCloud(source.shape);
+  await startReaders();
+  return parsePoints(source.file.bytes);
 }
 
 /**

@@ -83,7 +83,7 @@ class Session {
 
   async #load({ source, cameras, setup }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
-    const cloud = cloudFrom(source);
+    const cloud = await cloudFrom(source);
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
     const known = { ...setup, edits: { ...setup.edits, removed } };
     const model = buildModel(cloud, cameras, known);

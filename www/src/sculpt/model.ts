@@ -1,12 +1,12 @@
 /** Opens meshes and builds models for the requests of the Sculpt lab's page. Used by the worker only. */
 
-import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
+import { type Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
 import { copySurface, emptyArrays, texturedSurface } from '../worker/surface-buffers';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';
-import { computedMesh } from './shapes';
+import { computedMesh, readMesh } from './shapes';
 
 /**
  * Ellipsoids of a model for which neither a mesh nor ellipsoids are given: a unit ball, since the membrane needs at
@@ -42,7 +42,7 @@ export async function sceneFrom({ detail, base }: SceneSource): Promise<Scene> {
 
 async function meshFrom(source: MeshSource): Promise<Mesh> {
   if ('shape' in source) return computedMesh(source.shape);
-  return Mesh.parse(source.file.bytes, source.texture && { texture: source.texture });
+  return readMesh(source.file.bytes, source.texture);
 }
 
 export function freeScene({ detail, base }: Scene): void {

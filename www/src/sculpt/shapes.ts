@@ -1,5 +1,6 @@
 /** Computes the meshes of examples that have no mesh file. Used by the worker only. */
-import { Mesh } from 'vesicle';
+import { Mesh, type MeshTexture } from 'vesicle';
+import startReaders, { parseMesh } from 'vesicle/import';
 import { drawnMap } from './map';
 
 export type ComputedMesh = 'globe' | 'ball';
@@ -12,12 +13,19 @@ const CIRCLES = 47;
 /** Returns a computed mesh, with its texture if it has one. */
 export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
   if (shape === 'ball') return plainMesh(shape);
-  return Mesh.parse(globeAsObj(), { texture: { type: 'image/png', bytes: await drawnMap() } });
+  return readMesh(globeAsObj(), { type: 'image/png', bytes: await drawnMap() });
 }
 
 /** Returns a computed mesh without its texture; tests use it where no texture can be drawn. */
-export function plainMesh(shape: ComputedMesh): Mesh {
-  return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : Mesh.parse(globeAsObj());
+export async function plainMesh(shape: ComputedMesh): Promise<Mesh> {
+  return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : readMesh(globeAsObj());
+}
+
+/** Reads a mesh from the bytes of a file, with the image of its texture if that is a file of its own. */
+export async function readMesh(bytes: Uint8Array, texture?: MeshTexture): Promise<Mesh> {
+  await startReaders();
+  const { positions, indices, ...extra } = parseMesh(bytes, texture && { texture });
+  return Mesh.fromArrays(positions, indices, extra);
 }
 
 /**

@@ -2,7 +2,8 @@
  * Computed volumes of cells as in confocal microscopy: a nucleus with a marked boundary, and a cell that is bright
  * inside.
  */
-import { distance, noise, random, type ShapeVoxels, sample } from './sampling';
+import { uniform } from '../random';
+import { distance, noise, type ShapeVoxels, sample } from './sampling';
 
 type Point = [number, number, number];
 
@@ -36,7 +37,7 @@ const GRANULES = 7;
  * Returns the volume of a cell with intensity decreasing from its centre to an irregular border, and brighter granules.
  */
 export function cell(): ShapeVoxels {
-  const next = random(24);
+  const next = uniform(24);
   const middle: Point = [39.5, 39.5, 39.5];
   const around = (radius: number): Point => {
     const [turn, height] = [2 * Math.PI * next(), 2 * next() - 1];

@@ -1,5 +1,7 @@
 /** Sampling functions and noise shared by the computed volumes. */
 
+import { uniform } from '../random';
+
 export interface ShapeVoxels {
   data: Uint8Array;
   dims: [number, number, number];
@@ -26,23 +28,12 @@ export function sample(
   return { data, dims };
 }
 
-/** Returns a seeded generator of pseudo-random numbers from 0 to below 1 (mulberry32), identical on every machine. */
-export function random(seed: number): () => number {
-  let state = seed;
-  return () => {
-    state = (state + 0x6d2b79f5) | 0;
-    let t = Math.imul(state ^ (state >>> 15), 1 | state);
-    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
-    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
-  };
-}
-
 /**
  * Returns a generator of approximately normal noise with mean 0 and the given standard deviation: the sum of four
  * uniform numbers.
  */
 export function noise(seed: number, deviation: number): () => number {
-  const next = random(seed);
+  const next = uniform(seed);
   return () => deviation * Math.sqrt(3) * (next() + next() + next() + next() - 2);
 }
 

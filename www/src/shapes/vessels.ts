@@ -1,5 +1,6 @@
 /** A computed volume of a tree of bright vessels on a dark background, similar to an angiography. */
-import { distance, noise, random, type ShapeVoxels, sample, smoothStep } from './sampling';
+import { uniform } from '../random';
+import { distance, noise, type ShapeVoxels, sample, smoothStep } from './sampling';
 
 type Point = [number, number, number];
 
@@ -35,7 +36,7 @@ export function vesselTree(): ShapeVoxels {
 
 /** Generates the segments of a vessel tree: a trunk that grows upwards from the floor and bifurcates repeatedly. */
 function tree(): Segment[] {
-  const next = random(1999);
+  const next = uniform(1999);
   const segments: Segment[] = [];
   const grow = (from: Point, direction: Point, length: number, radius: number, left: number) => {
     const to = from.map((x, axis) => x + length * (direction[axis] ?? 0)) as Point;

@@ -3,6 +3,7 @@
  * tracking.
  */
 import type { Vec3 } from '../protocol';
+import { normal, uniform } from '../random';
 
 export interface CineSpec {
   dims: Vec3;
@@ -150,13 +151,6 @@ export function wallDistances(spec: CineSpec, frame: number, points: Float32Arra
 
 /** Returns a generator of normally distributed numbers of standard deviation 1, reproducible by its seed. */
 function normals(seed: number): () => number {
-  let state = seed;
-  const uniform = () => {
-    // mulberry32
-    state = (state + 0x6d2b79f5) | 0;
-    let t = Math.imul(state ^ (state >>> 15), 1 | state);
-    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
-    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
-  };
-  return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
+  const random = uniform(seed);
+  return () => normal(random);
 }

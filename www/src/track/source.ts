@@ -43,13 +43,13 @@ export function framesOf(files: NamedBytes[]): NamedBytes[][] {
   return heads.map((head) => [head, ...byName.filter(belongs(head))]);
 }
 
-function fromParts(parts: NamedBytes[][]): Volume {
+async function fromParts(parts: NamedBytes[][]): Promise<Volume> {
   const [first] = parts;
   if (!first) throw new Refusal('bad-file', text('track.noHeader'));
   if (parts.length === 1) return parseFiles(first);
   const frames: Volume[] = [];
   try {
-    for (const files of parts) frames.push(parseFiles(files));
+    for (const files of parts) frames.push(await parseFiles(files));
     return Volume.fromFrames(frames);
   } finally {
     for (const frame of frames) frame.free();

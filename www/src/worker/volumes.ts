@@ -1,5 +1,6 @@
 /** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
 import { VesicleError, Volume } from 'vesicle';
+import startReaders, { parseVolume } from 'vesicle/import';
 import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { quantize } from '../quantize';
@@ -20,7 +21,7 @@ function isHeader({ name }: NamedBytes): boolean {
  */
 function parseFile(file: NamedBytes): Volume {
   try {
-    return Volume.parse(file.bytes);
+    return new Volume(parseVolume(file.bytes));
   } catch (error) {
     if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
     throw new Refusal(error.code, text('files.headerWithoutData', { reason: error.message }));
@@ -31,13 +32,14 @@ function parseFile(file: NamedBytes): Volume {
  * Parses a volume from one file, or from a header and its data in either order; throws a `Refusal` for any other number
  * of files.
  */
-export function parseFiles(files: NamedBytes[]): Volume {
+export async function parseFiles(files: NamedBytes[]): Promise<Volume> {
+  await startReaders();
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
   if (!second) return parseFile(first);
   if (files.length > 2) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
-  return Volume.parse(header.bytes, { data: data.bytes });
+  return new Volume(parseVolume(header.bytes, { data: data.bytes }));
 }
 
 /**

@@ -2,7 +2,7 @@
 //! predicted from its nearest predecessors, in an order from coarse to fine (Vecchia's approximation; Schäfer, Katzfuss
 //! & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler minimization*, 2021).
 
-use crate::math::order::{rank_f64, sort_pairs};
+use crate::math::order::{rank_f64, select_least, sort_pairs};
 use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
@@ -137,7 +137,7 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
     let with_distance = |i: usize| (rank_f64(points[i].distance_squared(p)), i as u32);
     let mut found: Vec<(u64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
     if found.len() > NEIGHBOURS {
-        found.select_nth_unstable(NEIGHBOURS);
+        select_least(&mut found, NEIGHBOURS);
         found.truncate(NEIGHBOURS);
     }
     sort_pairs(&mut found);

@@ -1,0 +1,93 @@
+// Volumes, meshes and points as plain data: what is passed between modules, and to and from other libraries.
+
+/** Three numbers: a point, a direction, or one number for each of x, y and z. */
+export type Vec3 = [number, number, number];
+
+/** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
+export type VoxelArray =
+  | Uint8Array
+  | Int8Array
+  | Uint16Array
+  | Int16Array
+  | Uint32Array
+  | Int32Array
+  | Float32Array
+  | Float64Array;
+
+/** Orientation of the world axes: right-anterior-superior, or left-posterior-superior. */
+export type Space = 'RAS' | 'LPS';
+
+/** Length of one unit of world coordinates: metres, millimetres or micrometres. */
+export type LengthUnit = 'm' | 'mm' | 'um';
+
+/** Constructor options of a {@link Volume}. */
+export interface VolumeInit {
+  /** Stored value of each voxel: x fastest, then y, z, t. Copied once. */
+  data: VoxelArray;
+  /** Number of voxels along x, y, z, and the number of frames of a 4D volume. */
+  dims: Vec3 | [number, number, number, number];
+  /** Transform from voxel index to world: 16 numbers, column-major. Default from `spacing` and `origin`. */
+  affine?: ArrayLike<number>;
+  /** Voxel size, world units; default 1. Not together with `affine`. */
+  spacing?: Vec3;
+  /** World position of the centre of the first voxel; default 0. Not together with `affine`. */
+  origin?: Vec3;
+  /** Slope of intensity = stored value * slope + intercept. Default 1; not 0. */
+  slope?: number;
+  /** Intercept of intensity = stored value * slope + intercept. Default 0. */
+  intercept?: number;
+  /** Seconds from one frame to the next; 4D only. */
+  frameSeconds?: number;
+  /** Orientation of the world axes. Default RAS; meshes are returned in the same space. */
+  space?: Space;
+  /** Length of a world unit, which NIfTI files state. Default unknown. */
+  unit?: LengthUnit;
+}
+
+/** Image formats of a {@link MeshTexture}, as media types. */
+export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
+
+/**
+ * The texture of a mesh, as an image file. Texture coordinates start at its upper left corner, u to the right and v
+ * downwards, 1 at the far edges, and the image repeats beyond, as in glTF: in three.js, with `flipY = false`.
+ */
+export interface MeshTexture {
+  /** Image format of `bytes`. */
+  type: TextureType;
+  /** Content of the image file. */
+  bytes: Uint8Array;
+}
+
+/** Arrays and texture of a mesh, besides positions and triangles, for `Mesh.fromArrays`. */
+export interface MeshExtra {
+  /** Unit outward normal of each vertex, packed xyz. */
+  normals?: Float32Array;
+  /** Texture coordinates of each vertex, packed uv. */
+  uvs?: Float32Array;
+  /**
+   * Texture coordinates of the three corners of each triangle, packed uv, instead of `uvs`: vertices on texture seams
+   * have several.
+   */
+  cornerUvs?: Float32Array;
+  /** Colour of each vertex, packed rgb, 0..1. */
+  colors?: Float32Array;
+  /** The image that texture coordinates refer to. */
+  texture?: MeshTexture;
+}
+
+/** The content of a mesh file: the arguments of `Mesh.fromArrays`. */
+export interface MeshData extends MeshExtra {
+  /** Position of each vertex, packed xyz. */
+  positions: Float32Array;
+  /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
+  indices: Uint32Array;
+}
+
+/** The content of a point file, as packed arrays: xyz, xyz and rgb of each point in turn. */
+export interface PointData {
+  points: Float32Array;
+  /** Unit normals, if the file has them. */
+  normals?: Float32Array;
+  /** Colours, 0..1, if the file has them. */
+  colors?: Float32Array;
+}

@@ -1,0 +1,107 @@
+/**
+ * The readers of volume, mesh and point files in a small WebAssembly module of their own, for the entry points with one
+ * method, which have none. Results are plain data: `new Volume(parseVolume(bytes))`.
+ *
+ * Each call runs in a new instance of the module, whose memory is given back after it.
+ *
+ * @module vesicle/import
+ */
+import { checkProperties, typedArray } from '../check.js';
+import type { LengthUnit, MeshData, MeshTexture, PointData, Space, VolumeInit, VoxelArray } from '../data.js';
+import { MeshFile, VolumeFile } from '../files.js';
+import { parsePoints as points } from '../points.js';
+import { call, restart } from '../runtime.js';
+import { checkTexture, rawTexture, textureOf } from '../texture.js';
+
+export type {
+  LengthUnit,
+  MeshData,
+  MeshExtra,
+  MeshTexture,
+  PointData,
+  Space,
+  TextureType,
+  Vec3,
+  VolumeInit,
+  VoxelArray,
+} from '../data.js';
+export { type ErrorCode, VesicleCrash, VesicleError } from '../error.js';
+export { type InitInput, init as default, initSync } from '../runtime.js';
+
+/**
+ * Parses a volume file like `Volume.parse` of `vesicle`, and returns what the constructor of `Volume` takes.
+ *
+ * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
+ * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+ */
+export function parseVolume(bytes: Uint8Array, options: { data?: Uint8Array } = {}): VolumeInit {
+  const { data } = checkProperties('options', options, ['data']);
+  typedArray('bytes', bytes, Uint8Array);
+  if (data !== undefined) typedArray('data', data, Uint8Array);
+  return inOwnInstance(() => volumeData(VolumeFile.parse(bytes, data)));
+}
+
+/**
+ * Parses a mesh file like `Mesh.parse` of `vesicle`, and returns what `Mesh.fromArrays` takes:
+ * `const { positions, indices, ...extra } = parseMesh(bytes)`.
+ *
+ * @param options - `texture`: the image of a file that has it in a separate file (obj, ply).
+ * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`; `invalid-argument`.
+ */
+export function parseMesh(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): MeshData {
+  typedArray('bytes', bytes, Uint8Array);
+  const { texture } = checkProperties('options', options, ['texture']);
+  checkTexture(texture);
+  return inOwnInstance(() => meshData(MeshFile.parse(bytes, rawTexture(texture))));
+}
+
+/**
+ * Parses a point file like `parsePoints` of `vesicle`.
+ *
+ * @throws {@link VesicleError} `bad-file` naming the format and the line or field.
+ */
+export function parsePoints(bytes: Uint8Array): PointData {
+  return inOwnInstance(() => points(bytes));
+}
+
+/**
+ * Calls `work` in a new instance, and gives back the memory it used, which is several times the size of the file. The
+ * first instance is not used: the promise of {@link init} refers to it for good.
+ */
+function inOwnInstance<T>(work: () => T): T {
+  restart();
+  try {
+    return call(work);
+  } finally {
+    restart();
+  }
+}
+
+function volumeData(file: VolumeFile): VolumeInit {
+  const [nx = 0, ny = 0, nz = 0] = file.dims();
+  const [frames, frameSeconds, unit] = [file.frames(), file.frameSeconds(), file.unit()];
+  return {
+    data: file.voxels() as VoxelArray,
+    dims: frames > 1 ? [nx, ny, nz, frames] : [nx, ny, nz],
+    affine: file.affine(),
+    slope: file.slope(),
+    intercept: file.intercept(),
+    ...(frameSeconds > 0 && { frameSeconds }),
+    space: file.space() as Space,
+    ...(unit !== '' && { unit: unit as LengthUnit }),
+  };
+}
+
+function meshData(file: MeshFile): MeshData {
+  const [normals, uvs, cornerUvs, colors] = [file.normals(), file.uvs(), file.cornerUvs(), file.colors()];
+  const texture = file.texture();
+  return {
+    positions: file.positions(),
+    indices: file.indices(),
+    ...(normals && { normals }),
+    ...(uvs && { uvs }),
+    ...(cornerUvs && { cornerUvs }),
+    ...(colors && { colors }),
+    ...(texture && { texture: textureOf(texture) }),
+  };
+}

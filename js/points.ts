@@ -1,0 +1,20 @@
+import { typedArray } from './check.js';
+import type { PointData } from './data.js';
+import { call } from './runtime.js';
+import { RawPoints } from './vesicle.js';
+
+/**
+ * Parses points from a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Returns packed arrays, as in
+ * {@link ImplicitOptions}; colours are rgb, 0..1.
+ *
+ * @throws {@link VesicleError} `bad-file` naming the format and the field or line.
+ */
+export function parsePoints(bytes: Uint8Array): PointData {
+  typedArray('bytes', bytes, Uint8Array);
+  return call(() => {
+    const raw = RawPoints.parse(bytes);
+    const [points, normals, colors] = [raw.points(), raw.normals(), raw.colors()];
+    raw.free();
+    return { points, ...(normals && { normals }), ...(colors && { colors }) };
+  });
+}
