@@ -3,6 +3,7 @@
 use super::order::{combined_rank, rank_f32, select_least};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// An axis-aligned bounding box; its faces belong to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,13 +60,7 @@ impl Bounds {
     /// Returns the squared distance from `p` to the box, zero inside.
     #[inline]
     pub fn distance_squared(&self, p: Vec3) -> f64 {
-        self.distance_squared_f64(p.as_dvec3())
-    }
-
-    /// Returns the squared distance from `p`, a point in double precision, to the box, zero inside.
-    #[inline]
-    pub fn distance_squared_f64(&self, p: DVec3) -> f64 {
-        let (low, high) = (self.min.as_dvec3() - p, p - self.max.as_dvec3());
+        let (low, high) = (self.min.as_dvec3() - p.as_dvec3(), p.as_dvec3() - self.max.as_dvec3());
         low.max(high).max(DVec3::ZERO).length_squared()
     }
 
@@ -262,8 +257,21 @@ impl BoxTree {
         &self.nodes[node].bounds
     }
 
-    /// Returns the items (indices of boxes, each with its box) below a node.
-    pub fn node_items(&self, node: usize) -> &[(Bounds, u32)] {
+    /// Returns the children of a node; `None` for a leaf.
+    #[inline]
+    pub fn children(&self, node: usize) -> Option<[usize; 2]> {
+        let Node { link, count, .. } = self.nodes[node];
+        (count == 0).then_some([node + 1, link as usize])
+    }
+
+    /// Returns all items (indices of boxes), those below each node next to each other; see [`Self::node_range`].
+    pub fn order(&self) -> impl Iterator<Item = u32> {
+        self.items.iter().map(|(_, item)| *item)
+    }
+
+    /// Returns the range of the items below a node in [`Self::order`].
+    #[inline]
+    pub fn node_range(&self, node: usize) -> Range<usize> {
         let [mut first, mut last] = [node; 2];
         while self.nodes[first].count == 0 {
             first += 1;
@@ -272,52 +280,19 @@ impl BoxTree {
             last = self.nodes[last].link as usize;
         }
         let [first, last] = [&self.nodes[first], &self.nodes[last]];
-        &self.items[first.link as usize..(last.link + last.count) as usize]
+        first.link as usize..(last.link + last.count) as usize
     }
 
-    /// Calls `visit` with items of leaves, roughly from near to far, by the caller's own distance of each node, which
-    /// is at most that of any item below it. `visit` returns the new bound, which is `bound` at first. Nodes whose
-    /// distance is higher are skipped; `distance` also receives the bound, and may return `None` for these.
-    pub fn nearest_by_node(
-        &self,
-        bound: f64,
-        distance: impl Fn(usize, f64) -> Option<f64>,
-        mut visit: impl FnMut(u32) -> f64,
-    ) {
-        self.descend_nodes(bound, distance, |items, bound| {
-            items.iter().fold(bound, |_, (_, item)| visit(*item))
-        });
-    }
-
-    /// The traversal that queries by boxes share: visits items for whose boxes `entry` returns a distance within the
-    /// bound, which is `bound` at first, then the last value that `visit` returned. Boxes for which `entry` returns
-    /// `None` are skipped.
-    fn descend(&self, bound: f64, entry: impl Fn(&Bounds) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
-        self.descend_nodes(
-            bound,
-            |node, _| entry(&self.nodes[node].bounds),
-            |items, mut bound| {
-                for (bounds, item) in items {
-                    if entry(bounds).is_some_and(|d| d <= bound) {
-                        bound = visit(*item);
-                    }
-                }
-                bound
-            },
-        );
-    }
-
-    /// The traversal that all queries share: visits the items of leaves for which `entry` returns a distance within the
-    /// bound, which is `bound` at first, then the last value that `visit` returned. `entry` also receives the bound;
-    /// nodes for which it returns `None` are skipped. Of two sibling nodes, the nearer is visited first.
-    #[inline]
-    fn descend_nodes(
+    /// The traversal that all queries share: visits items for whose boxes `entry` returns a distance within the bound,
+    /// which is `bound` at first, then the last value that `visit` returned. Boxes for which `entry` returns `None` are
+    /// skipped. Of two sibling nodes, the nearer is visited first.
+    fn descend(
         &self,
         mut bound: f64,
-        entry: impl Fn(usize, f64) -> Option<f64>,
-        mut visit: impl FnMut(&[(Bounds, u32)], f64) -> f64,
+        entry: impl Fn(&Bounds) -> Option<f64>,
+        mut visit: impl FnMut(u32) -> f64,
     ) {
-        let Some(start) = self.nodes.first().and_then(|_| entry(0, bound)) else { return };
+        let Some(start) = self.nodes.first().and_then(|root| entry(&root.bounds)) else { return };
         let mut stack = Stack::new();
         stack.push((start, 0));
         while let Some((distance, i)) = stack.pop() {
@@ -325,19 +300,22 @@ impl BoxTree {
                 continue;
             }
             let node = &self.nodes[i];
+            for (bounds, item) in self.items_of(node) {
+                if entry(bounds).is_some_and(|d| d <= bound) {
+                    bound = visit(*item);
+                }
+            }
             if node.count == 0 {
-                self.push_children(i, |child| entry(child, bound), &mut stack);
-            } else {
-                bound = visit(self.items_of(node), bound);
+                self.push_children(i, &entry, &mut stack);
             }
         }
     }
 
-    /// Pushes those children of node `i` for which `entry` returns a distance onto the stack, the nearer one on
+    /// Pushes those children of node `i` for whose boxes `entry` returns a distance onto the stack, the nearer one on
     /// top.
-    fn push_children(&self, i: usize, entry: impl Fn(usize) -> Option<f64>, stack: &mut Stack) {
+    fn push_children(&self, i: usize, entry: &impl Fn(&Bounds) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
-        let [a, b] = children.map(|c| entry(c).map(|distance| (distance, c)));
+        let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
         match (a, b) {
             (Some(a), Some(b)) => {
                 let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };

@@ -50,9 +50,14 @@ pub fn closest_barycentric(triangle: [Vec3; 3], p: Vec3) -> DVec3 {
 
 /// Returns the squared distance of a point in double precision from the triangle.
 pub fn distance_squared(triangle: [Vec3; 3], p: DVec3) -> f64 {
+    from_closest(triangle, p).length_squared()
+}
+
+/// Returns the vector to `p` from the closest point of the triangle.
+pub fn from_closest(triangle: [Vec3; 3], p: DVec3) -> DVec3 {
     let [a, b, c] = triangle.map(|q| q.as_dvec3() - p);
     let closest = closest_to_origin([a, b, c]);
-    (a * closest.x + b * closest.y + c * closest.z).length_squared()
+    -(a * closest.x + b * closest.y + c * closest.z)
 }
 
 /// Returns the barycentric coordinates of the closest point to the origin, as [`closest_barycentric`].

@@ -52,7 +52,8 @@ const ORDINARY_EDGE: f64 = 1.5;
 /// long. Where a mesh intersects itself already, its vertices are held. Attributes are unchanged.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] for more than [`Smoothing::MAX_ITERATIONS`] iterations; the mesh is then unchanged.
+/// [`MeshError::InvalidArgument`] for more than [`Smoothing::MAX_ITERATIONS`] iterations, or if a position would leave
+/// the range of `f32`; the mesh is then unchanged.
 pub fn smooth(mesh: &mut Mesh, smoothing: Smoothing) -> Result<(), MeshError> {
     let Smoothing { iterations, keeps_volume } = smoothing;
     if iterations > Smoothing::MAX_ITERATIONS {
@@ -64,7 +65,8 @@ pub fn smooth(mesh: &mut Mesh, smoothing: Smoothing) -> Result<(), MeshError> {
     if iterations == 0 || edge == 0.0 {
         return Ok(());
     }
-    let [shrink, grow] = unit_scale(edge as f32);
+    // The mean edge may be longer than the largest number.
+    let [shrink, grow] = unit_scale(edge.min(f64::from(f32::MAX)) as f32);
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
     let before = mesh.positions().to_vec();
     let mut smoother = Smoother::new(mesh, keeps_volume);
@@ -76,7 +78,12 @@ pub fn smooth(mesh: &mut Mesh, smoothing: Smoothing) -> Result<(), MeshError> {
         smoother.run(mesh, iterations);
     }
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
-    Ok(())
+    if mesh.positions().iter().all(|p| p.is_finite()) {
+        return Ok(());
+    }
+    mesh.positions_mut().iter_mut().zip(before).for_each(|(p, before)| *p = before * grow);
+    let problem = "smoothing would move a vertex beyond the range of f32 (3.4e38)".to_owned();
+    Err(MeshError::InvalidArgument { parameter: "mesh", problem })
 }
 
 /// Returns the mean edge length, 0 without edges.
@@ -296,6 +303,20 @@ mod tests {
             }
         }
         assert!(held_volumes > 60, "{held_volumes}");
+    }
+
+    #[test]
+    fn the_largest_meshes_stay_finite() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 0.9 * f32::MAX, 0.4 * f32::MAX).unwrap();
+        smooth(&mut mesh, TEN).unwrap();
+        assert!(mesh.vertices().all(|v| mesh.position(v).is_finite()));
+        // Longer edges than the largest number.
+        let mut largest = cuboid(Vec3::splat(2.0));
+        largest.positions.iter_mut().for_each(|p| *p = (*p - Vec3::ONE) * f32::MAX);
+        let mut mesh = Mesh::from_triangles(&largest).unwrap();
+        let before = mesh.positions().to_vec();
+        assert!(smooth(&mut mesh, Smoothing { iterations: 1, keeps_volume: true }).is_err());
+        assert_eq!(mesh.positions(), before);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 
 mod cells;
 mod contains;
+mod cylinder_tree;
 mod distance;
+mod four_triangles;
 mod lattice_distance;
 mod points;
 mod section;
