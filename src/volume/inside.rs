@@ -1,8 +1,8 @@
 //! Voxelisation: which voxels are inside a closed surface.
 
-use super::row_sweep::for_each_row;
+use super::row_sweep::{for_each_slice, span};
 use crate::math::crossing::{crossing, is_beyond};
-use crate::math::order::sort_ranks;
+use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::{DVec2, DVec3};
 use crate::mesh::TriangleMesh;
 use fixedbitset::FixedBitSet;
@@ -53,28 +53,40 @@ pub fn for_each_inside(
 ) {
     let (positions, triangles) = surface;
     let mut crossings = Vec::new();
-    for_each_row(surface, dims, 0.0, |y, z, near| {
-        let at = DVec2::new(y as f64, z as f64);
+    for_each_slice(surface, dims[2], 0.0, |z, near| {
         for &t in near {
-            let corners = triangles[t as usize].map(|v| positions[v as usize]);
-            let crossing = crossing(corners, at);
-            if crossing != 0 {
-                let first = first_beyond(corners, crossing, at, dims[0]);
-                crossings.push((first as u64) << 1 | u64::from(crossing > 0));
+            let triangle = triangles[t as usize];
+            let Some([first, last]) = span(positions, triangle, 1, 0.0, dims[1]) else { continue };
+            let corners = triangle.map(|v| positions[v as usize]);
+            for y in first..=last {
+                let at = DVec2::new(y.into(), z as f64);
+                let crossing = crossing(corners, at);
+                if crossing != 0 {
+                    let voxel = first_beyond(corners, crossing, at, dims[0]);
+                    crossings.push(combined_rank(y, voxel as u32) << 1 | u64::from(crossing > 0));
+                }
             }
         }
-        let start = dims[0] * (y + dims[1] * z);
-        visit_runs(&mut crossings, dims[0], rule, |run| visit(start + run.start..start + run.end));
+        sort_ranks(&mut crossings);
+        for row in crossings.chunk_by(|a, b| row_of(*a) == row_of(*b)) {
+            let start = dims[0] * (row_of(row[0]) + dims[1] * z);
+            visit_runs(row, dims[0], rule, |run| visit(start + run.start..start + run.end));
+        }
+        crossings.clear();
     });
 }
 
-/// Calls `visit` with the voxels of a row of `count` that are inside, and clears `crossings`: for each, the first voxel
-/// beyond it, and in the lowest bit whether the surface is entered there.
-fn visit_runs(crossings: &mut Vec<u64>, count: usize, rule: FillRule, mut visit: impl FnMut(Range<usize>)) {
-    sort_ranks(crossings);
+/// Returns the row, within its slice, of a crossing.
+fn row_of(crossing: u64) -> usize {
+    (crossing >> 33) as usize
+}
+
+/// Calls `visit` with the voxels of a row of `count` that are inside, given its crossings in order: in the lowest bit
+/// whether the surface is entered, and above it, in 32 bits, the first voxel beyond.
+fn visit_runs(crossings: &[u64], count: usize, rule: FillRule, mut visit: impl FnMut(Range<usize>)) {
     let (mut winding, mut start) = (0, 0);
     for at_voxel in crossings.chunk_by(|a, b| a >> 1 == b >> 1) {
-        let voxel = (at_voxel[0] >> 1) as usize;
+        let voxel = (at_voxel[0] >> 1) as u32 as usize;
         let before = rule.is_inside(winding);
         winding += at_voxel.iter().map(|crossing| 2 * (crossing & 1) as i32 - 1).sum::<i32>();
         if before && !rule.is_inside(winding) {
@@ -86,7 +98,6 @@ fn visit_runs(crossings: &mut Vec<u64>, count: usize, rule: FillRule, mut visit:
     if rule.is_inside(winding) && start < count {
         visit(start..count);
     }
-    crossings.clear();
 }
 
 /// Returns the first voxel of a row of `count` at or beyond a triangle that the line through the row, at (y, z) = `at`,

@@ -1,29 +1,49 @@
 //! Sweep over the rows of a grid with the triangles that may reach each, for scan conversion of surfaces.
 
-use crate::math::DVec3;
-use crate::math::order::{combined_rank, sort_pairs};
+use crate::math::{DVec3, Groups};
 
 /// Calls `visit` for each row of voxels along x that a triangle may reach, rows in order: with y and z of the row and
 /// the indices of the triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order.
 /// `positions` are in voxel indices; `dims` are the dimensions of the grid.
 ///
-/// Memory is linear in the number of triangles, whatever the size of the grid.
+/// Memory is linear in the number of triangles and in that of slices and rows of a slice, whatever else the size of the
+/// grid.
 pub(super) fn for_each_row(
     (positions, triangles): (&[DVec3], &[[u32; 3]]),
     dims: [usize; 3],
     reach: f64,
     mut visit: impl FnMut(usize, usize, &[u32]),
 ) {
-    let span = |axis: usize| {
-        move |t: u32| {
-            let [low, high] = range(triangles[t as usize].map(|v| positions[v as usize][axis]));
-            span_of(low - reach, high + reach, dims[axis])
-        }
-    };
-    let all: Vec<u32> = (0..triangles.len() as u32).collect();
-    for_each_step(&all, span(2), |z, in_slice| {
-        for_each_step(in_slice, span(1), |y, in_row| visit(y, z, in_row));
+    for_each_slice((positions, triangles), dims[2], reach, |z, in_slice| {
+        let rows = |t: u32| span(positions, triangles[t as usize], 1, reach, dims[1]);
+        for_each_step(in_slice, dims[1], rows, |y, in_row| visit(y, z, in_row));
     });
+}
+
+/// Calls `visit` for each of `count` slices across z that a triangle may reach, in order: with z and the indices of the
+/// triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order.
+pub(super) fn for_each_slice(
+    (positions, triangles): (&[DVec3], &[[u32; 3]]),
+    count: usize,
+    reach: f64,
+    visit: impl FnMut(usize, &[u32]),
+) {
+    let all: Vec<u32> = (0..triangles.len() as u32).collect();
+    for_each_step(&all, count, |t| span(positions, triangles[t as usize], 2, reach, count), visit);
+}
+
+/// Returns the first and the last of `count` layers of voxels along `axis` that the bounding box of a triangle comes
+/// within `reach` of; `None` if there are none.
+#[inline]
+pub(super) fn span(
+    positions: &[DVec3],
+    triangle: [u32; 3],
+    axis: usize,
+    reach: f64,
+    count: usize,
+) -> Option<[u32; 2]> {
+    let [low, high] = range(triangle.map(|v| positions[v as usize][axis]));
+    span_of(low - reach, high + reach, count)
 }
 
 /// Returns the lowest and the highest of three numbers.
@@ -45,35 +65,25 @@ fn span_of(low: f64, high: f64, count: usize) -> Option<[u32; 2]> {
     (first <= last).then_some([first as u32, last as u32])
 }
 
-/// Calls `visit` for each number that some item's span contains, in order, with these items.
+/// Calls `visit` for each number below `count` that some item's span contains, in order, with these items.
 fn for_each_step(
     items: &[u32],
+    count: usize,
     span: impl Fn(u32) -> Option<[u32; 2]>,
     mut visit: impl FnMut(usize, &[u32]),
 ) {
-    // In the order of the first step, then of the item.
-    let mut spans: Vec<(u64, u32)> = Vec::with_capacity(items.len());
-    for &item in items {
-        if let Some([first, last]) = span(item) {
-            spans.push((combined_rank(first, item), last));
-        }
-    }
-    sort_pairs(&mut spans);
+    let spans = items.iter().filter_map(|&item| Some((item, span(item)?)));
+    let by_first = Groups::new(count, spans.map(|(item, [first, last])| (first, (item, last))));
     let (mut active, mut last) = (Vec::new(), Vec::new());
-    let mut waiting = spans.iter().peekable();
-    let mut step = 0;
-    loop {
-        if active.is_empty() {
-            let Some(&&(rank, _)) = waiting.peek() else { break };
-            step = (rank >> 32) as u32;
-        }
-        while let Some(&(rank, end)) = waiting.next_if(|(rank, _)| (rank >> 32) as u32 == step) {
-            active.push(rank as u32);
+    for step in 0..count {
+        for &(item, end) in by_first.of(step) {
+            active.push(item);
             last.push(end);
         }
-        visit(step as usize, &active);
-        step += 1;
-        drop_ended(&mut active, &mut last, step);
+        if !active.is_empty() {
+            visit(step, &active);
+            drop_ended(&mut active, &mut last, step as u32 + 1);
+        }
     }
 }
 
