@@ -126,7 +126,7 @@ mod tests {
                 assert!((measure(mesh).volume / expected - 1.0).abs() < 1e-4);
                 assert!(report(mesh).unwrap().oriented);
             }
-            // The list's own normals are moved as planes are, and stay near those computed anew from the triangles.
+            // The list's own normals are moved as planes are, and stay near those of the triangles.
             let dots =
                 moved.normals.unwrap().into_iter().zip(moved_list.normals.unwrap()).map(|(a, b)| a.dot(b));
             assert!(dots.fold(0.0, |sum, dot| sum + dot) / 108.0 > 0.9);

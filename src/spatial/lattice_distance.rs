@@ -242,7 +242,7 @@ impl Search<'_> {
     ) {
         let count = block.count();
         let is_last = count <= SMALLEST;
-        // In every second block, bounds are not computed anew.
+        // Every second block keeps the bounds of the one it is half of.
         let is_moved_only = !is_last && count.ilog2() % 2 == SMALLEST.ilog2() % 2;
         let across = bound.half_axes.iter().map(|axis| across_squared(*axis, bound.direction));
         let coarse = COARSE * COARSE * across.sum::<f64>();

@@ -81,7 +81,7 @@ fn row_of(crossing: u64) -> usize {
     (crossing >> 33) as usize
 }
 
-/// Calls `visit` with the voxels of a row of `count` that are inside, given its crossings in order: in the lowest bit
+/// Calls `visit` with the voxels of a row of `count` that are inside, given where its line meets the surface, in order: in the lowest bit
 /// whether the surface is entered, and above it, in 32 bits, the first voxel beyond.
 fn visit_runs(crossings: &[u64], count: usize, rule: FillRule, mut visit: impl FnMut(Range<usize>)) {
     let (mut winding, mut start) = (0, 0);
