@@ -24,6 +24,7 @@ export {
   type MeshReport,
   type RestructurePass,
   type SurfaceDistance,
+  type VoxelKind,
 } from './mesh.js';
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';

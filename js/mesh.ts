@@ -6,6 +6,7 @@ import {
   integer,
   invalid,
   number,
+  numbers,
   positive,
   shallowCopy,
   typedArray,
@@ -15,7 +16,7 @@ import type { MeshExtra, MeshTexture, Vec3 } from './data.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
-import { type Volume, volumeHandle } from './volume.js';
+import { type Volume, volumeHandle, wrapVolume } from './volume.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -131,6 +132,17 @@ export interface SurfaceDistance {
   /** Hausdorff distance: the largest of all distances between the two surfaces, in both directions. */
   hausdorff: number;
 }
+
+/** Quantity per voxel, for {@link Mesh.toVolume}. */
+export type VoxelKind =
+  /** A value where the voxel centre is inside the mesh, 0 elsewhere. */
+  | 'mask'
+  /** Fraction of the voxel inside the mesh, 0..1. */
+  | 'coverage'
+  /** Signed distance of the voxel centre from the surface, world units, negative inside. */
+  | 'distance';
+
+const VOXEL_KINDS: readonly VoxelKind[] = ['mask', 'coverage', 'distance'];
 
 /** A pass of {@link Mesh.restructure}, named by what it does to edges. */
 export type RestructurePass = 'collapse' | 'split' | 'flip';
@@ -397,6 +409,93 @@ export class Mesh {
   remesh(edge: { min: number; max: number }): void {
     const [min, max] = edgeBounds(edge);
     this.#handle.use((raw) => raw.remesh(min, max));
+  }
+
+  /**
+   * Smooths the mesh by Taubin's method: each iteration moves every vertex half of the way to the mean of its
+   * neighbours, then slightly further away from it. Noise is removed, and shapes that extend over ten edges or more
+   * are kept. The mesh stays closed, keeps its topology, and a mesh without self-intersections remains free of them:
+   * displacements are shortened where triangles would intersect. Regions that already intersect themselves are left
+   * unchanged.
+   *
+   * Texture coordinates and colours are removed.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param options - `iterations`: 0 to 10,000. `keepVolume`: whether each connected component keeps the volume that it
+   *   encloses, by a small offset along the normals; default true. Where its vertices cannot move without
+   *   self-intersections, the volume may differ.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
+   */
+  smooth(options: { iterations: number; keepVolume?: boolean }): void {
+    const copy = checkProperties('options', shallowCopy('options', options), ['iterations', 'keepVolume']);
+    const { iterations, keepVolume = true } = copy;
+    const count = integer('iterations', iterations, { max: 10_000 });
+    if (typeof keepVolume !== 'boolean') throw invalid('keepVolume', 'must be true or false');
+    this.#handle.use((raw) => raw.smooth(count, keepVolume));
+  }
+
+  /**
+   * Transforms the mesh by an affine map. A reflection reverses the triangles, so that they still face outwards.
+   * Normals of a file are transformed, too, and texture coordinates and colours stay.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param matrix - 4x4, column-major, with last row 0, 0, 0, 1, as in three.js and WebGL.
+   * @throws {@link VesicleError} `invalid-argument`: another last row, a number that is not finite, a singular matrix
+   *   (the determinant of its normalised columns is below 1e-8), positions beyond the range of single precision, or the
+   *   mesh of a model: `clone()` it first. The mesh is then unchanged.
+   */
+  transform(matrix: ArrayLike<number>): void {
+    const entries = numbers('matrix', matrix, 16);
+    this.#handle.use((raw) => raw.transform(entries));
+  }
+
+  /**
+   * Tests for each point whether it is inside the mesh; returns 1 for inside and 0 for outside. Inside is where the
+   * winding number, the number of times the surface encloses a point, is not 0, whether triangles face outwards or
+   * inwards. The mesh must be closed, but may intersect itself.
+   *
+   * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of
+   * two meshes that share a wall exactly one contains it.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param points - Packed xyz of each point, in the mesh's coordinates.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`: a length that is no multiple of 3, or a number that
+   *   is not finite.
+   */
+  contains(points: Float32Array): Uint8Array {
+    const array = finite('points', points, 3);
+    return this.#handle.use((raw) => raw.contains(array));
+  }
+
+  /**
+   * Voxelises the mesh on the grid of a volume: returns a volume with the dimensions, affine and space of `like`, and
+   * one frame. Inside is defined as for {@link Mesh.contains}; the mesh must be closed, but may intersect itself.
+   *
+   * - `'mask'` (default): `value` in each voxel whose centre is inside, 0 elsewhere, in the smallest unsigned integer
+   *   type that holds `value`. Exact for vertices mapped to voxel indices in double precision; a centre on the surface
+   *   counts as moved by an infinitesimal amount along the grid's axes.
+   * - `'coverage'`: the fraction of each voxel inside, 0..1, 32-bit floats. Triangles are clipped to the voxels, so it
+   *   is exact to single precision; only in voxels where the surface intersects itself may it be wrong.
+   * - `'distance'`: the signed distance of each voxel centre from the surface, in world units, negative inside, 32-bit
+   *   floats. Exact to single precision. Takes longest: about half a microsecond a voxel.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param like - Volume whose grid is used; its intensities have no influence.
+   * @param options - `value`: of a mask, 1 to 4,294,967,295; default 1.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for distances from a mesh without triangles;
+   *   `too-large`.
+   */
+  toVolume(like: Volume, options: { kind?: VoxelKind; value?: number } = {}): Volume {
+    const { kind = 'mask', value } = checkProperties('options', options, ['kind', 'value']);
+    choice('kind', kind, VOXEL_KINDS);
+    if (value !== undefined && kind !== 'mask') throw invalid('value', `only a mask has a value, not a ${kind} volume`);
+    const inside = integer('value', value ?? 1, { min: 1 });
+    const handle = volumeHandle('like', like);
+    return wrapVolume(() => this.#handle.use((raw) => handle.use((grid) => raw.toVolume(grid, kind, inside))));
   }
 
   /**

@@ -90,6 +90,7 @@ export type {
   VolumeFormat,
   VolumeInit,
   VoxelArray,
+  VoxelKind,
 } from './index.js';
 export { transfer } from './worker-remote.js';
 export type { NodeWorker } from './worker-session.js';

@@ -27,6 +27,10 @@ const BENCHES = {
     inNode: async () => (await import('../bench/remesh.mjs')).measure(REPEATS),
     rows: remeshRows,
   },
+  voxelise: {
+    inNode: async () => (await import('../bench/voxelise.mjs')).measure(REPEATS),
+    rows: voxeliseRows,
+  },
   skin: {
     file: BUST,
     inNode: async () => (await import('../bench/skin.mjs')).measure(new Uint8Array(await readFile(at(BUST))), REPEATS),
@@ -131,6 +135,19 @@ function remeshRows({ host, rows }) {
       `${selfIntersections} self-intersections`,
   ];
   return [[host, '', `best of ${REPEATS}`], ...rows.map(row)];
+}
+
+function voxeliseRows({ host, sizes }) {
+  const row = ({ kind, milliseconds, ratio }) => [
+    `  ${kind}`,
+    seconds(milliseconds),
+    `${ratio.toFixed(2)} of marching cubes of the distances`,
+  ];
+  const part = ({ size, triangles, rows }) => [
+    [`  ${size} x ${size} x ${size}`, '', `from ${triangles} triangles`],
+    ...rows.map(row),
+  ];
+  return [[host, '', `best of ${REPEATS}`], ...sizes.flatMap(part)];
 }
 
 function skinRows({ host, rows }) {

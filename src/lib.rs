@@ -2,11 +2,11 @@
 //! to a volume.
 //!
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
-//! methods < bindings`; `io` uses only math, mesh and volume.
+//! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial.
 //!
 //! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
-//! files to the bindings, `enrich` the interpolation of slices, `labels` label maps and the writers of volume files.
-//! All are on by default.
+//! files to the bindings, `enrich` the interpolation of slices, `labels` label maps, the writers of volume files,
+//! voxelisation, and smoothing and transforms of meshes. All are on by default.
 
 #![cfg_attr(
     not(all(
@@ -33,6 +33,7 @@ pub mod methods;
 pub mod remesh;
 pub mod spatial;
 pub mod volume;
+pub mod voxelise;
 
 #[cfg(target_arch = "wasm32")]
 pub mod bindings;

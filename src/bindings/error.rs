@@ -8,6 +8,8 @@ use crate::io::FormatError;
 use crate::mesh::MeshError;
 use crate::methods::MethodError;
 use crate::volume::VolumeError;
+#[cfg(feature = "labels")]
+use crate::voxelise::VoxeliseError;
 
 /// An error with the code and message that JavaScript receives.
 #[derive(Debug)]
@@ -63,6 +65,16 @@ impl From<VolumeError> for Failure {
             VolumeError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())
+    }
+}
+
+#[cfg(feature = "labels")]
+impl From<VoxeliseError> for Failure {
+    fn from(error: VoxeliseError) -> Self {
+        match error {
+            VoxeliseError::Mesh(error) => error.into(),
+            VoxeliseError::Volume(error) => error.into(),
+        }
     }
 }
 

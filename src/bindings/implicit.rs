@@ -9,7 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{bytes, floats, packed, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh};
+use super::mesh::{RawMesh, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use crate::math::Vec3;
@@ -99,7 +99,7 @@ impl RawImplicit {
     /// coloured; empty in other phases.
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
-        Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
+        Ok(RawMesh(triangle_list(mesh)))
     }
 
     /// Replaces all manual edits of the input points: the positions of added points and of exterior points (known to be

@@ -25,8 +25,8 @@ use crate::volume::marching_cubes_world;
 pub(super) enum MeshKind {
     /// A closed mesh that can be edited.
     Surface(Box<Mesh>),
-    /// A list of triangles as given, which may be open or intersect itself.
-    Triangles(Rc<TriangleMesh>),
+    /// A list of triangles as given, which may be open or intersect itself, and its topology and geometry version.
+    Triangles(Rc<TriangleMesh>, [u32; 2]),
     /// The live surface of a model.
     Live(Rc<RefCell<dyn LiveSurface>>),
 }
@@ -107,7 +107,7 @@ impl RawMesh {
     pub fn vertex_count(&self) -> usize {
         match &self.0 {
             MeshKind::Surface(mesh) => mesh.vertex_count(),
-            MeshKind::Triangles(mesh) => mesh.positions.len(),
+            MeshKind::Triangles(mesh, _) => mesh.positions.len(),
             MeshKind::Live(model) => model.borrow().counts()[0],
         }
     }
@@ -117,29 +117,28 @@ impl RawMesh {
     pub fn triangle_count(&self) -> usize {
         match &self.0 {
             MeshKind::Surface(mesh) => mesh.triangle_count(),
-            MeshKind::Triangles(mesh) => mesh.triangles.len(),
+            MeshKind::Triangles(mesh, _) => mesh.triangles.len(),
             MeshKind::Live(model) => model.borrow().counts()[1],
         }
     }
 
-    /// Returns a counter that increases when connectivity changes, so that copies can be recognised as out of date; 0
-    /// for a triangle list.
+    /// Returns a counter that increases when connectivity changes, so that copies can be recognised as out of date.
     #[wasm_bindgen(js_name = topologyVersion)]
     pub fn topology_version(&self) -> u32 {
         match &self.0 {
             MeshKind::Surface(mesh) => mesh.topology_version(),
-            MeshKind::Triangles(_) => 0,
+            MeshKind::Triangles(_, versions) => versions[0],
             MeshKind::Live(model) => model.borrow().versions()[0],
         }
     }
 
     /// Returns a counter that increases when any vertex moves or connectivity changes, so that copies can be recognised
-    /// as out of date; 0 for a triangle list.
+    /// as out of date.
     #[wasm_bindgen(js_name = geometryVersion)]
     pub fn geometry_version(&self) -> u32 {
         match &self.0 {
             MeshKind::Surface(mesh) => mesh.geometry_version(),
-            MeshKind::Triangles(_) => 0,
+            MeshKind::Triangles(_, versions) => versions[1],
             MeshKind::Live(model) => model.borrow().versions()[1],
         }
     }
@@ -172,7 +171,7 @@ impl RawMesh {
         let texture = match &self.0 {
             // Editable meshes have no texture.
             MeshKind::Surface(_) => None,
-            MeshKind::Triangles(_) | MeshKind::Live(_) => self.triangles().texture.clone(),
+            MeshKind::Triangles(..) | MeshKind::Live(_) => self.triangles().texture.clone(),
         };
         texture.map(RawTexture)
     }
@@ -219,7 +218,7 @@ impl RawMesh {
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
         // Truncates a fraction, and saturates a count that no mesh can have.
         let target = target_triangles as usize;
-        if let MeshKind::Triangles(mesh) = &self.0
+        if let MeshKind::Triangles(mesh, _) = &self.0
             && mesh.triangles.len() <= target
         {
             // Already small enough: nothing changes, but an open mesh is still rejected.
@@ -296,7 +295,8 @@ impl RawMesh {
     pub fn duplicate(&self) -> RawMesh {
         match &self.0 {
             MeshKind::Surface(mesh) => RawMesh(MeshKind::Surface(mesh.clone())),
-            MeshKind::Triangles(_) | MeshKind::Live(_) => RawMesh(MeshKind::Triangles(self.triangles())),
+            MeshKind::Triangles(mesh, versions) => RawMesh(MeshKind::Triangles(Rc::clone(mesh), *versions)),
+            MeshKind::Live(_) => RawMesh(MeshKind::Triangles(self.triangles(), [0, 0])),
         }
     }
 
@@ -314,20 +314,22 @@ impl RawMesh {
     pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
         match &self.0 {
             MeshKind::Surface(mesh) => Rc::new(mesh.to_triangles()),
-            MeshKind::Triangles(mesh) => Rc::clone(mesh),
+            MeshKind::Triangles(mesh, _) => Rc::clone(mesh),
             MeshKind::Live(model) => Rc::new(model.borrow().surface()),
         }
     }
 
     /// Returns the mesh for editing; a triangle list is replaced by an editable mesh first. An error if the list is not
     /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
-    fn editable(&mut self) -> Result<&mut Mesh, Failure> {
-        if let MeshKind::Triangles(triangles) = &self.0 {
-            self.0 = MeshKind::Surface(Box::new(Mesh::from_triangles(triangles)?));
+    pub(super) fn editable(&mut self) -> Result<&mut Mesh, Failure> {
+        if let MeshKind::Triangles(triangles, versions) = &self.0 {
+            let mut mesh = Mesh::from_triangles(triangles)?;
+            mesh.set_versions(*versions);
+            self.0 = MeshKind::Surface(Box::new(mesh));
         }
         match &mut self.0 {
             MeshKind::Surface(mesh) => Ok(mesh),
-            _ => Err(Failure::invalid("mesh", "belongs to a model and is read-only: clone() it first")),
+            _ => Err(read_only()),
         }
     }
 }
@@ -376,7 +378,12 @@ fn copy_into(out: &Float32Array, values: &[f32]) {
 }
 
 pub(super) fn triangle_list(mesh: TriangleMesh) -> MeshKind {
-    MeshKind::Triangles(Rc::new(mesh))
+    MeshKind::Triangles(Rc::new(mesh), [0, 0])
+}
+
+/// Returns the failure of an edit of a model's live mesh.
+pub(super) fn read_only() -> Failure {
+    Failure::invalid("mesh", "belongs to a model and is read-only: clone() it first")
 }
 
 fn to_f32(values: &[f64]) -> Vec<f32> {

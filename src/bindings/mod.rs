@@ -34,6 +34,8 @@ mod texture;
 mod tracking;
 #[cfg(feature = "processing")]
 mod volume;
+#[cfg(feature = "labels")]
+mod voxelise;
 
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::throw_val;

@@ -9,7 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh, TriangleCopy};
+use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
 use crate::mesh::TriangleMesh;
 use crate::methods::LiveSurface;
@@ -79,7 +79,7 @@ impl RawMultires {
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
-        levels.into_iter().map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh)))).collect()
+        levels.into_iter().map(|mesh| RawMesh(triangle_list(mesh))).collect()
     }
 
     /// Sets the target ellipsoids, towards which the model moves its current ellipsoids: twelve numbers each, the

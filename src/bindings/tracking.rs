@@ -9,7 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh, TriangleCopy};
+use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use crate::io::write_animation;
@@ -64,7 +64,7 @@ impl RawTracker {
     #[wasm_bindgen(js_name = meshAt)]
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
         let tracker = self.0.borrow();
-        tracker.meshes().get(frame).map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh.clone()))))
+        tracker.meshes().get(frame).map(|mesh| RawMesh(triangle_list(mesh.clone())))
     }
 
     /// Returns the index of the frame that the live mesh shows, the newest finished one; 0 before the first one is

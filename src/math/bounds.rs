@@ -3,6 +3,7 @@
 use super::order::{combined_rank, rank_f32, select_least};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// An axis-aligned bounding box; its faces belong to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -243,6 +244,43 @@ impl BoxTree {
             visit(item);
             0.0
         });
+    }
+
+    /// Returns the number of nodes of the tree, for data kept per node.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Returns the box of a node.
+    #[inline]
+    pub fn node_bounds(&self, node: usize) -> &Bounds {
+        &self.nodes[node].bounds
+    }
+
+    /// Returns the children of a node; `None` for a leaf.
+    #[inline]
+    pub fn children(&self, node: usize) -> Option<[usize; 2]> {
+        let Node { link, count, .. } = self.nodes[node];
+        (count == 0).then_some([node + 1, link as usize])
+    }
+
+    /// Returns all items (indices of boxes), those below each node next to each other; see [`Self::node_range`].
+    pub fn order(&self) -> impl Iterator<Item = u32> {
+        self.items.iter().map(|(_, item)| *item)
+    }
+
+    /// Returns the range of the items below a node in [`Self::order`].
+    #[inline]
+    pub fn node_range(&self, node: usize) -> Range<usize> {
+        let [mut first, mut last] = [node; 2];
+        while self.nodes[first].count == 0 {
+            first += 1;
+        }
+        while self.nodes[last].count == 0 {
+            last = self.nodes[last].link as usize;
+        }
+        let [first, last] = [&self.nodes[first], &self.nodes[last]];
+        first.link as usize..(last.link + last.count) as usize
     }
 
     /// The traversal that all queries share: visits items for whose boxes `entry` returns a distance within the bound,

@@ -4,6 +4,7 @@
 
 mod bounds;
 mod conjugate_gradients;
+pub mod crossing;
 mod groups;
 mod min_max;
 pub mod order;

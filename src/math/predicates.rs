@@ -1,12 +1,13 @@
 //! Exact predicates on points, segments and triangles: the sign of a determinant is never affected by rounding.
 //!
 //! Determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation with an error bound decides
-//! nearly all calls, and exact arithmetic only those within the bound. Coordinates are `f32`, except in [`orient2d`]:
-//! products of three `f32` can neither overflow nor underflow in `f64`, so the results hold for all finite coordinates.
+//! nearly all calls, and exact arithmetic only those within the bound. Coordinates are `f32`, except in [`orient2d`]
+//! and [`orient3d_f64`]: products of three `f32` can neither overflow nor underflow in `f64`, so the results hold for
+//! all finite coordinates.
 //!
 //! Triangles, segments and boxes are closed sets: if they touch, they intersect.
 
-use super::{Bounds, DVec2, Vec3};
+use super::{Bounds, DVec2, DVec3, Vec3};
 use robust::{Coord, Coord3D};
 
 /// Returns six times the signed volume of the tetrahedron `a b c d`, with an exact sign: positive if `d` is on the side
@@ -17,6 +18,14 @@ use robust::{Coord, Coord3D};
 #[inline]
 pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     robust::orient3d(coordinates(a), coordinates(b), coordinates(c), coordinates(d))
+}
+
+/// Returns the same as [`orient3d`] for points in double precision. The sign is exact unless products of coordinates
+/// overflow or underflow.
+#[inline]
+pub fn orient3d_f64(points: [DVec3; 4]) -> f64 {
+    let [a, b, c, d] = points.map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
+    robust::orient3d(a, b, c, d)
 }
 
 #[inline]

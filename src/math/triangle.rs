@@ -44,8 +44,25 @@ pub fn point_at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
 /// Returns the barycentric coordinates (of `a`, `b`, `c`; none negative, sum 1) of the triangle's closest point to `p`.
 ///
 /// A triangle without area is treated as the segment or point that it is.
-pub fn closest_barycentric([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
-    let [a, b, c] = [a, b, c].map(|q| q.as_dvec3() - p.as_dvec3());
+pub fn closest_barycentric(triangle: [Vec3; 3], p: Vec3) -> DVec3 {
+    closest_to_origin(triangle.map(|q| q.as_dvec3() - p.as_dvec3()))
+}
+
+/// Returns the squared distance of a point in double precision from the triangle.
+pub fn distance_squared(triangle: [Vec3; 3], p: DVec3) -> f64 {
+    from_closest(triangle, p).length_squared()
+}
+
+/// Returns the vector to `p` from the closest point of the triangle.
+pub fn from_closest(triangle: [Vec3; 3], p: DVec3) -> DVec3 {
+    let [a, b, c] = triangle.map(|q| q.as_dvec3() - p);
+    let closest = closest_to_origin([a, b, c]);
+    -(a * closest.x + b * closest.y + c * closest.z)
+}
+
+/// Returns the barycentric coordinates of the closest point to the origin, as [`closest_barycentric`].
+#[inline]
+fn closest_to_origin([a, b, c]: [DVec3; 3]) -> DVec3 {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac);
     let size = normal.length_squared();

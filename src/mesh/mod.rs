@@ -13,6 +13,7 @@
 mod attributes;
 mod build;
 mod check;
+mod closed;
 mod component_volumes;
 mod components;
 mod curvature;
@@ -34,6 +35,7 @@ mod self_intersections;
 pub(crate) mod shapes;
 mod surgery;
 mod texture;
+mod transform;
 mod triangles;
 mod tube;
 mod weld;
@@ -55,6 +57,7 @@ pub use ring::Ring;
 pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};
 pub use surgery::{Cut, TubeRims};
 pub use texture::{ImageKind, Texture};
+pub use transform::invertible_map;
 pub use triangles::TriangleMesh;
 
 use crate::math::Vec3;
@@ -131,6 +134,11 @@ impl Mesh {
     /// Returns the topology version and the geometry version, by which caches tell whether they are out of date.
     pub fn versions(&self) -> [u32; 2] {
         [self.topology_version, self.geometry_version]
+    }
+
+    /// Sets the topology version and the geometry version, for a mesh that replaces a triangle list with these.
+    pub fn set_versions(&mut self, [topology, geometry]: [u32; 2]) {
+        (self.topology_version, self.geometry_version) = (topology, geometry);
     }
 
     /// Advances both version counters beyond those of `replaced`, the mesh that this one replaces, so that caches built

@@ -120,6 +120,11 @@ impl Ring {
         }
     }
 
+    /// Reverses the cycle, which turns the triangles of the vertex over if done in all rings.
+    pub(super) fn reverse(&mut self) {
+        self.0.reverse();
+    }
+
     pub(super) fn renumber(&mut self, new_id: impl Fn(VertexId) -> VertexId) {
         for v in &mut self.0 {
             *v = new_id(*v);

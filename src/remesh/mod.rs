@@ -7,7 +7,7 @@
 //! [`Embedding`] keeps the mesh free of self-intersections.
 //!
 //! [`decimate()`] reduces a static mesh, [`remesh`] remeshes it isotropically, with even edge lengths and well-shaped
-//! triangles; neither changes topology.
+//! triangles; [`smooth`] removes noise. None of them changes topology.
 
 mod changes;
 mod clustering;
@@ -22,6 +22,8 @@ mod resolve;
 mod restructure;
 mod sampling;
 mod small_components;
+mod smooth;
+mod unit_scale;
 
 pub use changes::Changes;
 pub use clustering::clustered;
@@ -33,3 +35,4 @@ pub use restructure::{
     EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,
 };
 pub use sampling::Sampling;
+pub use smooth::{Smoothing, smooth};

@@ -1,8 +1,12 @@
 //! Spatial queries: neighbours of points, pairs of vertices near each other, closest points and ray intersections of
-//! surfaces, cross-sections, and distances between surfaces.
+//! surfaces, inside tests, cross-sections, and distances from and between surfaces.
 
 mod cells;
+mod contains;
+mod cylinder_tree;
 mod distance;
+mod four_triangles;
+mod lattice_distance;
 mod points;
 mod section;
 mod surface_walker;
@@ -11,7 +15,9 @@ mod tree;
 mod vertex_grid;
 
 pub use cells::CellSet;
+pub use contains::contains;
 pub use distance::{SurfaceDistance, surface_distance};
+pub use lattice_distance::lattice_distances;
 pub use points::PointGrid;
 pub use section::cross_section;
 pub use surface_walker::SurfaceWalker;

@@ -37,3 +37,13 @@ pub(crate) fn reserve<T>(count: usize) -> Result<Vec<T>, VolumeError> {
     out.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
     Ok(out)
 }
+
+/// Returns a vector of `count` copies of `value`.
+///
+/// # Errors
+/// [`VolumeError::TooLarge`] if the allocation fails.
+pub(crate) fn filled<T: Clone>(count: usize, value: T) -> Result<Vec<T>, VolumeError> {
+    let mut out = reserve(count)?;
+    out.resize(count, value);
+    Ok(out)
+}

@@ -24,6 +24,7 @@
 
 mod binning;
 mod contour;
+mod coverage;
 mod crop;
 pub(crate) mod cube_cases;
 mod dice;
@@ -36,6 +37,7 @@ mod labels;
 mod pyramid;
 mod region;
 mod resample;
+mod row_sweep;
 mod same_grid;
 mod sampling;
 mod sequence;
@@ -47,10 +49,12 @@ mod voxels;
 mod write;
 
 pub use contour::{marching_cubes, marching_cubes_world};
+pub use coverage::coverage;
 pub use enrich::Enrichment;
 pub use error::VolumeError;
+pub(crate) use error::filled;
 pub use grid::{CellCache, Grid, VectorGrid};
-pub use inside::voxels_inside;
+pub use inside::{FillRule, for_each_inside, voxels_inside};
 pub use labels::LabelCount;
 pub use region::Region;
 pub use resample::{Interpolation, ResampleGrid};
@@ -162,6 +166,18 @@ impl Volume {
             unit: LengthUnit::Unknown,
             range,
         })
+    }
+
+    /// Returns a volume on the grid of this one, with the same dimensions, affine, space and length unit, but one
+    /// frame, whose intensities are `voxels`.
+    ///
+    /// # Errors
+    /// As [`Volume::new`].
+    pub fn with_voxels(&self, voxels: Voxels) -> Result<Volume, VolumeError> {
+        let [nx, ny, nz] = self.dims();
+        let Self { affine, space, .. } = *self;
+        let volume = Volume::new(VolumeInit { affine, space, ..VolumeInit::new(voxels, [nx, ny, nz, 1]) })?;
+        Ok(volume.with_unit(self.unit))
     }
 
     /// Returns the volume with the length unit of its world coordinates set to `unit`.

@@ -162,6 +162,14 @@ export class Mesh {
   remesh(edge: { min: number; max: number }): void;
   /** Quadric decimation that keeps the mesh closed and its topology unchanged. */
   decimate(targetTriangles: number): void;
+  /** Taubin smoothing; no new self-intersections; enclosed volume kept by default. */
+  smooth(options: { iterations: number; keepVolume?: boolean }): void;
+  /** 4x4 column-major affine; singular and non-finite ones are refused; a reflection flips the triangles. */
+  transform(matrix: Float64Array): void;
+  /** World xyz; 1 inside, 0 outside; exact. */
+  contains(points: Float32Array): Uint8Array;
+  /** On the grid of `like`: exact mask of voxel centres, coverage 0..1, or signed distance (negative inside). */
+  toVolume(like: Volume, options?: { kind?: 'mask' | 'coverage' | 'distance'; value?: number }): Volume;
   /** Per vertex. */
   curvature(kind: 'mean' | 'gaussian'): Float32Array;
   geodesic(fromVertex: number): Float32Array;

@@ -87,6 +87,11 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const copy = await found.clone();
     await copy.refine();
     const moved = await copy.restructure({ min: 0.6, max: 2 }, ['flip']);
+    const smoothed = await found.clone();
+    await smoothed.smooth({ iterations: 2 });
+    await smoothed.transform([-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 24, 0, 0, 1]);
+    const grid = new Volume({ data, dims: DIMS });
+    const distances = await smoothed.toVolume(grid, { kind: 'distance' });
     return [
       await parsed.arrays(),
       await (await textured.splitAtSeams()).arrays(),
@@ -95,6 +100,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
       await Promise.all([found.vertexCount, found.triangleCount, found.topologyVersion, found.geometryVersion]),
       await Promise.all([ball.texture, ball.pick([3, 0.1, 0], [-1, 0, 0]), ball.pick([3, 0, 0], [1, 0, 0])]),
       await Promise.all([ball.distanceTo(parsed), ball.crossSection([0, 0, 0.1], [0, 0, 1])]),
+      await Promise.all([smoothed.arrays(), distances.intensities(), smoothed.contains(positions)]),
     ];
   },
   deformable: async ({ DeformableModel, Mesh, Volume }) => {

@@ -21,6 +21,7 @@ mod relax;
 mod session;
 
 use super::restructure::{MAX_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
+use super::unit_scale::unit_scale;
 use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
 use crate::mesh::{Mesh, MeshError};
 use conflicts::ConflictMask;
@@ -68,10 +69,7 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
         return Ok(Changes::default());
     }
     let before = mesh.clone();
-    // Scaled to edges of about 1, whose squares neither over- nor underflow; by a power of two, which is exact.
-    let (_, exponent) = libm::frexpf(bounds.max);
-    let exponent = exponent.clamp(-EXPONENTS, EXPONENTS);
-    let [shrink, grow] = [-exponent, exponent].map(|power| libm::ldexpf(1.0, power));
+    let [shrink, grow] = unit_scale(bounds.max);
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
     let changes = remesh_scaled(mesh, bounds.scaled(shrink));
     if mesh.vertex_count() >= MAX_VERTICES {
@@ -89,10 +87,6 @@ fn is_one_point(mesh: &Mesh) -> bool {
     let first = positions.next();
     positions.all(|position| Some(position) == first)
 }
-
-/// The largest exponent of two by which lengths are scaled before remeshing and back afterwards, so that both factors
-/// are in the range of `f32`.
-const EXPONENTS: i32 = 120;
 
 /// Remeshes a mesh that was scaled to edges of about 1: with unchecked edits, then with checked ones where these caused
 /// self-intersections. Returns the changes made.

@@ -1,0 +1,60 @@
+//! Bindings of voxelisation, inside tests, smoothing and transforms of meshes.
+
+use std::rc::Rc;
+
+use js_sys::Float32Array;
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::convert::points;
+use super::error::Failure;
+use super::mesh::{MeshKind, RawMesh, read_only};
+use super::volume::RawVolume;
+use crate::mesh::invertible_map;
+use crate::remesh::{Smoothing, smooth};
+use crate::spatial::contains;
+use crate::voxelise::{VoxelKind, voxelise};
+
+#[wasm_bindgen]
+impl RawMesh {
+    /// Returns a volume on the grid of `like`: `kind` is mask (of intensity `value` inside), coverage or distance; see
+    /// [`voxelise`].
+    #[wasm_bindgen(js_name = toVolume)]
+    pub fn to_volume(&self, like: &RawVolume, kind: &str, value: u32) -> Result<RawVolume, JsValue> {
+        let kind = match kind {
+            "mask" => VoxelKind::Mask { value },
+            "coverage" => VoxelKind::Coverage,
+            "distance" => VoxelKind::Distance,
+            _ => return Err(Failure::invalid("kind", "must be one of mask, coverage, distance").into()),
+        };
+        Ok(RawVolume(voxelise(&self.triangles(), &like.0, kind).map_err(Failure::from)?))
+    }
+
+    /// Returns 1 for each point inside the mesh, and 0 for each outside; the points are x, y and z in turn.
+    pub fn contains(&self, at: &Float32Array) -> Result<Vec<u8>, JsValue> {
+        let inside = contains(&self.triangles(), &points(at)?).map_err(Failure::from)?;
+        Ok(inside.into_iter().map(u8::from).collect())
+    }
+
+    /// Smooths the mesh; see [`smooth`].
+    pub fn smooth(&mut self, iterations: usize, keep_volume: bool) -> Result<(), JsValue> {
+        let smoothing = Smoothing { iterations, keeps_volume: keep_volume };
+        Ok(smooth(self.editable()?, smoothing).map_err(Failure::from)?)
+    }
+
+    /// Transforms the mesh by a 4 × 4 matrix, column by column.
+    pub fn transform(&mut self, matrix: &[f64]) -> Result<(), JsValue> {
+        let matrix = matrix.try_into().map_err(|_| Failure::invalid("matrix", "must be 16 numbers"))?;
+        let map = invertible_map(matrix).map_err(Failure::from)?;
+        match &mut self.0 {
+            MeshKind::Surface(mesh) => mesh.transform(&map).map_err(Failure::from)?,
+            MeshKind::Triangles(mesh, versions) => {
+                *mesh = Rc::new(mesh.checked_transformed(&map).map_err(Failure::from)?);
+                let reflects = map.matrix3.determinant() < 0.0;
+                versions[0] = versions[0].wrapping_add(u32::from(reflects));
+                versions[1] = versions[1].wrapping_add(1);
+            }
+            MeshKind::Live(_) => return Err(read_only().into()),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,95 @@
+//! Exact inside tests of points.
+
+use super::TriangleTree;
+use crate::math::crossing::{crossing, is_beyond};
+use crate::math::{Bounds, DVec2, Vec3};
+use crate::mesh::{MeshError, TriangleMesh};
+
+/// Returns for each point whether it is inside a closed mesh: whether its winding number, the number of times the
+/// surface encloses it, is not 0. False for points that are not finite.
+///
+/// Exact. A point on the surface counts as moved by an infinitesimal amount along x, y and z; see
+/// [`crossing`](crate::math::crossing). A mesh is closed if its edges have equally many triangles in both directions;
+/// it may intersect itself.
+///
+/// # Errors
+/// As [`TriangleMesh::check_closed`].
+pub fn contains(mesh: &TriangleMesh, points: &[Vec3]) -> Result<Vec<bool>, MeshError> {
+    mesh.check_closed()?;
+    let tree = TriangleTree::new(mesh)?;
+    Ok(points.iter().map(|&p| p.is_finite() && winding_number(mesh, &tree, p) != 0).collect())
+}
+
+/// Returns the winding number of a point, from the triangles between it and infinity at low x.
+fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: Vec3) -> i32 {
+    let line = Bounds { min: Vec3::new(f32::NEG_INFINITY, p.y, p.z), max: p };
+    let at = DVec2::new(p.y.into(), p.z.into());
+    let mut winding = 0;
+    tree.for_each_overlapping(&line, |t| {
+        let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize].as_dvec3());
+        let crossing = crossing(corners, at);
+        if crossing != 0 && is_beyond(corners, crossing, p.as_dvec3()) {
+            winding += crossing;
+        }
+    });
+    winding
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Random, triangle};
+    use crate::mesh::Mesh;
+    use crate::mesh::shapes::{cuboid, joined, torus};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn points_are_inside_if_their_winding_number_is_not_0() {
+        let mut inside = 0;
+        for seed in 0..20 {
+            let mut random = Random::new(seed);
+            let mut vector = |size: f32| Vec3::from([(); 3].map(|()| size * (random.unit() as f32 - 0.5)));
+            let ball = Mesh::icosphere(vector(4.0), 2.0, 1.0).unwrap().to_triangles();
+            let mut mesh = joined(&[ball, torus(3.0, 1.0, 12, 7)]);
+            mesh.positions.iter_mut().for_each(|p| *p += vector(0.1 * seed as f32));
+            let points: Vec<Vec3> = (0..200).map(|_| vector(9.0)).collect();
+            for (p, found) in points.iter().zip(contains(&mesh, &points).unwrap()) {
+                let angle: f64 = mesh.corners().map(|corners| triangle::solid_angle(corners, *p)).sum();
+                assert_eq!(found, angle.abs() > std::f64::consts::TAU, "seed {seed}, {p}");
+                inside += usize::from(found);
+            }
+        }
+        assert!(inside > 400, "{inside}");
+    }
+
+    #[test]
+    fn points_on_the_surface_belong_to_one_of_two_solids() {
+        let cube = cuboid(Vec3::ONE);
+        let points: Vec<Vec3> =
+            (0..64).map(|i| Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32)).collect();
+        let mut found = vec![0; 64];
+        for at in points.iter().filter(|p| p.max_element() < 3.0) {
+            let mut mesh = cube.clone();
+            mesh.positions.iter_mut().for_each(|p| *p += *at);
+            contains(&mesh, &points)
+                .unwrap()
+                .iter()
+                .zip(&mut found)
+                .for_each(|(new, sum)| *sum += u32::from(*new));
+        }
+        for (p, count) in points.iter().zip(found) {
+            assert_eq!(count, u32::from(p.max_element() < 3.0), "{p}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_inside() {
+        let mut open = cuboid(Vec3::ONE);
+        open.triangles.pop();
+        assert!(matches!(contains(&open, &[]), Err(MeshError::NotClosed { .. })));
+        assert_eq!(contains(&TriangleMesh::default(), &[Vec3::ZERO]), Ok(vec![false]));
+        let points = [Vec3::NAN, Vec3::INFINITY, Vec3::splat(0.5)];
+        assert_eq!(contains(&cuboid(Vec3::ONE), &points), Ok(vec![false, false, true]));
+    }
+}
