@@ -20,6 +20,8 @@ export interface PanelEvents {
    * there, both in voxels. A returned grip follows the pointer until it is released, and `onPoint` is not called.
    */
   grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
+  /** Called with the position of the pointer over the slice image, in voxels; undefined when it has left. */
+  onHover?: (index: Vec3 | undefined) => void;
 }
 
 /** Handle of an object on a slice while it is dragged; positions are in voxels, also between and outside them. */
@@ -283,7 +285,7 @@ export class SlicePanel {
     }
   }
 
-  #followPointer({ onPoint, grab }: PanelEvents): void {
+  #followPointer({ onPoint, grab, onHover }: PanelEvents): void {
     let grip: Grip | undefined;
     const report = (event: PointerEvent) =>
       onPoint(this.#voxelAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
@@ -292,7 +294,9 @@ export class SlicePanel {
       grip = grab?.(this.#placeAt(event.offsetX, event.offsetY), this.#slack());
       if (!grip) report(event);
     });
+    this.#canvas.addEventListener('pointerleave', () => onHover?.(undefined));
     this.#canvas.addEventListener('pointermove', (event) => {
+      onHover?.(this.#placeAt(event.offsetX, event.offsetY));
       if (grip) grip.move(this.#placeAt(event.offsetX, event.offsetY));
       else if (event.buttons & 1) report(event);
     });

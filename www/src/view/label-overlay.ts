@@ -1,0 +1,64 @@
+import type { LabelArray, Vec3 } from '../segment/protocol';
+import { context2d } from '../ui/dom';
+import type { SliceOrientation } from './anatomy';
+import { pictureSize } from './slicing';
+
+/** Colours of labels: red, green, blue, 0..255. */
+export type LabelColors = ReadonlyMap<number, readonly [number, number, number]>;
+
+/** What is drawn over the slices: the labels, and the voxels that a threshold brush paints. */
+export interface Overlays {
+  dims: Vec3;
+  voxels: LabelArray;
+  /** Colours of the visible labels. */
+  colors: LabelColors;
+  /** 0..1; 0 hides the labels. */
+  opacity: number;
+  /** Not 0 for the voxels that the threshold brush paints; undefined while another tool is in use. */
+  mask: Uint8Array | undefined;
+}
+
+/** Colour and opacity (0..255) of the voxels that the threshold brush paints. */
+const MASK = [255, 255, 255, 70] as const;
+
+/** The image of the labels of one slice, one pixel a voxel, with the background transparent. */
+export class LabelPicture {
+  readonly canvas = document.createElement('canvas');
+  readonly #orientation: SliceOrientation;
+  readonly #pixels: ImageData;
+
+  constructor(dims: Vec3, orientation: SliceOrientation) {
+    const { width, height } = pictureSize({ dims, voxels: new Uint8Array() }, orientation);
+    Object.assign(this.canvas, { width, height });
+    this.#orientation = orientation;
+    this.#pixels = new ImageData(width, height);
+  }
+
+  /** Paints the slice with the given index. */
+  paint({ dims, voxels, colors, opacity, mask }: Overlays, index: number): void {
+    const { axis, horizontal, vertical } = this.#orientation;
+    const { width, height } = this.canvas;
+    const strides = [1, dims[0], dims[0] * dims[1]] as const;
+    const out = this.#pixels.data;
+    const alpha = Math.round(255 * opacity);
+    out.fill(0);
+    for (let j = 0; j < height; j++) {
+      const row = index * strides[axis] + (vertical.flip ? height - 1 - j : j) * strides[vertical.axis];
+      for (let i = 0; i < width; i++) {
+        const voxel = row + (horizontal.flip ? width - 1 - i : i) * strides[horizontal.axis];
+        const color = voxels[voxel] ? colors.get(voxels[voxel] ?? 0) : undefined;
+        const target = 4 * (j * width + i);
+        if (color && alpha > 0) put(out, target, ...color, alpha);
+        else if (mask?.[voxel]) put(out, target, ...MASK);
+      }
+    }
+    context2d(this.canvas)?.putImageData(this.#pixels, 0, 0);
+  }
+}
+
+function put(out: Uint8ClampedArray, at: number, red: number, green: number, blue: number, alpha: number): void {
+  out[at] = red;
+  out[at + 1] = green;
+  out[at + 2] = blue;
+  out[at + 3] = alpha;
+}
