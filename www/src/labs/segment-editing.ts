@@ -1,9 +1,8 @@
-import { toFailure } from '../channel';
 import { flood, sweep } from '../segment/brush';
 import type { SegmentClient } from '../segment/client';
 import { LabelMap, type Patch, rangeOf } from '../segment/label-map';
 import { freeValue, type Label, newLabel } from '../segment/labels';
-import type { LabelArray, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
+import type { LabelArray, OpenedLabels, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
 import { union } from '../segment/region';
 import { text } from '../texts';
 import type { ToolSettings } from '../ui/segment-tools';
@@ -29,8 +28,8 @@ export interface EditedLab {
   onLabels: () => void;
   /** Called when voxels have changed, before the surfaces follow. */
   onVoxels: () => void;
-  /** Called with the surfaces that the worker has updated; `settled` if no further change is pending. */
-  onUpdate: (update: SurfaceUpdate, settled: boolean) => void;
+  /** Called with surfaces that have followed a change, at first along the faces of voxels; later `smooth`. */
+  onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
   onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
@@ -53,9 +52,11 @@ export class SegmentEditing {
   readonly #hidden = new Set<number>();
   /** Box of the voxels that the worker does not know yet. */
   #unsent: Region | undefined;
-  #isSending = false;
-  /** Counts label maps opened, so that replies about a previous one are discarded. */
-  #turn = 0;
+  /** Whether the worker has yet to smooth surfaces. */
+  #isRough = false;
+  #isFollowing = false;
+  /** Number of the label map at the worker; replies about a previous one are discarded. */
+  #id = 0;
   /** Not 0 for the voxels that the threshold brush paints, as far as they are known. */
   mask: Uint8Array | undefined;
 
@@ -82,20 +83,16 @@ export class SegmentEditing {
 
   /** Whether the worker has yet to follow changes. */
   get isBusy(): boolean {
-    return this.#isSending || this.#unsent !== undefined;
+    return this.#isRough || this.#unsent !== undefined;
   }
 
   /**
-   * Takes over a newly opened label map, and clears the undo history. `present` are the labels with voxels, `names` those
-   * of the example; without either, there is one label to begin with.
+   * Takes over a newly opened label map, and clears the undo history. `names` are those of an example's labels; without
+   * any label there is one to begin with.
    */
-  adopt(
-    { dims, spacing }: Pick<VolumeView, 'dims' | 'spacing'>,
-    voxels: LabelArray,
-    present: number[],
-    names: string[],
-  ): void {
-    this.#start({ dims, spacing }, voxels);
+  adopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, opened: OpenedLabels, names: string[]): void {
+    this.#start(grid, opened);
+    const present = opened.surfaces.map(({ value }) => value);
     const named = new Map(names.map((name, i) => [i + 1, name]));
     const values = [...new Set([...present, ...named.keys()])].sort((a, b) => a - b);
     this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, named.get(value)));
@@ -105,17 +102,17 @@ export class SegmentEditing {
   }
 
   /** Takes over the label map opened again after a failure of the engine; the list of labels stays. */
-  readopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, voxels: LabelArray): void {
-    this.#start(grid, voxels);
+  readopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, opened: OpenedLabels): void {
+    this.#start(grid, opened);
     this.#lab.onLabels();
   }
 
-  #start({ dims, spacing }: Pick<VolumeView, 'dims' | 'spacing'>, voxels: LabelArray): void {
-    this.#turn += 1;
+  #start({ dims, spacing }: Pick<VolumeView, 'dims' | 'spacing'>, { map, voxels }: OpenedLabels): void {
+    this.#id = map;
     this.#map = new LabelMap(dims, voxels);
     this.#spacing = spacing;
     this.#unsent = undefined;
-    this.#isSending = false;
+    this.#isFollowing = false;
     this.mask = undefined;
     this.#undo.clear();
     this.#notify();
@@ -260,31 +257,40 @@ export class SegmentEditing {
     if (!box) return;
     this.#unsent = union(this.#unsent, box);
     this.#lab.onVoxels();
-    void this.#send();
+    this.follow();
   }
 
-  /** Sends the worker what has changed, until nothing is left; meanwhile further changes are collected. */
-  async #send(): Promise<void> {
-    if (this.#isSending) return;
-    this.#isSending = true;
-    const turn = this.#turn;
+  /** Has the worker adopt what has changed, and smooth the surfaces. */
+  follow(): void {
+    this.#isRough = true;
+    if (this.#isFollowing) return;
+    this.#isFollowing = true;
     this.#lab.onBusy();
-    try {
-      while (this.#unsent && this.#map) {
-        const block = this.#map.block(this.#unsent);
-        this.#unsent = undefined;
-        const update = await this.#client.request('edit', block);
-        if (turn !== this.#turn) return;
-        this.#lab.onUpdate(update, !this.#unsent);
-      }
-      this.#isSending = false;
-    } catch (error) {
-      if (turn !== this.#turn) return;
-      this.#isSending = false;
+    const id = this.#id;
+    this.#followChanges(id).catch((error) => {
+      if (id !== this.#id) return;
+      this.#isFollowing = false;
+      this.#isRough = false;
       this.#lab.onError(text('segment.editFailed'), error);
-      // The worker knows less than the page from here on: Reset opens both again.
-      if (toFailure(error).code !== 'internal') this.#unsent = undefined;
+    });
+  }
+
+  /**
+   * Sends the worker what has changed, as often as it is ready for more, and has it smooth the surfaces in between, step
+   * by step, so that the next change never waits for long.
+   */
+  async #followChanges(map: number): Promise<void> {
+    while (this.#map && (this.#unsent || this.#isRough)) {
+      const box = this.#unsent;
+      this.#unsent = undefined;
+      const update = box
+        ? { ...(await this.#client.request('edit', { map, block: this.#map.block(box) })), done: false }
+        : await this.#client.request('step', { map });
+      if (map !== this.#id) return;
+      this.#isRough = !update.done || this.#unsent !== undefined;
+      this.#lab.onUpdate(update, !this.#isRough);
     }
+    this.#isFollowing = false;
   }
 }
 

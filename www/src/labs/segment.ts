@@ -40,8 +40,8 @@ export class SegmentLab implements Lab {
   #maskTimer = 0;
   /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
   #released: number | undefined;
-  /** Milliseconds from the end of the last stroke until its surfaces were drawn. */
-  #settled: number | undefined;
+  /** Milliseconds from the end of the last stroke until surfaces with it were drawn, and smooth ones. */
+  #latency: { first?: number; smooth?: number } = {};
 
   constructor(root: HTMLElement, help: HTMLElement, _passOn: OpenInLab) {
     this.#root = root;
@@ -53,7 +53,7 @@ export class SegmentLab implements Lab {
     this.#editing = new SegmentEditing(this.#client, {
       onLabels: () => this.#showLabels(),
       onVoxels: () => ui.view.showLabels(),
-      onUpdate: (update, settled) => this.#take(update, settled),
+      onUpdate: (update, smooth) => this.#take(update, smooth),
       onBusy: () => states.setModelState('running'),
       onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
       onError: (title, error) => states.fail(title, error),
@@ -139,7 +139,7 @@ export class SegmentLab implements Lab {
 
   /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
   #adopt(opened: OpenedImage, { name, example, linked }: SegmentSource, reopening: boolean): void {
-    const { volume, voxels, surfaces, params } = opened;
+    const { volume, voxels, params } = opened;
     this.#states.ready = true;
     this.#volume = volume;
     this.#sharing.name = example?.id ?? name;
@@ -148,10 +148,9 @@ export class SegmentLab implements Lab {
     this.#ui.showParams(params);
     this.#forgetMask();
     this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, colors: new Map(), mask: undefined });
-    const present = surfaces.map(({ value }) => value);
-    if (reopening) this.#editing.readopt(volume, voxels);
+    if (reopening) this.#editing.readopt(volume, opened);
     else {
-      this.#editing.adopt(volume, voxels, present, example?.labels ?? []);
+      this.#editing.adopt(volume, opened, example?.labels ?? []);
       this.#ui.tools.set({ range: example?.range ?? [...volume.window] });
       this.#ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
     }
@@ -167,11 +166,9 @@ export class SegmentLab implements Lab {
     this.#states.load(text('labs.opening', { name }));
     try {
       const opened = await this.#client.request('openLabels', { files: await readFiles(files) });
-      const { voxels, surfaces } = opened;
-      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, colors: new Map(), mask: undefined });
+      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, colors: new Map(), mask: undefined });
       this.#forgetMask();
-      const present = surfaces.map(({ value }) => value);
-      this.#editing.adopt(volume, voxels, present, []);
+      this.#editing.adopt(volume, opened, []);
       this.#applyTool(this.#ui.tools.value);
       this.#ui.data.showMap(name);
       this.#showAll(opened);
@@ -182,18 +179,24 @@ export class SegmentLab implements Lab {
 
   #showAll(opened: OpenedLabels): void {
     this.#measures.clear();
-    this.#settled = undefined;
+    this.#released = undefined;
+    this.#latency = {};
     this.#show(opened);
-    this.#states.idle(this.#describe(), 'done');
+    this.#editing.follow();
   }
 
-  /** Shows the surfaces that followed a change. */
-  #take(update: SurfaceUpdate, settled: boolean): void {
+  /** Shows surfaces that have followed a change; when they are smooth, the lab is done. */
+  #take(update: SurfaceUpdate, smooth: boolean): void {
     this.#show(update);
-    if (!settled) return;
+    const released = this.#released;
+    if (update.surfaces.length > 0 && released !== undefined)
+      this.#ui.view.afterDrawing(() => {
+        const milliseconds = performance.now() - released;
+        this.#latency = smooth ? { ...this.#latency, smooth: milliseconds } : { first: milliseconds };
+        if (smooth) this.#released = undefined;
+      });
+    if (!smooth) return;
     this.#ui.view.afterDrawing(() => {
-      if (this.#released !== undefined) this.#settled = performance.now() - this.#released;
-      this.#released = undefined;
       if (this.#editing.isBusy) return;
       this.#showMeasures();
       if (this.#states.setModelState('done')) this.#ui.status.say(this.#describe());
@@ -212,8 +215,7 @@ export class SegmentLab implements Lab {
 
   #showMeasures(): void {
     const unit = this.#opening.source?.example?.unit ?? 'mm';
-    const isExample = this.#opening.source?.example !== undefined;
-    this.#ui.measures.show(this.#editing.labels, this.#measures, isExample ? unit : 'mm', this.#settled);
+    this.#ui.measures.show(this.#editing.labels, this.#measures, unit, this.#latency);
   }
 
   /** Shows the list of labels and their colours everywhere. */
@@ -300,11 +302,12 @@ export class SegmentLab implements Lab {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       try {
-        const update = await this.#client.request('setParams', { [name]: value });
-        this.#sharing.params = update.params;
-        this.#ui.showParams(update.params);
-        this.#show(update);
-        this.#sharing.updateAddress();
+        const params = await this.#client.request('setParams', { [name]: value });
+        this.#sharing.params = params;
+        this.#ui.showParams(params);
+        this.#released = undefined;
+        this.#latency = {};
+        this.#editing.follow();
       } catch (error) {
         const { code, message } = toFailure(error);
         if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
@@ -321,8 +324,9 @@ export class SegmentLab implements Lab {
   #describe(): string {
     const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
     const labels = plural('segment.surfaces', present.length);
-    if (this.#settled === undefined) return text('segment.ready', { labels });
-    return text('segment.followed', { labels, milliseconds: Math.round(this.#settled) });
+    const { smooth } = this.#latency;
+    if (smooth === undefined) return text('segment.ready', { labels });
+    return text('segment.followed', { labels, milliseconds: Math.round(smooth) });
   }
 
   #onEvent({ failure }: WorkerEvent): void {

@@ -43,14 +43,16 @@ export interface LabelSurface {
   surface: Surface | undefined;
 }
 
-/** Result of a change: the surfaces that may have changed, and the milliseconds that the worker spent on it. */
+/** Surfaces that may have changed, and the milliseconds that the worker spent on them. */
 export interface SurfaceUpdate {
   surfaces: LabelSurface[];
   milliseconds: number;
 }
 
-/** The open label map, with the surfaces of all its labels. */
+/** The open label map, with the surfaces of all its labels, which are not smooth yet. */
 export interface OpenedLabels extends SurfaceUpdate {
+  /** Number of the map, which requests that concern it name; another one opened meanwhile has another number. */
+  map: number;
   voxels: LabelArray;
 }
 
@@ -74,10 +76,18 @@ export interface Requests {
   };
   /** Replaces the label map of the open volume by that of a file, which must have the grid of the volume. */
   openLabels: { body: { files: NamedBytes[] }; reply: OpenedLabels };
-  /** Changes voxels of the label map; the surfaces follow. */
-  edit: { body: LabelBlock; reply: SurfaceUpdate };
-  /** Changes parameters of the surfaces; all of them follow. */
-  setParams: { body: ParamValues; reply: SurfaceUpdate & { params: ParamValues } };
+  /**
+   * Changes voxels of the label map; the surfaces follow at once, along the faces of the voxels. Does nothing if another
+   * map is open.
+   */
+  edit: { body: { map: number; block: LabelBlock }; reply: SurfaceUpdate };
+  /**
+   * Makes a step that smooths what has changed; the reply to the last one has the surfaces. Does nothing if another map
+   * is open.
+   */
+  step: { body: { map: number }; reply: SurfaceUpdate & { done: boolean } };
+  /** Changes parameters of the surfaces, which the next steps adopt; replies with all parameters. */
+  setParams: { body: ParamValues; reply: ParamValues };
   /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */
   mask: { body: { low: number; high: number }; reply: Uint8Array };
   /** Replies with the label map as a file, in the geometry of the volume. */

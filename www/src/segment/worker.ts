@@ -30,11 +30,11 @@ type Handlers = {
 
 /** Distance in voxels from a change within which surfaces may move: they are smoothed again up to 8 cells away. */
 const HALO = 9;
-/** More steps than any smoothing takes. */
-const ALL_STEPS = 1000;
+let maps = 0;
 
 /** A label map with its surfaces. */
 class LiveMap {
+  readonly id = ++maps;
   readonly map: Volume;
   readonly voxels: LabelArray;
   readonly surfaces: LabelSurfaces;
@@ -43,6 +43,9 @@ class LiveMap {
   /** Numbers of vertices and triangles of the surfaces when they were last sent, to reserve memory for the next. */
   readonly #sizes = new Map<number, [number, number]>();
   readonly #voxelVolume: number;
+  /** Labels whose surfaces may have changed since they were smooth. */
+  #changed = new Set<number>();
+  #isSmooth = false;
 
   constructor({ volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>, voxels: LabelArray, params: ParamValues) {
     this.voxels = voxels;
@@ -55,11 +58,24 @@ class LiveMap {
       throw error;
     }
     for (const label of voxels) this.#count(label, 1);
-    this.settle();
+    this.#changed = new Set(this.surfaces.labels);
   }
 
-  settle(): void {
-    this.surfaces.step(ALL_STEPS);
+  /** Makes a step; returns whether the surfaces are smooth. */
+  step(): boolean {
+    this.#isSmooth = this.surfaces.step(1).done;
+    return this.#isSmooth;
+  }
+
+  /** Labels whose surfaces may have changed by the last edits, until others follow when the surfaces are smooth. */
+  get changed(): ReadonlySet<number> {
+    return this.#changed;
+  }
+
+  setParams(params: ParamValues): void {
+    this.surfaces.setParams(params);
+    this.#changed = new Set(this.surfaces.labels);
+    this.#isSmooth = false;
   }
 
   /** Changes voxels, and has the surfaces follow; returns the labels whose surfaces may have changed. */
@@ -78,8 +94,10 @@ class LiveMap {
     });
     const { min, dims } = block;
     this.surfaces.refresh({ min, dims });
-    this.settle();
     for (const label of this.#labelsIn(near)) affected.add(label);
+    if (this.#isSmooth) this.#changed.clear();
+    for (const label of affected) this.#changed.add(label);
+    this.#isSmooth = false;
     return affected;
   }
 
@@ -143,18 +161,16 @@ class Session {
     },
     open: (body) => this.#openImage(body),
     openLabels: ({ files }) => this.#openLabels(files),
-    edit: (block) => {
+    edit: ({ map, block }) => {
       const began = performance.now();
       const live = this.#current();
-      return this.#update(live.write(block), began);
+      return this.#update(map === live.id ? live.write(block) : [], began);
     },
+    step: ({ map }) => this.#step(map),
     setParams: (params) => {
-      const began = performance.now();
       const live = this.#current();
-      live.surfaces.setParams(params);
-      live.settle();
-      const update = this.#update(live.labels, began);
-      return withTransfer({ ...update, params: { ...live.surfaces.params } }, arraysOf(update));
+      live.setParams(params);
+      return { ...live.surfaces.params };
     },
     mask: ({ low, high }) => this.#mask(low, high),
     exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: format !== 'nifti' }),
@@ -192,13 +208,22 @@ class Session {
     return withTransfer(all, [...arraysOf(all), all.voxels]);
   }
 
+  #step(map: number): SurfaceUpdate & { done: boolean } {
+    const began = performance.now();
+    const live = this.#current();
+    if (map !== live.id) return { surfaces: [], milliseconds: 0, done: true };
+    const done = live.step();
+    const update = this.#update(done ? live.changed : [], began);
+    return withTransfer({ ...update, done }, arraysOf(update));
+  }
+
   #adopt(live: LiveMap): void {
     this.#live?.free();
     this.#live = live;
   }
 
   #all(live: LiveMap, began: number): OpenedLabels {
-    return { ...this.#update(live.labels, began), voxels: live.voxels.slice() };
+    return { ...this.#update(live.labels, began), map: live.id, voxels: live.voxels.slice() };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {

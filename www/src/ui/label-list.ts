@@ -108,5 +108,9 @@ function iconButton(
   pressed?: boolean,
 ): HTMLButtonElement {
   const state = pressed === undefined ? {} : { 'aria-pressed': String(pressed) };
-  return h('button', { type: 'button', title: label, 'aria-label': label, onclick, ...state, ...data }, icon(path));
+  return h(
+    'button',
+    { type: 'button', class: 'icon-only', title: label, 'aria-label': label, onclick, ...state, ...data },
+    icon(path),
+  );
 }

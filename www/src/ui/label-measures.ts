@@ -38,11 +38,16 @@ export class LabelMeasureTable {
     );
   }
 
-  /** `settled`: milliseconds from the end of the last stroke until its surfaces were drawn, if that is known. */
-  show(labels: readonly Label[], measures: ReadonlyMap<number, LabelMeasures>, unit: Unit, settled?: number): void {
+  /** `latency`: milliseconds from the end of the last stroke until its surfaces were drawn, for other programs. */
+  show(
+    labels: readonly Label[],
+    measures: ReadonlyMap<number, LabelMeasures>,
+    unit: Unit,
+    latency: { first?: number; smooth?: number },
+  ): void {
     this.#body.replaceChildren(...labels.map((label) => row(label, measures.get(label.value), unit)));
     const all = labels.map(({ value, name }) => ({ name, ...(measures.get(value) ?? { value, voxels: 0 }) }));
-    this.element.dataset.measures = JSON.stringify({ labels: all, ...(settled !== undefined && { settled }) });
+    this.element.dataset.measures = JSON.stringify({ labels: all, latency });
   }
 }
 

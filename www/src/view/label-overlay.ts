@@ -18,8 +18,10 @@ export interface Overlays {
   mask: Uint8Array | undefined;
 }
 
-/** Colour and opacity (0..255) of the voxels that the threshold brush paints. */
+/** Colour and opacity (0..255) of the background voxels that the threshold brush paints. */
 const MASK = [255, 255, 255, 70] as const;
+/** Share of white in the colour of the labelled voxels that it paints. */
+const LIGHTER = 0.45;
 
 /** The image of the labels of one slice, one pixel a voxel, with the background transparent. */
 export class LabelPicture {
@@ -48,12 +50,18 @@ export class LabelPicture {
         const voxel = row + (horizontal.flip ? width - 1 - i : i) * strides[horizontal.axis];
         const color = voxels[voxel] ? colors.get(voxels[voxel] ?? 0) : undefined;
         const target = 4 * (j * width + i);
-        if (color && alpha > 0) put(out, target, ...color, alpha);
-        else if (mask?.[voxel]) put(out, target, ...MASK);
+        const isPainted = mask !== undefined && mask[voxel] !== 0;
+        if (color && alpha > 0) put(out, target, ...(isPainted ? lighter(color) : color), alpha);
+        else if (isPainted) put(out, target, ...MASK);
       }
     }
     context2d(this.canvas)?.putImageData(this.#pixels, 0, 0);
   }
+}
+
+function lighter([red, green, blue]: readonly [number, number, number]): [number, number, number] {
+  const mix = (value: number) => value + LIGHTER * (255 - value);
+  return [mix(red), mix(green), mix(blue)];
 }
 
 function put(out: Uint8ClampedArray, at: number, red: number, green: number, blue: number, alpha: number): void {
