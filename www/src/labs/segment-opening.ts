@@ -1,6 +1,6 @@
 import { exampleUrl } from '../examples';
 import type { SegmentClient } from '../segment/client';
-import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
+import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from '../segment/examples';
 import type { ImageSource, LabelArray, OpenedImage, ParamSpec } from '../segment/protocol';
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
@@ -39,7 +39,7 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
   }
 
   protected find(id: string): SegmentExample | undefined {
-    return SEGMENT_EXAMPLES.find((example) => example.id === id);
+    return segmentExampleById(id);
   }
 
   protected linkedBy(hash: string): LinkedSegment | undefined {

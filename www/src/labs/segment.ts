@@ -9,6 +9,7 @@ import { nameOf, readFiles } from '../ui/files';
 import type { LabelMeasures } from '../ui/label-measures';
 import type { Tool, ToolSettings } from '../ui/segment-tools';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import type { Overlays } from '../view/label-overlay';
 import { LabStates } from './lab-states';
 import type { Handoff, Lab, OpenInLab } from './labs';
 import { SegmentEditing } from './segment-editing';
@@ -19,6 +20,13 @@ import { SegmentSharing } from './segment-sharing';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
+
+/** Overlays before there are labels. */
+const NO_OVERLAYS: Pick<Overlays, 'colors' | 'paint' | 'mask'> = {
+  colors: new Map(),
+  paint: [255, 255, 255],
+  mask: undefined,
+};
 
 /**
  * The Segment lab: labels are painted on slices, and their surfaces follow. This class connects the lab's parts; opening,
@@ -42,6 +50,8 @@ export class SegmentLab implements Lab {
   #released: number | undefined;
   /** Milliseconds from the end of the last stroke until surfaces with it were drawn, and smooth ones. */
   #latency: { first?: number; smooth?: number } = {};
+  /** Number of times that surfaces were shown. */
+  #updates = 0;
 
   constructor(root: HTMLElement, help: HTMLElement, _passOn: OpenInLab) {
     this.#root = root;
@@ -79,6 +89,7 @@ export class SegmentLab implements Lab {
     this.#opening.close();
     this.#client.close();
     this.#ui.dispose();
+    delete this.#root.dataset.tool;
     this.#root.replaceChildren();
   }
 
@@ -147,7 +158,7 @@ export class SegmentLab implements Lab {
     this.#ui.data.show(opened, example);
     this.#ui.showParams(params);
     this.#forgetMask();
-    this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, colors: new Map(), mask: undefined });
+    this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
     if (reopening) this.#editing.readopt(volume, opened);
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
@@ -166,7 +177,7 @@ export class SegmentLab implements Lab {
     this.#states.load(text('labs.opening', { name }));
     try {
       const opened = await this.#client.request('openLabels', { files: await readFiles(files) });
-      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, colors: new Map(), mask: undefined });
+      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
       this.#applyTool(this.#ui.tools.value);
@@ -204,6 +215,7 @@ export class SegmentLab implements Lab {
   }
 
   #show({ surfaces }: SurfaceUpdate): void {
+    if (surfaces.length > 0) this.#updates += 1;
     for (const { value, voxels, volume, area, surface } of surfaces) {
       this.#ui.view.showSurface(value, surface);
       const { vertices = 0, triangles = 0 } = surface ?? {};
@@ -215,7 +227,10 @@ export class SegmentLab implements Lab {
 
   #showMeasures(): void {
     const unit = this.#opening.source?.example?.unit ?? 'mm';
-    this.#ui.measures.show(this.#editing.labels, this.#measures, unit, this.#latency);
+    this.#ui.measures.show(this.#editing.labels, this.#measures, unit, {
+      latency: this.#latency,
+      updates: this.#updates,
+    });
   }
 
   /** Shows the list of labels and their colours everywhere. */
@@ -224,7 +239,11 @@ export class SegmentLab implements Lab {
     const visible = labels.filter(({ value }) => !hidden.has(value));
     this.#ui.labels.show(labels, active, hidden);
     this.#ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
-    this.#ui.view.showLabels({ colors: new Map(visible.map((label) => [label.value, rgbOf(label)])) });
+    const painted = labels.find(({ value }) => value === active);
+    this.#ui.view.showLabels({
+      colors: new Map(visible.map((label) => [label.value, rgbOf(label)])),
+      ...(painted && { paint: rgbOf(painted) }),
+    });
     this.#showMeasures();
   }
 

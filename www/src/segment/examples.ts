@@ -49,3 +49,8 @@ export const SEGMENT_EXAMPLES: [SegmentExample, ...SegmentExample[]] = [
     credit: text('segment.ovuleCredit'),
   },
 ];
+
+/** Returns the example with this id, undefined if there is none. */
+export function segmentExampleById(id: string): SegmentExample | undefined {
+  return SEGMENT_EXAMPLES.find((example) => example.id === id);
+}

@@ -38,16 +38,19 @@ export class LabelMeasureTable {
     );
   }
 
-  /** `latency`: milliseconds from the end of the last stroke until its surfaces were drawn, for other programs. */
+  /**
+   * `more` is only for other programs: milliseconds from the end of the last stroke until its surfaces were drawn, and
+   * how often surfaces were shown.
+   */
   show(
     labels: readonly Label[],
     measures: ReadonlyMap<number, LabelMeasures>,
     unit: Unit,
-    latency: { first?: number; smooth?: number },
+    more: { latency: { first?: number; smooth?: number }; updates: number },
   ): void {
     this.#body.replaceChildren(...labels.map((label) => row(label, measures.get(label.value), unit)));
     const all = labels.map(({ value, name }) => ({ name, ...(measures.get(value) ?? { value, voxels: 0 }) }));
-    this.element.dataset.measures = JSON.stringify({ labels: all, latency });
+    this.element.dataset.measures = JSON.stringify({ labels: all, ...more });
   }
 }
 

@@ -14,12 +14,14 @@ export interface Overlays {
   colors: LabelColors;
   /** 0..1; 0 hides the labels. */
   opacity: number;
+  /** Colour of the label that the tools paint. */
+  paint: readonly [number, number, number];
   /** Not 0 for the voxels that the threshold brush paints; undefined while another tool is in use. */
   mask: Uint8Array | undefined;
 }
 
-/** Colour and opacity (0..255) of the background voxels that the threshold brush paints. */
-const MASK = [255, 255, 255, 70] as const;
+/** Opacity (0..255) of the tint of background voxels that the threshold brush paints. */
+const TINT = 70;
 /** Share of white in the colour of the labelled voxels that it paints. */
 const LIGHTER = 0.45;
 
@@ -37,7 +39,7 @@ export class LabelPicture {
   }
 
   /** Paints the slice with the given index. */
-  paint({ dims, voxels, colors, opacity, mask }: Overlays, index: number): void {
+  paint({ dims, voxels, colors, opacity, paint, mask }: Overlays, index: number): void {
     const { axis, horizontal, vertical } = this.#orientation;
     const { width, height } = this.canvas;
     const strides = [1, dims[0], dims[0] * dims[1]] as const;
@@ -52,7 +54,7 @@ export class LabelPicture {
         const target = 4 * (j * width + i);
         const isPainted = mask !== undefined && mask[voxel] !== 0;
         if (color && alpha > 0) put(out, target, ...(isPainted ? lighter(color) : color), alpha);
-        else if (isPainted) put(out, target, ...MASK);
+        else if (isPainted) put(out, target, ...paint, TINT);
       }
     }
     context2d(this.canvas)?.putImageData(this.#pixels, 0, 0);
