@@ -200,18 +200,20 @@ export class SegmentLab implements Lab {
   #take(update: SurfaceUpdate, smooth: boolean): void {
     this.#show(update);
     const released = this.#released;
-    if (update.surfaces.length > 0 && released !== undefined)
+    if (smooth) this.#ui.view.afterDrawing(() => this.#settle());
+    else if (update.surfaces.length > 0 && released !== undefined)
       this.#ui.view.afterDrawing(() => {
-        const milliseconds = performance.now() - released;
-        this.#latency = smooth ? { ...this.#latency, smooth: milliseconds } : { first: milliseconds };
-        if (smooth) this.#released = undefined;
+        this.#latency = { first: performance.now() - released };
       });
-    if (!smooth) return;
-    this.#ui.view.afterDrawing(() => {
-      if (this.#editing.isBusy) return;
-      this.#showMeasures();
-      if (this.#states.setModelState('done')) this.#ui.status.say(this.#describe());
-    });
+  }
+
+  /** Ends a change, when its smooth surfaces are drawn, unless another one has begun. */
+  #settle(): void {
+    if (this.#editing.isBusy) return;
+    if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
+    this.#released = undefined;
+    this.#showMeasures();
+    if (this.#states.setModelState('done')) this.#ui.status.say(this.#describe());
   }
 
   #show({ surfaces }: SurfaceUpdate): void {
@@ -251,9 +253,13 @@ export class SegmentLab implements Lab {
     if (!this.#states.canChange) return undefined;
     const grip = this.#editing.press(at, axis, this.#ui.tools.value);
     if (!grip) return undefined;
+    this.#released = undefined;
+    this.#latency = {};
     const drop = () => {
       this.#released = performance.now();
       grip.drop();
+      // The surfaces may have followed before the pointer was released.
+      if (!this.#editing.isBusy) this.#ui.view.afterDrawing(() => this.#settle());
     };
     return { move: grip.move, drop };
   }
@@ -264,6 +270,7 @@ export class SegmentLab implements Lab {
     if (!this.#states.canChange) return;
     if (tools.value.tool === 'navigate') this.#ui.status.say(text('segment.applyNothing'));
     else {
+      this.#latency = {};
       this.#released = performance.now();
       this.#editing.apply(view.crosshair, view.axial, tools.value);
     }
@@ -275,6 +282,7 @@ export class SegmentLab implements Lab {
 
   #travel(direction: 'undo' | 'redo'): void {
     if (!this.#states.canChange) return;
+    this.#latency = {};
     this.#released = performance.now();
     this.#editing.travel(direction);
   }
