@@ -48,7 +48,7 @@ function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[])
   return found;
 }
 
-/** The whole library for engines without vector instructions: of the labs, only Segment loads it, and only there. */
+/** The whole library for engines without vector instructions, of which the labs need none offline. */
 const PLAIN = /pkg\/vesicle_plain_bg\.wasm$/;
 
 /** Names the built files of the app, for the service worker to keep: what the labs load, now or later. */

@@ -15,7 +15,7 @@ const LIMITS = { entries: 200, bytes: 256e6 };
 /** Bytes of a patch for each of its voxels, besides the label. */
 const INDEX_BYTES = 4;
 
-/** What undo restores: voxels, the list of labels, and which of them the tools paint. */
+/** State that undo restores: voxels, the list of labels, and which of them the tools paint. */
 interface Moment {
   patch: Patch | undefined;
   labels: readonly Label[];

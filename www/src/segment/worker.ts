@@ -173,7 +173,7 @@ class Session {
       return { ...live.surfaces.params };
     },
     mask: ({ low, high }) => this.#mask(low, high),
-    exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: format !== 'nifti' }),
+    exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: true }),
     exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
   };
 

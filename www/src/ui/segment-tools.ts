@@ -1,7 +1,7 @@
 import { text } from '../texts';
 import { h, icon, uniqueId } from './dom';
 
-/** What pressing a slice does: moves the crosshair, or changes labels. */
+/** Effect of pressing a slice: the crosshair moves, or labels change. */
 export type Tool = 'navigate' | 'brush' | 'threshold' | 'eraser' | 'fill';
 
 /** Shape of the brush: a ball in the volume, or a disc in the slice. */
@@ -40,7 +40,7 @@ export interface ToolEvents {
 export class SegmentTools {
   /** The tools, the radius of the brush, undo and redo. */
   readonly bar: HTMLElement;
-  /** What the tool does, and its other settings. */
+  /** Description of the tool in use, and its other settings. */
   readonly settings: HTMLElement;
   readonly #events: ToolEvents;
   readonly #radios = new Map<Tool, HTMLInputElement>();

@@ -6,7 +6,7 @@ import { pictureSize } from './slicing';
 /** Colours of labels: red, green, blue, 0..255. */
 export type LabelColors = ReadonlyMap<number, readonly [number, number, number]>;
 
-/** What is drawn over the slices: the labels, and the voxels that a threshold brush paints. */
+/** Content that is drawn over the slices: the labels, and the voxels that a threshold brush paints. */
 export interface Overlays {
   dims: Vec3;
   voxels: LabelArray;
