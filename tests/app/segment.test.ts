@@ -316,10 +316,10 @@ describe('files', () => {
       const before = await measured();
       const { name, bytes } = await saved(`[data-map=${format}]`);
       expect(name).toMatch(/^image-labels\.(nii\.gz|nrrd|mha)$/);
-    // Compressed: as a whole, or inside.
-    expect([...bytes.subarray(0, 2)].join() === '31,139').toBe(format === 'nifti');
-    expect(bytes.length).toBeLessThan(SIZE ** 3 / 8);
-    const [map, image] = [Volume.parse(bytes), Volume.parse(ballFile())];
+      // Compressed: as a whole, or inside.
+      expect([...bytes.subarray(0, 2)].join() === '31,139').toBe(format === 'nifti');
+      expect(bytes.length).toBeLessThan(SIZE ** 3 / 8);
+      const [map, image] = [Volume.parse(bytes), Volume.parse(ballFile())];
       expect(map.dims).toEqual(image.dims);
       expect([...map.intensities()]).toEqual([...boxes()]);
       if (map.space === image.space) expect([...map.affine]).toEqual([...image.affine]);
