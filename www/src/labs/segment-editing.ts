@@ -121,6 +121,8 @@ export class SegmentEditing {
   /** Begins a stroke at a position in voxels, in a slice across `axis`; undefined if the tool makes none. */
   press(at: Vec3, axis: Axis, settings: ToolSettings): Grip | undefined {
     if (!this.#map || settings.tool === 'navigate') return undefined;
+    // Nobody wants to paint what cannot be seen.
+    if (settings.tool !== 'eraser' && this.#hidden.has(this.#active)) this.setVisible(this.#active, true);
     if (settings.tool === 'fill') {
       this.#fill(at, axis);
       return { move: () => undefined, drop: () => undefined };
@@ -181,6 +183,7 @@ export class SegmentEditing {
     const patch = map.end();
     this.#push(text('segment.removing'), patch);
     this.#labels = this.#labels.filter((label) => label.value !== value);
+    this.#hidden.delete(value);
     if (this.#active === value) this.#active = this.#labels[0]?.value ?? 0;
     if (this.#labels.length === 0) {
       this.#labels = [newLabel(1)];

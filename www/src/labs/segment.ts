@@ -22,8 +22,9 @@ import { SegmentSharing } from './segment-sharing';
 const MASK_DELAY = 120;
 
 /** Overlays before there are labels. */
-const NO_OVERLAYS: Pick<Overlays, 'colors' | 'paint' | 'mask'> = {
+const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
   colors: new Map(),
+  names: new Map(),
   paint: [255, 255, 255],
   mask: undefined,
 };
@@ -244,6 +245,7 @@ export class SegmentLab implements Lab {
     const painted = labels.find(({ value }) => value === active);
     this.#ui.view.showLabels({
       colors: new Map(visible.map((label) => [label.value, rgbOf(label)])),
+      names: new Map(labels.map(({ value, name }) => [value, name])),
       ...(painted && { paint: rgbOf(painted) }),
     });
     this.#showMeasures();

@@ -34,7 +34,7 @@ export const SEGMENT_EXAMPLES: [SegmentExample, ...SegmentExample[]] = [
     name: text('segment.headName'),
     file: 'visible-human-head.nii.gz',
     labelling: 'head',
-    labels: [text('segment.bone'), text('segment.softTissue')],
+    labels: [text('segment.bone')],
     unit: 'mm',
     range: [95, 255],
     credit: text('segment.headCredit'),

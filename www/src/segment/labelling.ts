@@ -30,14 +30,13 @@ export function labelTooth(intensities: Float32Array, dims: Vec3): Uint8Array {
   return labels;
 }
 
-/** Intensities of the CT of the head from which on voxels are soft tissue, and bone. */
-const [SOFT, BONE] = [35, 95];
+/** Intensity of the CT of the head from which on voxels are bone. */
+const BONE = 95;
 
-/** Labels the CT of a head: bone 1 from intensity 95 on, soft tissue 2 from 35 on. Parts of less than 60 voxels are dropped. */
+/** Labels the CT of a head: bone 1 from intensity 95 on. Parts of less than 60 voxels are dropped. */
 export function labelHead(intensities: Float32Array, dims: Vec3): Uint8Array {
-  const labels = Uint8Array.from(intensities, (value) => (value >= BONE ? 1 : value >= SOFT ? 2 : 0));
-  dropSpecks(labels, dims, 1, 2);
-  dropSpecks(labels, dims, 2, 0);
+  const labels = Uint8Array.from(intensities, (value) => Number(value >= BONE));
+  dropSpecks(labels, dims, 1, AIR);
   return labels;
 }
 

@@ -2,7 +2,7 @@ import type { Unit } from '../examples';
 import type { Label } from '../segment/labels';
 import { text } from '../texts';
 import { h } from './dom';
-import { count } from './format';
+import { count, figure } from './format';
 import { sized } from './measures';
 
 /** Measures of a label and its surface; lengths are in world units. */
@@ -29,7 +29,7 @@ export class LabelMeasureTable {
       text('measures.volume'),
       text('measures.area'),
     ].map((name) => h('th', { scope: 'col' }, name));
-    const table = h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...heads)), this.#body);
+    const table = h('table', { class: 'times label-measures' }, h('thead', {}, h('tr', {}, ...heads)), this.#body);
     this.element = h(
       'div',
       { 'data-measures': '{}' },
@@ -65,6 +65,6 @@ function row({ name, color }: Label, measures: LabelMeasures | undefined, unit: 
 /** Formats a volume; from 1 ml on, cubic millimetres are converted to millilitres. */
 function volumeText(volume: number, unit: Unit): string {
   return unit === 'mm' && volume >= 1000
-    ? text('segment.millilitres', { value: (volume / 1000).toFixed(2) })
+    ? text('segment.millilitres', { value: figure(volume / 1000) })
     : sized(volume, 3, unit);
 }

@@ -12,6 +12,8 @@ export interface Overlays {
   voxels: LabelArray;
   /** Colours of the visible labels. */
   colors: LabelColors;
+  /** Names of all labels, for descriptions. */
+  names: ReadonlyMap<number, string>;
   /** 0..1; 0 hides the labels. */
   opacity: number;
   /** Colour of the label that the tools paint. */
@@ -38,19 +40,22 @@ export class LabelPicture {
     this.#pixels = new ImageData(width, height);
   }
 
-  /** Paints the slice with the given index. */
-  paint({ dims, voxels, colors, opacity, paint, mask }: Overlays, index: number): void {
+  /** Paints the slice with the given index; returns the number of voxels of each label in it. */
+  paint({ dims, voxels, colors, opacity, paint, mask }: Overlays, index: number): Map<number, number> {
     const { axis, horizontal, vertical } = this.#orientation;
     const { width, height } = this.canvas;
     const strides = [1, dims[0], dims[0] * dims[1]] as const;
     const out = this.#pixels.data;
     const alpha = Math.round(255 * opacity);
+    const counts = new Map<number, number>();
     out.fill(0);
     for (let j = 0; j < height; j++) {
       const row = index * strides[axis] + (vertical.flip ? height - 1 - j : j) * strides[vertical.axis];
       for (let i = 0; i < width; i++) {
         const voxel = row + (horizontal.flip ? width - 1 - i : i) * strides[horizontal.axis];
-        const color = voxels[voxel] ? colors.get(voxels[voxel] ?? 0) : undefined;
+        const label = voxels[voxel] ?? 0;
+        if (label !== 0) counts.set(label, (counts.get(label) ?? 0) + 1);
+        const color = label === 0 ? undefined : colors.get(label);
         const target = 4 * (j * width + i);
         const isPainted = mask !== undefined && mask[voxel] !== 0;
         if (color && alpha > 0) put(out, target, ...(isPainted ? lighter(color) : color), alpha);
@@ -58,6 +63,7 @@ export class LabelPicture {
       }
     }
     context2d(this.canvas)?.putImageData(this.#pixels, 0, 0);
+    return counts;
   }
 }
 

@@ -55,6 +55,8 @@ export class SlicePanel {
   readonly #pixels: ImageData;
   readonly #observer = new ResizeObserver(() => this.draw());
   #outline: Float32Array = new Float32Array(0);
+  /** Description of the content over the slice, in place of that of the outline. */
+  #content: string | undefined;
   #attractors: Attractor[] = [];
   #uncovered: readonly UncoveredRegion[] = [];
   /** Voxels shown instead of the volume's: those of a coarser pyramid level, or of one frame. */
@@ -106,6 +108,12 @@ export class SlicePanel {
     this.#level = level;
     this.#paint(this.#crosshair[this.orientation.axis]);
     this.draw();
+  }
+
+  /** Describes the content over the slice, for screen readers, where it is not the outline of a surface. */
+  set content(text: string) {
+    this.#content = text;
+    this.#describe();
   }
 
   setAttractors(attractors: Attractor[]): void {
@@ -187,7 +195,10 @@ export class SlicePanel {
     });
     this.#canvas.setAttribute(
       'aria-label',
-      text('view.sliceWith', { slice: where, outline: describeOutline(this.#outline, this.picture) }),
+      text('view.sliceWith', {
+        slice: where,
+        outline: this.#content ?? describeOutline(this.#outline, this.picture),
+      }),
     );
   }
 

@@ -1,5 +1,6 @@
 import type { Raycaster } from 'three';
 import type { Surface, Vec3, VolumeView } from '../protocol';
+import { count, text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
 import { type Axis, toWorld } from './anatomy';
@@ -190,7 +191,11 @@ export class SegmentView {
   #paintPictures(axes: readonly Axis[]): void {
     if (!this.#overlays) return;
     const overlays = { ...this.#overlays, opacity: this.#options.opacity };
-    for (const axis of axes) this.#pictures[axis]?.paint(overlays, this.#crosshair[axis]);
+    for (const axis of axes) {
+      const counts = this.#pictures[axis]?.paint(overlays, this.#crosshair[axis]);
+      const panel = this.#scene?.panels[axis];
+      if (counts && panel) panel.content = describe(counts, overlays.names);
+    }
   }
 
   #redraw(): void {
@@ -271,4 +276,14 @@ export class SegmentView {
     this.#pictures = [];
     this.#pointer = undefined;
   }
+}
+
+/** Describes the labels in a slice, for screen readers. */
+function describe(counts: ReadonlyMap<number, number>, names: ReadonlyMap<number, string>): string {
+  const known = [...counts].filter(([label]) => names.has(label));
+  if (known.length === 0) return text('segment.sliceEmpty');
+  const labels = known.map(([label, voxels]) =>
+    text('segment.sliceLabel', { name: names.get(label) ?? '', voxels: count(voxels) }),
+  );
+  return text('segment.sliceLabels', { labels: labels.join(', ') });
 }
