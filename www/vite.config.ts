@@ -48,8 +48,8 @@ function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[])
   return found;
 }
 
-/** The modules of the whole library, which only the live pages and the benchmarks load; the labs have smaller ones. */
-const WHOLE = /pkg\/vesicle_(plain_)?bg\.wasm$/;
+/** The whole library for engines without vector instructions, of which the labs need none offline. */
+const PLAIN = /pkg\/vesicle_plain_bg\.wasm$/;
 
 /** Names the built files of the app, for the service worker to keep: what the labs load, now or later. */
 function listFiles(): Plugin {
@@ -68,12 +68,12 @@ function listFiles(): Plugin {
         entries.filter((one) => !isEmbed(one)),
       );
       const theirs = reached(bundle, entries.filter(isEmbed));
-      const isWhole = (name: string) => {
+      const isPlain = (name: string) => {
         const file = bundle[name];
-        return file?.type === 'asset' && file.originalFileNames.some((from) => WHOLE.test(from));
+        return file?.type === 'asset' && file.originalFileNames.some((from) => PLAIN.test(from));
       };
       const wanted = (name: string) =>
-        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !isWhole(name);
+        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !isPlain(name);
       const listed = Object.keys(bundle).filter(wanted).sort();
       this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(listed, null, 1)}\n` });
     },
@@ -88,7 +88,10 @@ const METHODS = new Map([
   [here('src/sculpt/worker.ts'), 'multires'],
 ]);
 
-/** Gives each lab's worker, for `vesicle`, the entry point with its own method alone, whose module is smaller. */
+/**
+ * Gives the worker of a lab with a method, for `vesicle`, the entry point with that method alone, whose module is
+ * smaller. The Segment lab needs the whole library.
+ */
 function ownMethod(): Plugin {
   let method: string | undefined;
   return {

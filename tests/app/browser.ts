@@ -21,6 +21,7 @@ export const QUICK = {
   reconstruct: 'reconstruct?example=two-balls',
   track: 'track?example=ventricle',
   sculpt: 'sculpt?example=globe',
+  segment: 'segment?example=ovule',
 };
 export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
 

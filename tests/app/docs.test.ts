@@ -7,6 +7,7 @@ import { at } from '../../scripts/shell.mjs';
 import { exampleById } from '../../www/src/presets';
 import { cloudById } from '../../www/src/reconstruct/presets';
 import { sceneById } from '../../www/src/sculpt/presets';
+import { segmentExampleById } from '../../www/src/segment/examples';
 import { imageById } from '../../www/src/track/presets';
 
 const DOCS = at('dist/docs');
@@ -15,6 +16,7 @@ const LABS: Record<string, (id: string) => { id: string } | undefined> = {
   reconstruct: cloudById,
   sculpt: sceneById,
   track: imageById,
+  segment: segmentExampleById,
 };
 
 interface Link {

@@ -42,7 +42,7 @@ test.each(LABS)('%s links to its documentation, and from its keyboard shortcuts 
   expect(pages[0]).toContain(`index.html#${lab}"`);
   expect(pages.pop()).toContain('three');
   expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
-    expect.stringMatching(/^(Surface|Freeform) .* \| Vesicle documentation$/),
+    expect.stringMatching(/^(Surface|Freeform|Segmentation) .* \| Vesicle documentation$/),
     'Vesicle documentation',
     'Vesicle: Benchmarks',
     'Vesicle in other software',

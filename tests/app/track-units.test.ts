@@ -15,9 +15,10 @@ import { beatOf, warningsOf } from '../../www/src/track/curve';
 import { IMAGES } from '../../www/src/track/examples';
 import { interpolateSlice } from '../../www/src/track/interpolate-slice';
 import { TRACK_PRESETS, viewOf } from '../../www/src/track/presets';
-import { framesOf, openImage, prepare } from '../../www/src/track/source';
+import { openImage, prepare } from '../../www/src/track/source';
 import { invert } from '../../www/src/view/anatomy';
 import { votesNear } from '../../www/src/view/votes';
+import { groupFiles } from '../../www/src/worker/file-groups';
 
 beforeAll(() => init());
 
@@ -260,7 +261,7 @@ describe('images', () => {
   const named = (...names: string[]) => names.map((name) => ({ name, bytes: new Uint8Array() }));
 
   test('from several files are frames in the order of their names, headers with their data', () => {
-    const names = (files: string[]) => framesOf(named(...files)).map((parts) => parts.map(({ name }) => name));
+    const names = (files: string[]) => groupFiles(named(...files)).map((parts) => parts.map(({ name }) => name));
     expect(names(['f10.nii', 'f2.nii', 'f1.nii'])).toEqual([['f1.nii'], ['f2.nii'], ['f10.nii']]);
     expect(names(['b.raw', 'a.mhd', 'a.raw', 'b.mhd'])).toEqual([
       ['a.mhd', 'a.raw'],

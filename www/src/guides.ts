@@ -8,6 +8,7 @@ export const GUIDES = {
   extract: `${DOCS}documents/Surface_extraction_from_volumes.html`,
   reconstruct: `${DOCS}documents/Surface_reconstruction_from_points.html`,
   track: `${DOCS}documents/Surface_tracking_through_time.html`,
+  segment: `${DOCS}documents/Segmentation_and_surfaces_of_label_maps.html`,
   sculpt: `${DOCS}documents/Freeform_deformation_of_detailed_surfaces.html`,
 };
 

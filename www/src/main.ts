@@ -8,11 +8,12 @@ import type { Handoff, Lab, LabKind } from './labs/labs';
 import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
+import { spawnSegment } from './segment/client';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
 /**
- * The labs (the app's four pages), in the order of the navigation. If none is open yet, an empty or unknown address
+ * The labs (the app's five pages), in the order of the navigation. If none is open yet, an empty or unknown address
  * opens the first one.
  */
 const LABS: [LabKind, ...LabKind[]] = [
@@ -47,6 +48,14 @@ const LABS: [LabKind, ...LabKind[]] = [
     guide: GUIDES.sculpt,
     spawn: spawnSculpt,
     load: async () => (await import('./labs/sculpt')).SculptLab,
+  },
+  {
+    id: 'segment',
+    name: text('shell.segment'),
+    tagline: text('shell.segmentTagline'),
+    guide: GUIDES.segment,
+    spawn: spawnSegment,
+    load: async () => (await import('./labs/segment')).SegmentLab,
   },
 ];
 

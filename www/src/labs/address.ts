@@ -3,7 +3,7 @@ import { text } from '../texts';
 import type { StatusLine } from '../ui/status';
 
 /** Ids of the labs, as they appear in addresses. */
-export const LAB_IDS = ['extract', 'reconstruct', 'track', 'sculpt'] as const;
+export const LAB_IDS = ['extract', 'reconstruct', 'track', 'sculpt', 'segment'] as const;
 
 /** Returns the id of the lab that the hash of an address names, undefined if none. */
 export const labOf = (hash: string): string | undefined =>

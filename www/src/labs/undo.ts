@@ -37,6 +37,16 @@ export class UndoStack<State> {
     return this.#future.at(-1)?.label;
   }
 
+  /** State that undo would restore; undefined if there is none. */
+  get past(): State | undefined {
+    return this.#past.at(-1)?.state;
+  }
+
+  /** State that redo would restore; undefined if there is none. */
+  get future(): State | undefined {
+    return this.#future.at(-1)?.state;
+  }
+
   clear(): void {
     this.#past = [];
     this.#future = [];

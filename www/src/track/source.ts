@@ -4,6 +4,7 @@ import { SurfaceTracker, Volume } from 'vesicle';
 import { importVolume } from '../importers';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
+import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
 import { voxelsOf } from './box';
@@ -25,22 +26,7 @@ export async function openImage(source: ImageSource): Promise<Volume> {
     });
   }
   const foreign = await importVolume(source.files);
-  return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
-}
-
-/**
- * Groups files by frame, in the order of their names: each header, or file that needs none, together with the data
- * files of the same name. A single header takes all data files.
- */
-export function framesOf(files: NamedBytes[]): NamedBytes[][] {
-  const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
-  const isData = ({ name }: NamedBytes) => /\.(z?raw|img)(\.gz)?$/i.test(name);
-  const stem = ({ name }: NamedBytes) => name.replace(/\..*$/, '');
-  const heads = byName.filter((file) => !isData(file));
-  // A single header takes all data files; of several, each takes those of its name.
-  const belongs = (head: NamedBytes) => (file: NamedBytes) =>
-    isData(file) && (heads.length === 1 || stem(file) === stem(head));
-  return heads.map((head) => [head, ...byName.filter(belongs(head))]);
+  return foreign ? new Volume(foreign) : fromParts(groupFiles(source.files));
 }
 
 async function fromParts(parts: NamedBytes[][]): Promise<Volume> {

@@ -4,8 +4,15 @@ import { h, uniqueId } from './dom';
 
 const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
 
-/** Creates a button that chooses one file, or several that belong together; by default files of volumes. */
-export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): HTMLElement {
+/**
+ * Creates a button with the given label that chooses one file, or several that belong together; by default files of
+ * volumes.
+ */
+export function fileChooser(
+  onFiles: (files: File[]) => void,
+  accept = ACCEPT,
+  label = text('controls.openFile'),
+): HTMLElement {
   const id = uniqueId('file');
   const input = h('input', { type: 'file', id, multiple: true, accept, class: 'visually-hidden' });
   input.addEventListener('change', () => {
@@ -14,7 +21,7 @@ export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): 
     input.value = '';
     if (files.length > 0) onFiles(files);
   });
-  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, text('controls.openFile')));
+  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
 }
 
 /**

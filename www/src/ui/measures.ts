@@ -158,7 +158,7 @@ function textOf(name: Name, value: number | boolean, unit: Unit): string {
  * Formats an area (power 2) or volume (power 3) with its unit; from 10 cm² or 10 cm³ on, values in millimetres are
  * converted to centimetres.
  */
-function sized(value: number, power: 2 | 3, unit: Unit): string {
+export function sized(value: number, power: 2 | 3, unit: Unit): string {
   const raised = power === 2 ? '²' : '³';
   const inCentimetres = value / 10 ** power;
   if (unit === 'mm' && inCentimetres >= 10) return `${figure(inCentimetres)} cm${raised}`;

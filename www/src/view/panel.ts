@@ -20,6 +20,8 @@ export interface PanelEvents {
    * there, both in voxels. A returned grip follows the pointer until it is released, and `onPoint` is not called.
    */
   grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
+  /** Called with the position of the pointer over the slice image, in voxels; undefined when it has left. */
+  onHover?: (index: Vec3 | undefined) => void;
 }
 
 /** Handle of an object on a slice while it is dragged; positions are in voxels, also between and outside them. */
@@ -53,6 +55,8 @@ export class SlicePanel {
   readonly #pixels: ImageData;
   readonly #observer = new ResizeObserver(() => this.draw());
   #outline: Float32Array = new Float32Array(0);
+  /** Description of the content over the slice, in place of that of the outline. */
+  #content: string | undefined;
   #attractors: Attractor[] = [];
   #uncovered: readonly UncoveredRegion[] = [];
   /** Voxels shown instead of the volume's: those of a coarser pyramid level, or of one frame. */
@@ -104,6 +108,12 @@ export class SlicePanel {
     this.#level = level;
     this.#paint(this.#crosshair[this.orientation.axis]);
     this.draw();
+  }
+
+  /** Describes the content over the slice, for screen readers, where it is not the outline of a surface. */
+  set content(text: string) {
+    this.#content = text;
+    this.#describe();
   }
 
   setAttractors(attractors: Attractor[]): void {
@@ -185,7 +195,10 @@ export class SlicePanel {
     });
     this.#canvas.setAttribute(
       'aria-label',
-      text('view.sliceWith', { slice: where, outline: describeOutline(this.#outline, this.picture) }),
+      text('view.sliceWith', {
+        slice: where,
+        outline: this.#content ?? describeOutline(this.#outline, this.picture),
+      }),
     );
   }
 
@@ -283,7 +296,7 @@ export class SlicePanel {
     }
   }
 
-  #followPointer({ onPoint, grab }: PanelEvents): void {
+  #followPointer({ onPoint, grab, onHover }: PanelEvents): void {
     let grip: Grip | undefined;
     const report = (event: PointerEvent) =>
       onPoint(this.#voxelAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
@@ -292,7 +305,9 @@ export class SlicePanel {
       grip = grab?.(this.#placeAt(event.offsetX, event.offsetY), this.#slack());
       if (!grip) report(event);
     });
+    this.#canvas.addEventListener('pointerleave', () => onHover?.(undefined));
     this.#canvas.addEventListener('pointermove', (event) => {
+      onHover?.(this.#placeAt(event.offsetX, event.offsetY));
       if (grip) grip.move(this.#placeAt(event.offsetX, event.offsetY));
       else if (event.buttons & 1) report(event);
     });

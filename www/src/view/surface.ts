@@ -67,6 +67,7 @@ export class SurfaceObject {
   /** Number of triangle corners in use in the buffers: three times the triangles. */
   #corners = 0;
   #color: SurfaceColor = 'plain';
+  #plain: ColorRepresentation = BONE;
   #texture: Texture | null = null;
   /** Whether the current surface has texture coordinates. */
   #hasUvs = false;
@@ -150,6 +151,12 @@ export class SurfaceObject {
 
   set solid(visible: boolean) {
     this.#mesh.visible = visible;
+  }
+
+  /** Colour of the surface where the colouring is 'plain'. */
+  set plainColor(color: ColorRepresentation) {
+    this.#plain = color;
+    this.#fillColors();
   }
 
   set color(mode: SurfaceColor) {
@@ -245,7 +252,7 @@ export class SurfaceObject {
       this.#material.map = map;
       this.#material.needsUpdate = true;
     }
-    this.#material.color.set(on || map ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
+    this.#material.color.set(on || map ? '#ffffff' : this.#plain).multiplyScalar(own ? OWN_GAIN : 1);
     this.#range = shaded ? robustRange(this.#values, QUANTITIES[mode].least) : 0;
     const geometry = this.#fine;
     if (!on || !geometry.index) return;

@@ -1,5 +1,5 @@
 /** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
-import { VesicleError, Volume } from 'vesicle';
+import { VesicleError, Volume, type VolumeInit } from 'vesicle';
 import startReaders, { parseVolume } from 'vesicle/import';
 import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
@@ -19,9 +19,9 @@ function isHeader({ name }: NamedBytes): boolean {
  * Parses a volume from one file; for a header without its voxels, throws a `Refusal` whose message requests the file
  * with them.
  */
-function parseFile(file: NamedBytes): Volume {
+function parseFile(file: NamedBytes): VolumeInit {
   try {
-    return new Volume(parseVolume(file.bytes));
+    return parseVolume(file.bytes);
   } catch (error) {
     if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
     throw new Refusal(error.code, text('files.headerWithoutData', { reason: error.message }));
@@ -33,13 +33,18 @@ function parseFile(file: NamedBytes): Volume {
  * of files.
  */
 export async function parseFiles(files: NamedBytes[]): Promise<Volume> {
+  return new Volume(await readFiles(files));
+}
+
+/** Reads the voxels and the geometry of a volume as {@link parseFiles} does, without making a volume of them. */
+export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   await startReaders();
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
   if (!second) return parseFile(first);
   if (files.length > 2) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
-  return new Volume(parseVolume(header.bytes, { data: data.bytes }));
+  return parseVolume(header.bytes, { data: data.bytes });
 }
 
 /**

@@ -1,0 +1,423 @@
+/** The Segment lab: labels are painted on slices, and their surfaces follow. */
+import { readFile } from 'node:fs/promises';
+import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
+import init, { Mesh, Volume } from '../../pkg/index.js';
+import { labelTooth } from '../../www/src/segment/labelling';
+import { type App, anotherPage, drop, openApp, overflow, reach, unnamedControls } from './browser';
+import { changes } from './pixels';
+import { ball } from './volumes';
+
+/** Size of the ball's volume. */
+const SIZE = 32;
+
+let app: App;
+
+beforeAll(async () => {
+  await init();
+  app = await openApp({ width: 1280, height: 800 }, 'bench.html');
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+interface Measured {
+  name: string;
+  value: number;
+  voxels: number;
+  volume: number;
+  area: number;
+  vertices: number;
+  triangles: number;
+  version: number;
+}
+
+interface Report {
+  labels: Measured[];
+  latency: { first?: number; smooth?: number };
+  /** Number of times that surfaces were shown. */
+  updates: number;
+}
+
+async function measured(): Promise<Report> {
+  return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+}
+
+/** Returns the measures of a label. */
+async function of(value: number): Promise<Measured> {
+  const found = (await measured()).labels.find((label) => label.value === value);
+  return found ?? { name: '', value, voxels: 0, volume: 0, area: 0, vertices: 0, triangles: 0, version: 0 };
+}
+
+async function openAt(hash: string): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + hash);
+  await reach(app.page, 'done');
+}
+
+const text = (selector: string) => app.page.locator(selector).first().textContent();
+
+/** Returns the file of the ball of radius 10 voxels, with voxels of 1 × 1 × 2 mm, away from the origin. */
+function ballFile(data: Uint8Array | Float32Array = ball(), spacing: [number, number, number] = [1, 1, 2]): Uint8Array {
+  const volume = new Volume({ data, dims: [SIZE, SIZE, SIZE], spacing, origin: [5, -7, 11] });
+  const file = volume.toBytes('nifti');
+  volume.free();
+  return file;
+}
+
+/** Opens the ball with an empty label map. */
+async function openBall(): Promise<void> {
+  if (!app.page.url().includes('#segment')) await openAt('#segment?example=ovule');
+  await drop(app.page, [{ name: 'ball.nii', bytes: ballFile() }]);
+  await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('ball.nii'));
+  await expect.poll(async () => (await measured()).labels).toEqual([{ name: 'Label 1', value: 1, voxels: 0 }]);
+  await reach(app.page, 'done');
+}
+
+/** Drags on a slice from one voxel of its picture to others, counted from the middle of the picture. */
+async function drag(slice: string, ...places: [number, number][]): Promise<void> {
+  const box = await app.page.locator(`.slice canvas[aria-label^="${slice}"]`).boundingBox();
+  if (!box) throw new Error(`there is no ${slice} slice`);
+  // Voxels of the axial slice are squares.
+  const scale = Math.min(box.width, box.height) / SIZE;
+  const at = ([x, y]: [number, number]) =>
+    [box.x + box.width / 2 + x * scale, box.y + box.height / 2 + y * scale] as const;
+  const [first, ...others] = places;
+  await app.page.mouse.move(...at(first ?? [0, 0]));
+  await app.page.mouse.down();
+  for (const place of others) await app.page.mouse.move(...at(place), { steps: 4 });
+  await app.page.mouse.up();
+}
+
+/** Makes a change of the voxels, and waits until the surfaces have followed. */
+async function followed(change: () => Promise<unknown>): Promise<void> {
+  const updates = async () => (await measured()).updates;
+  const before = await updates();
+  await change();
+  await expect.poll(updates).toBeGreaterThan(before);
+  await reach(app.page, 'done');
+  // The last surfaces are smooth, and drawn.
+  await expect.poll(async () => (await measured()).latency.smooth).toBeGreaterThan(0);
+}
+
+async function tool(name: string, radius?: number): Promise<void> {
+  await app.page.check(`input[data-tool=${name}]`);
+  if (radius !== undefined) await app.page.fill('[data-tool-setting=radius]', String(radius));
+}
+
+async function saved(selector: string): Promise<{ name: string; bytes: Uint8Array }> {
+  const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click(selector)]);
+  return { name: download.suggestedFilename(), bytes: new Uint8Array(await readFile(await download.path())) };
+}
+
+/** Returns the voxels of the label map, from its file. */
+async function voxels(format = 'nrrd'): Promise<number[]> {
+  const volume = Volume.parse((await saved(`[data-map=${format}]`)).bytes);
+  const values = [...volume.intensities()];
+  volume.free();
+  return values;
+}
+
+const count = (values: number[], label: number) => values.filter((value) => value === label).length;
+
+/** Opens a label map of the open volume. */
+async function openMap(name: string, bytes: Uint8Array): Promise<void> {
+  const chooser = app.page.locator('input[type=file]').nth(1);
+  await chooser.setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(bytes) });
+}
+
+describe('the tooth', () => {
+  test('opens with enamel, dentine and pulp, labelled as documented, and closed surfaces', async () => {
+    await openAt('#segment');
+    const file = Volume.parse(new Uint8Array(await readFile('www/public/data/tooth.nrrd')));
+    const truth = labelTooth(file.intensities(), file.dims);
+    file.free();
+    const { labels } = await measured();
+    expect(labels.map(({ name, value, voxels }) => [name, value, voxels])).toEqual([
+      ['Enamel', 1, count([...truth], 1)],
+      ['Dentine', 2, count([...truth], 2)],
+      ['Pulp', 3, count([...truth], 3)],
+    ]);
+    for (const { volume, voxels, area, triangles, vertices } of labels) {
+      expect(volume).toBeCloseTo(voxels);
+      expect(area).toBeGreaterThan(4.8 * voxels ** (2 / 3));
+      expect(triangles).toBeGreaterThan(vertices);
+    }
+    expect(await app.page.title()).toBe('Vesicle: Segment');
+    expect(await text('.status')).toBe('Ready: 3 surfaces.');
+    expect(await unnamedControls(app.page)).toEqual([]);
+  });
+
+  test('changes only where it is painted, and the surfaces with it', async () => {
+    const [enamel, dentine] = [await of(1), await of(2)];
+    await tool('brush', 4);
+    const view = app.page.locator('.scene canvas');
+    const before = await view.screenshot();
+    await followed(() => drag('Coronal', [-9, 2], [-4, 2]));
+    const now = await of(1);
+    expect(now.voxels).toBeGreaterThan(enamel.voxels + 100);
+    expect(now.version).toBeGreaterThan(enamel.version);
+    expect((await of(2)).voxels).toBeLessThan(dentine.voxels);
+    await changes(app.page, before, () => view.screenshot(), 0, 'the surfaces');
+    expect(await text('.status')).toMatch(/^3 surfaces, smooth \d+ ms after the change\.$/);
+  });
+});
+
+describe('a volume without a label map', () => {
+  beforeEach(openBall);
+
+  test('begins with an empty map and one label, into which a stroke paints a surface', async () => {
+    expect(await text('.facts')).toContain('empty');
+    await tool('brush', 3);
+    await followed(() => drag('Axial', [-6, 0], [6, 0]));
+    const { voxels: painted, volume, area, vertices } = await of(1);
+    // A ball of radius 3.5 mm, in voxels of 1 × 1 × 2 mm, along 12 mm.
+    expect(painted).toBeGreaterThan(230);
+    expect(painted).toBeLessThan(400);
+    expect(volume).toBeCloseTo(2 * painted);
+    expect(area).toBeGreaterThan(300);
+    expect(vertices).toBeGreaterThan(200);
+    expect(count(await voxels(), 1)).toBe(painted);
+  });
+
+  test('shows the labels on the slices', async () => {
+    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
+    const before = await slice.screenshot();
+    await tool('brush', 5);
+    await followed(() => drag('Axial', [-6, 0], [6, 0]));
+    await changes(app.page, before, () => slice.screenshot(), 0.02, 'the coronal slice');
+  });
+
+  test('undo and redo restore the voxels of each stroke, and the surfaces follow', async () => {
+    await tool('brush', 2);
+    await followed(() => drag('Axial', [-6, -4], [6, -4]));
+    const first = await voxels();
+    const before = await of(1);
+    await followed(() => drag('Coronal', [0, -5], [0, 5]));
+    const second = await voxels();
+    expect(second).not.toEqual(first);
+    await followed(() => app.page.keyboard.press('u'));
+    expect(await voxels()).toEqual(first);
+    const undone = await of(1);
+    expect(undone.voxels).toBe(before.voxels);
+    expect(undone.area / before.area).toBeCloseTo(1, 2);
+    await followed(() => app.page.keyboard.press('Control+z'));
+    expect(count(await voxels(), 1)).toBe(0);
+    expect((await of(1)).vertices).toBe(0);
+    for (let i = 0; i < 2; i++) await followed(() => app.page.keyboard.press('Control+y'));
+    expect(await voxels()).toEqual(second);
+    expect(await app.page.locator('[data-transport=redo]').isEnabled()).toBe(false);
+  });
+
+  test('the threshold brush paints only intensities of its range, whose voxels are shown before', async () => {
+    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
+    const before = await slice.screenshot();
+    await tool('threshold', 12);
+    await app.page.fill('[data-tool-setting=low]', '200');
+    await app.page.fill('[data-tool-setting=high]', '300');
+    await app.page.locator('[data-tool-setting=high]').blur();
+    await changes(app.page, before, () => slice.screenshot(), 0.02, 'the mask');
+    await followed(() => drag('Axial', [0, 0], [8, 0]));
+    const [painted, intensities] = [await voxels(), ball()];
+    expect(count(painted, 1)).toBeGreaterThan(500);
+    expect(painted.every((label, i) => label === 0 || (intensities[i] ?? 0) >= 200)).toBe(true);
+    // Voxels beside each other on both sides of the threshold are both under the brush.
+    expect(painted.some((label, i) => label === 1 && (intensities[i] ?? 0) >= 200 && painted[i + 1] === 0)).toBe(true);
+  });
+
+  test('the eraser erases, and fill fills one area of a slice', async () => {
+    await tool('brush', 2);
+    await app.page.selectOption('[data-tool-setting=shape]', 'disc');
+    // A square without its inside.
+    await followed(() => drag('Axial', [-8, -8], [8, -8], [8, 8], [-8, 8], [-8, -8]));
+    const outline = count(await voxels(), 1);
+    await tool('fill');
+    await followed(() => drag('Axial', [0, 0]));
+    const filled = await voxels();
+    expect(count(filled, 1)).toBeGreaterThan(outline + 80);
+    // In one slice alone.
+    const slices = new Set(filled.flatMap((label, i) => (label === 1 ? [Math.floor(i / SIZE ** 2)] : [])));
+    expect([...slices]).toEqual([15]);
+    await tool('eraser', 3);
+    await followed(() => drag('Axial', [0, 0]));
+    expect(count(await voxels(), 1)).toBeLessThan(count(filled, 1) - 20);
+  });
+
+  test('labels are added, named, coloured, hidden and removed, and other labels can be kept', async () => {
+    await tool('brush', 4);
+    await followed(() => drag('Axial', [-3, 0]));
+    const alone = (await of(1)).voxels;
+    await app.page.click('[data-label=add]');
+    await app.page.fill('[data-control=name][data-value="2"]', 'Kidney');
+    await app.page.locator('[data-control=name][data-value="2"]').press('Enter');
+    await app.page.check('[data-tool-setting=protect]');
+    await followed(() => drag('Axial', [0, 0]));
+    expect((await of(1)).voxels).toBe(alone);
+    expect(await of(2)).toMatchObject({ name: 'Kidney', value: 2 });
+    const kept = (await of(2)).voxels;
+    expect(kept).toBeGreaterThan(0);
+    await app.page.uncheck('[data-tool-setting=protect]');
+    await followed(() => drag('Axial', [0, 0]));
+    expect((await of(2)).voxels).toBeGreaterThan(kept);
+    expect((await of(1)).voxels).toBeLessThan(alone);
+    const view = app.page.locator('.scene canvas');
+    const before = await view.screenshot();
+    await app.page.click('[data-control=visible][data-value="2"]');
+    await changes(app.page, before, () => view.screenshot(), 0.001, 'the view');
+    await followed(() => app.page.click('[data-control=remove][data-value="2"]'));
+    expect((await measured()).labels.map(({ value }) => value)).toEqual([1]);
+    expect(count(await voxels(), 2)).toBe(0);
+    await followed(() => app.page.keyboard.press('u'));
+    expect((await measured()).labels.map(({ name }) => name)).toEqual(['Label 1', 'Kidney']);
+  });
+
+  test('can be painted by keys alone', async () => {
+    await app.page.locator('.scene canvas').focus();
+    for (const key of ['b', ']', ']']) await app.page.keyboard.press(key);
+    const radius = Number(await app.page.inputValue('[data-tool-setting=radius]'));
+    await app.page.keyboard.press('[');
+    expect(await app.page.inputValue('[data-tool-setting=radius]')).toBe(String(radius - 1));
+    await followed(() => app.page.keyboard.press('p'));
+    const { voxels: painted } = await of(1);
+    expect(painted).toBeGreaterThan(10);
+    await app.page.keyboard.press('e');
+    await app.page.keyboard.press('[');
+    await followed(() => app.page.keyboard.press('p'));
+    expect((await of(1)).voxels).toBeLessThan(painted);
+  });
+});
+
+describe('files', () => {
+  /** A label map of two boxes that touch. */
+  const boxes = () =>
+    Uint8Array.from({ length: SIZE ** 3 }, (_, i) => {
+      const [x, y, z] = [i % SIZE, Math.floor(i / SIZE) % SIZE, Math.floor(i / SIZE ** 2)];
+      const inside = x > 5 && x < 26 && y > 8 && y < 20 && z > 10 && z < 22;
+      return inside ? (x < 15 ? 3 : 7) : 0;
+    });
+
+  test('a volume and its label map open together, with a surface for each label', async () => {
+    await openBall();
+    await drop(app.page, [
+      { name: 'image.nii', bytes: ballFile() },
+      { name: 'image-labels.nii', bytes: ballFile(boxes()) },
+    ]);
+    await expect.poll(async () => (await measured()).labels.map(({ value }) => value)).toEqual([3, 7]);
+    await reach(app.page, 'done');
+    expect(await text('.facts')).toContain('image-labels.nii');
+    expect((await of(3)).voxels).toBe(count([...boxes()], 3));
+    expect((await of(3)).volume).toBeCloseTo(2 * count([...boxes()], 3));
+  });
+
+  test.each(['nifti', 'nrrd', 'mha'])(
+    'a map saved as %s and opened again is the same, to the voxel',
+    async (format) => {
+      const before = await measured();
+      const { name, bytes } = await saved(`[data-map=${format}]`);
+      expect(name).toMatch(/^image-labels\.(nii\.gz|nrrd|mha)$/);
+      // Compressed: as a whole, or inside.
+      expect([...bytes.subarray(0, 2)].join() === '31,139').toBe(format === 'nifti');
+      expect(bytes.length).toBeLessThan(SIZE ** 3 / 8);
+      const [map, image] = [Volume.parse(bytes), Volume.parse(ballFile())];
+      expect(map.dims).toEqual(image.dims);
+      expect([...map.intensities()]).toEqual([...boxes()]);
+      if (map.space === image.space) expect([...map.affine]).toEqual([...image.affine]);
+      map.free();
+      image.free();
+      await tool('eraser', 8);
+      await followed(() => drag('Axial', [0, 0]));
+      expect((await of(3)).voxels).toBeLessThan(before.labels[0]?.voxels ?? 0);
+      await openMap(name, bytes);
+      await expect.poll(async () => (await of(3)).voxels).toBe(before.labels[0]?.voxels);
+      await reach(app.page, 'done');
+      expect(await voxels()).toEqual([...boxes()]);
+    },
+  );
+
+  test('surfaces are saved as one GLB with named nodes, and as a file for each label', async () => {
+    await app.page.fill('[data-control=name][data-value="7"]', 'Left part');
+    await app.page.locator('[data-control=name][data-value="7"]').press('Enter');
+    const glb = await saved('[data-export=glb]');
+    expect(glb.name).toMatch(/\.glb$/);
+    const length = new DataView(glb.bytes.buffer, glb.bytes.byteOffset).getUint32(12, true);
+    const { nodes } = JSON.parse(strFromU8(glb.bytes.subarray(20, 20 + length)));
+    expect(nodes.map(({ name }: { name: string }) => name)).toEqual(['Label 3', 'Left part']);
+    for (const format of ['ply', 'stl', 'obj']) {
+      const files = unzipSync((await saved(`[data-export=${format}]`)).bytes);
+      expect(Object.keys(files)).toEqual([`3-Label-3.${format}`, `7-Left-part.${format}`]);
+      const mesh = Mesh.parse(files[`7-Left-part.${format}`] ?? new Uint8Array());
+      expect(mesh.check()).toMatchObject({ closed: true, selfIntersections: 0 });
+      expect(mesh.info().volume / (await of(7)).volume).toBeCloseTo(1, 2);
+      mesh.free();
+    }
+  });
+
+  test('a map of another size, at another position, or of fractions is refused, and nothing changes', async () => {
+    const before = await measured();
+    const small = new Volume({ data: new Uint8Array(27), dims: [3, 3, 3] });
+    const refused: [string, Uint8Array, RegExp][] = [
+      ['small.nii', small.toBytes('nifti'), /3 × 3 × 3.*32 × 32 × 32/],
+      ['moved.nii', ballFile(boxes(), [1, 1, 2.5]), /another position/],
+      ['fractions.nii', ballFile(Float32Array.from(boxes(), (label) => label / 2)), /float|integer/],
+    ];
+    small.free();
+    for (const [name, bytes, reason] of refused) {
+      await openMap(name, bytes);
+      await app.page.waitForSelector('[data-state=error]');
+      expect(await text('.banner')).toMatch(reason);
+      await app.page.click('.banner button');
+      await reach(app.page, 'done');
+      expect((await measured()).labels).toEqual(before.labels);
+    }
+    expect(await voxels()).toEqual([...boxes()]);
+  });
+});
+
+test('a crash of the worker loses no stroke', async () => {
+  const page = await anotherPage(app, () => {
+    const { Worker } = window;
+    class Breaking extends Worker {
+      constructor(...given: ConstructorParameters<typeof Worker>) {
+        super(...given);
+        const crash = () => this.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
+        Object.assign(window, { crash });
+      }
+    }
+    Object.assign(window, { Worker: Breaking });
+  });
+  const first = app.page;
+  app.page = page;
+  try {
+    await openAt('#segment?example=ovule');
+    await openBall();
+    await tool('brush', 4);
+    await followed(() => drag('Axial', [-5, 0], [5, 0]));
+    const painted = await voxels();
+    await page.evaluate(() => (window as unknown as { crash: () => void }).crash());
+    await page.waitForSelector('[data-state=error]');
+    expect(await text('.banner')).toMatch(/Reset restarts the engine.*out of memory/);
+    await page.click('[data-action=reset]');
+    await reach(page, 'done');
+    expect(await voxels()).toEqual(painted);
+    expect((await of(1)).voxels).toBe(count(painted, 1));
+  } finally {
+    app.page = first;
+    await page.close();
+  }
+});
+
+test('settings are part of the link, and the page fits a phone', async () => {
+  await openAt('#segment?example=ovule&opacity=0.8&slices=hidden&p.smoothing=5');
+  expect(await app.page.inputValue('[data-view=opacity]')).toBe('0.8');
+  expect(await app.page.inputValue('[data-view=slices]')).toBe('hidden');
+  expect(await app.page.evaluate(() => location.hash)).toBe(
+    '#segment?example=ovule&slices=hidden&opacity=0.8&p.smoothing=5',
+  );
+  for (const [width, height] of [
+    [390, 844],
+    [1024, 768],
+    [1400, 900],
+  ] as const)
+    expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+});

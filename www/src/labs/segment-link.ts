@@ -1,0 +1,74 @@
+/** Converts the Segment lab's settings to the hash of an address, `#segment?…`, and back. */
+import type { ParamValues } from '../protocol';
+import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
+import type { SegmentViewOptions } from '../view/segmentation';
+import { differing, readValue } from './link';
+
+const ADDRESS = '#segment';
+
+export const INITIAL_VIEW: SegmentViewOptions = { edges: false, slices: 'walls', opacity: 0.5 };
+
+/** Settings of the Segment lab that are contained in a link; missing ones are as by default. */
+export interface LinkedSegment {
+  example?: string;
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
+  file?: string;
+  params: ParamValues;
+  view: Partial<SegmentViewOptions>;
+}
+
+/** Present settings of the Segment lab, from which a link is made. */
+export interface LinkableSegment {
+  example: SegmentExample | undefined;
+  file: string;
+  params: ParamValues;
+  /** Default parameters; the link contains only those that differ. */
+  defaults: ParamValues;
+  view: SegmentViewOptions;
+}
+
+/** Returns what a link to the lab's present state contains. Labels that were painted are not part of it. */
+export function linkOf({ example, file, params, defaults, view }: LinkableSegment): LinkedSegment {
+  return {
+    ...(!example && { file }),
+    ...(example && example !== SEGMENT_EXAMPLES[0] && { example: example.id }),
+    params: differing(params, defaults),
+    view: differing({ ...view }, { ...INITIAL_VIEW }),
+  };
+}
+
+/** Converts the settings in a link to the hash of an address. */
+export function toHash({ example, file, params, view }: LinkedSegment): string {
+  const query = new URLSearchParams();
+  for (const [name, value] of Object.entries({ example, file, ...view }))
+    if (value !== undefined) query.set(name, String(value));
+  for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
+  const text = query.toString();
+  return text ? `${ADDRESS}?${text}` : ADDRESS;
+}
+
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether parameters and view options are valid is not checked here.
+ */
+export function fromHash(hash: string): LinkedSegment | undefined {
+  const [address = '', text] = hash.split(/\?(.*)/s);
+  if (address !== ADDRESS || !text) return undefined;
+  const query = new URLSearchParams(text);
+  const linked: LinkedSegment = { params: {}, view: viewIn(query) };
+  for (const name of ['example', 'file'] as const) {
+    const value = query.get(name);
+    if (value) linked[name] = value;
+  }
+  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
+  return linked;
+}
+
+function viewIn(query: URLSearchParams): Partial<SegmentViewOptions> {
+  const view: Partial<SegmentViewOptions> = {};
+  const [slices, opacity] = [query.get('slices'), Number(query.get('opacity') ?? Number.NaN)];
+  if (query.has('edges')) view.edges = query.get('edges') === 'true';
+  if (slices) view.slices = slices as SegmentViewOptions['slices'];
+  if (Number.isFinite(opacity)) view.opacity = opacity;
+  return view;
+}

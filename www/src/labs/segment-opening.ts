@@ -1,0 +1,74 @@
+import { exampleUrl } from '../examples';
+import type { SegmentClient } from '../segment/client';
+import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from '../segment/examples';
+import type { ImageSource, LabelArray, OpenedImage, ParamSpec } from '../segment/protocol';
+import { nameOf, readFiles } from '../ui/files';
+import { fetchBytes } from './downloads';
+import type { LabStates } from './lab-states';
+import { Opening, type Source } from './opening';
+import { fromHash, type LinkedSegment } from './segment-link';
+import type { SegmentParts } from './segment-parts';
+
+export type SegmentSource = Source<SegmentExample, LinkedSegment, ImageSource>;
+
+/** Interface to the lab, as opening a volume needs it. */
+export interface OpeningLab {
+  /** Displays what was opened; with `reopening`, with the labels as they were before. */
+  adopt: (opened: OpenedImage, source: SegmentSource, reopening: boolean) => void;
+  /** Returns a copy of the voxels of the present label map, to open again with its volume. */
+  labels: () => LabelArray | undefined;
+}
+
+/** Opens volumes and their label maps in the Segment lab. */
+export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, ImageSource, OpenedImage> {
+  protected readonly first = SEGMENT_EXAMPLES[0];
+  readonly #client: SegmentClient;
+  readonly #lab: OpeningLab;
+  /** Default values of the parameters of the surfaces. */
+  defaults: Record<string, unknown> = {};
+
+  constructor(client: SegmentClient, ui: SegmentParts, states: LabStates, lab: OpeningLab) {
+    super(client, ui, states);
+    this.#client = client;
+    this.#lab = lab;
+  }
+
+  /** Opens the present source again, with its own label map. */
+  async again(): Promise<void> {
+    if (this.source) await this.open(this.source);
+  }
+
+  protected find(id: string): SegmentExample | undefined {
+    return segmentExampleById(id);
+  }
+
+  protected linkedBy(hash: string): LinkedSegment | undefined {
+    return fromHash(hash);
+  }
+
+  protected fromExample(example: SegmentExample): SegmentSource {
+    return { name: example.name, load: () => imageOf(example), example };
+  }
+
+  protected fromFiles(files: File[]): SegmentSource {
+    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
+  }
+
+  protected override onEngineReady(specs: ParamSpec[]): void {
+    this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
+  }
+
+  protected load({ name, linked }: SegmentSource, source: ImageSource, reopening: boolean): Promise<OpenedImage> {
+    const labels = reopening ? this.#lab.labels() : undefined;
+    return this.#client.request('open', { name, source, params: { ...linked?.params }, labels });
+  }
+
+  protected async adopt(opened: OpenedImage, source: SegmentSource, reopening: boolean): Promise<void> {
+    this.#lab.adopt(opened, source, reopening);
+  }
+}
+
+async function imageOf({ file, labelling }: SegmentExample): Promise<ImageSource> {
+  const files = [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }];
+  return { files, ...(labelling && { labelling }) };
+}

@@ -1,0 +1,382 @@
+import { RequestError, toFailure } from '../channel';
+import { GUIDES } from '../guides';
+import { SegmentClient } from '../segment/client';
+import { rgbOf } from '../segment/labels';
+import type { OpenedImage, OpenedLabels, SurfaceUpdate, VolumeView, WorkerEvent } from '../segment/protocol';
+import type { LabState } from '../state';
+import { plural, text } from '../texts';
+import { nameOf, readFiles } from '../ui/files';
+import type { LabelMeasures } from '../ui/label-measures';
+import type { Tool, ToolSettings } from '../ui/segment-tools';
+import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import type { Overlays } from '../view/label-overlay';
+import { LabStates } from './lab-states';
+import type { Handoff, Lab, OpenInLab } from './labs';
+import { SegmentEditing } from './segment-editing';
+import { INITIAL_VIEW } from './segment-link';
+import { SegmentOpening, type SegmentSource } from './segment-opening';
+import { type PartEvents, SegmentParts } from './segment-parts';
+import { SegmentSharing } from './segment-sharing';
+
+/** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
+const MASK_DELAY = 120;
+
+/** Overlays before there are labels. */
+const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
+  colors: new Map(),
+  names: new Map(),
+  paint: [255, 255, 255],
+  mask: undefined,
+};
+
+/**
+ * The Segment lab: labels are painted on slices, and their surfaces follow. This class connects the lab's parts; opening,
+ * editing and sharing are in files of their own.
+ */
+export class SegmentLab implements Lab {
+  readonly #root: HTMLElement;
+  readonly #closing = new AbortController();
+  readonly #client = new SegmentClient((event) => this.#onEvent(event));
+  readonly #ui: SegmentParts;
+  readonly #states: LabStates;
+  readonly #editing: SegmentEditing;
+  readonly #opening: SegmentOpening;
+  readonly #sharing: SegmentSharing;
+  readonly #measures = new Map<number, LabelMeasures>();
+  #volume: VolumeView | undefined;
+  /** Range of intensities of the mask that the editing has, as text; undefined if it has none. */
+  #maskRange: string | undefined;
+  #maskTimer = 0;
+  /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
+  #released: number | undefined;
+  /** Milliseconds from the end of the last stroke until surfaces with it were drawn, and smooth ones. */
+  #latency: { first?: number; smooth?: number } = {};
+  /** Number of times that surfaces were shown. */
+  #updates = 0;
+
+  constructor(root: HTMLElement, help: HTMLElement, _passOn: OpenInLab) {
+    this.#root = root;
+    const { signal } = this.#closing;
+    const ui = new SegmentParts(root, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.#ui = ui;
+    this.#states = states;
+    this.#editing = new SegmentEditing(this.#client, {
+      onLabels: () => this.#showLabels(),
+      onVoxels: () => ui.view.showLabels(),
+      onUpdate: (update, smooth) => this.#take(update, smooth),
+      onBusy: () => states.setModelState('running'),
+      onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
+      onError: (title, error) => states.fail(title, error),
+    });
+    this.#opening = new SegmentOpening(this.#client, ui, states, {
+      adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
+      labels: () => this.#editing.voxels?.slice(),
+    });
+    this.#sharing = new SegmentSharing(this.#client, ui, states, this.#editing, this.#opening);
+    states.subscribe((state) => this.#showState(state));
+    this.#applyTool(ui.tools.value);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.segment, signal);
+  }
+
+  /** Opens what the address asks for, or else the first example. */
+  async start(_passedOn?: Handoff): Promise<void> {
+    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
+  }
+
+  close(): void {
+    this.#closing.abort();
+    clearTimeout(this.#maskTimer);
+    this.#opening.close();
+    this.#client.close();
+    this.#ui.dispose();
+    delete this.#root.dataset.tool;
+    this.#root.replaceChildren();
+  }
+
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
+  #events(): PartEvents {
+    return {
+      onFiles: (files) => void this.#opening.files(files),
+      onMapFiles: (files) => void this.#openLabels(files),
+      onExample: (example) => void this.#opening.example(example),
+      onParam: (name, value) => void this.#setParam(name, value),
+      onOptions: () => this.#optionsChanged(),
+      onSaveMap: (format) => this.#sharing.saveMap(format),
+      onSaveSurfaces: (format) => this.#sharing.saveSurfaces(format),
+      onCopyLink: () => void this.#sharing.copyLink(),
+      onReset: () => void this.#reset(),
+      onCancel: () => void this.#opening.cancel(),
+      onDismiss: () => this.#dismiss(),
+      onActive: (value) => this.#editing.setActive(value),
+      onRename: (value, name) => this.#editing.rename(value, name),
+      onColor: (value, color) => this.#editing.recolor(value, color),
+      onVisible: (value, visible) => this.#editing.setVisible(value, visible),
+      onAdd: () => this.#addLabel(),
+      onRemove: (value) => this.#editing.remove(value),
+      onSettings: (settings) => this.#applyTool(settings),
+      onApply: () => this.#apply(),
+      onUndo: () => this.#travel('undo'),
+      onRedo: () => this.#travel('redo'),
+      press: (at, axis) => this.#press(at, axis),
+      onPick: (label) => this.#editing.setActive(label),
+    };
+  }
+
+  #shortcuts(): Shortcut[] {
+    const tool = (key: string, one: Tool, what: string): Shortcut => ({
+      key,
+      shown: key,
+      text: what,
+      act: () => this.#ui.tools.set({ tool: one }),
+    });
+    const travel = (direction: 'undo' | 'redo') => () => this.#travel(direction);
+    return [
+      tool('b', 'brush', text('segment.brush')),
+      tool('t', 'threshold', text('segment.threshold')),
+      tool('e', 'eraser', text('segment.eraser')),
+      tool('f', 'fill', text('segment.fill')),
+      tool('v', 'navigate', text('segment.navigate')),
+      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.#ui.tools.changeRadius(-1) },
+      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.#ui.tools.changeRadius(1) },
+      { key: 'p', shown: 'p', text: text('segment.applyKey'), act: () => this.#apply() },
+      { key: 'n', shown: 'n', text: text('segment.addKey'), act: () => this.#addLabel() },
+      { key: 'u', shown: 'u', text: text('labs.undo'), act: travel('undo') },
+      { key: 'z', ctrl: true, shown: text('labs.keyUndo'), text: text('labs.undo'), act: travel('undo') },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: travel('redo') },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: travel('redo') },
+      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
+    ];
+  }
+
+  /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
+  #adopt(opened: OpenedImage, { name, example, linked }: SegmentSource, reopening: boolean): void {
+    const { volume, voxels, params } = opened;
+    this.#states.ready = true;
+    this.#volume = volume;
+    this.#sharing.name = example?.id ?? name;
+    this.#sharing.params = params;
+    this.#ui.data.show(opened, example);
+    this.#ui.showParams(params);
+    this.#forgetMask();
+    this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
+    if (reopening) this.#editing.readopt(volume, opened);
+    else {
+      this.#editing.adopt(volume, opened, example?.labels ?? []);
+      this.#ui.tools.set({ range: example?.range ?? [...volume.window] });
+      this.#ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
+    }
+    this.#applyTool(this.#ui.tools.value);
+    this.#showAll(opened);
+  }
+
+  /** Opens a label map of the open volume in place of the present one. */
+  async #openLabels(files: File[]): Promise<void> {
+    const volume = this.#volume;
+    if (!volume || !this.#states.canChange) return;
+    const name = nameOf(files);
+    this.#states.load(text('labs.opening', { name }));
+    try {
+      const opened = await this.#client.request('openLabels', { files: await readFiles(files) });
+      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
+      this.#forgetMask();
+      this.#editing.adopt(volume, opened, []);
+      this.#applyTool(this.#ui.tools.value);
+      this.#ui.data.showMap(name);
+      this.#showAll(opened);
+    } catch (error) {
+      this.#states.fail(text('labs.openFailed', { name }), error);
+    }
+  }
+
+  #showAll(opened: OpenedLabels): void {
+    this.#measures.clear();
+    this.#released = undefined;
+    this.#latency = {};
+    this.#show(opened);
+    this.#editing.follow();
+  }
+
+  /** Shows surfaces that have followed a change; when they are smooth, the lab is done. */
+  #take(update: SurfaceUpdate, smooth: boolean): void {
+    this.#show(update);
+    const released = this.#released;
+    if (smooth) this.#ui.view.afterDrawing(() => this.#settle());
+    else if (update.surfaces.length > 0 && released !== undefined)
+      this.#ui.view.afterDrawing(() => {
+        this.#latency = { first: performance.now() - released };
+      });
+  }
+
+  /** Ends a change, when its smooth surfaces are drawn, unless another one has begun. */
+  #settle(): void {
+    if (this.#editing.isBusy) return;
+    if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
+    this.#released = undefined;
+    this.#showMeasures();
+    if (this.#states.setModelState('done')) this.#ui.status.say(this.#describe());
+  }
+
+  #show({ surfaces }: SurfaceUpdate): void {
+    if (surfaces.length > 0) this.#updates += 1;
+    for (const { value, voxels, volume, area, surface } of surfaces) {
+      this.#ui.view.showSurface(value, surface);
+      const { vertices = 0, triangles = 0 } = surface ?? {};
+      const version = (this.#measures.get(value)?.version ?? 0) + 1;
+      this.#measures.set(value, { value, voxels, volume, area, vertices, triangles, version });
+    }
+    this.#showMeasures();
+  }
+
+  #showMeasures(): void {
+    const unit = this.#opening.source?.example?.unit ?? 'mm';
+    this.#ui.measures.show(this.#editing.labels, this.#measures, unit, {
+      latency: this.#latency,
+      updates: this.#updates,
+    });
+  }
+
+  /** Shows the list of labels and their colours everywhere. */
+  #showLabels(): void {
+    const { labels, active, hidden } = this.#editing;
+    const visible = labels.filter(({ value }) => !hidden.has(value));
+    this.#ui.labels.show(labels, active, hidden);
+    this.#ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
+    const painted = labels.find(({ value }) => value === active);
+    this.#ui.view.showLabels({
+      colors: new Map(visible.map((label) => [label.value, rgbOf(label)])),
+      names: new Map(labels.map(({ value, name }) => [value, name])),
+      ...(painted && { paint: rgbOf(painted) }),
+    });
+    this.#showMeasures();
+  }
+
+  #press(at: Parameters<PartEvents['press']>[0], axis: Parameters<PartEvents['press']>[1]) {
+    if (!this.#states.canChange) return undefined;
+    const grip = this.#editing.press(at, axis, this.#ui.tools.value);
+    if (!grip) return undefined;
+    this.#released = undefined;
+    this.#latency = {};
+    const drop = () => {
+      this.#released = performance.now();
+      grip.drop();
+      // The surfaces may have followed before the pointer was released.
+      if (!this.#editing.isBusy) this.#ui.view.afterDrawing(() => this.#settle());
+    };
+    return { move: grip.move, drop };
+  }
+
+  /** Applies the tool in use at the crosshair: the alternative to the pointer for the keyboard. */
+  #apply(): void {
+    const { view, tools } = this.#ui;
+    if (!this.#states.canChange) return;
+    if (tools.value.tool === 'navigate') this.#ui.status.say(text('segment.applyNothing'));
+    else {
+      this.#latency = {};
+      this.#released = performance.now();
+      this.#editing.apply(view.crosshair, view.axial, tools.value);
+    }
+  }
+
+  #addLabel(): void {
+    if (this.#states.canChange && !this.#editing.add()) this.#ui.labels.showError(text('segment.noRoom'));
+  }
+
+  #travel(direction: 'undo' | 'redo'): void {
+    if (!this.#states.canChange) return;
+    this.#latency = {};
+    this.#released = performance.now();
+    this.#editing.travel(direction);
+  }
+
+  #applyTool(settings: ToolSettings): void {
+    const { tool, radius, shape } = settings;
+    const voxel = Math.min(...(this.#volume?.spacing ?? [1]));
+    const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
+    // Half a voxel more, as the brush covers.
+    this.#ui?.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
+    this.#root.dataset.tool = tool;
+    this.#followRange(settings);
+  }
+
+  /** Asks the worker which voxels the threshold brush paints, if that tool is in use and the range is another one. */
+  #followRange({ tool, range }: ToolSettings): void {
+    if (!this.#editing || !this.#states.ready) return;
+    const wanted = range.join(' ');
+    const isKnown = wanted === this.#maskRange;
+    this.#ui.view.showLabels({ mask: tool === 'threshold' && isKnown ? this.#editing.mask : undefined });
+    if (tool !== 'threshold' || isKnown) return;
+    clearTimeout(this.#maskTimer);
+    this.#maskTimer = window.setTimeout(() => void this.#requestMask(range, wanted), MASK_DELAY);
+  }
+
+  async #requestMask([low, high]: [number, number], wanted: string): Promise<void> {
+    try {
+      const mask = await this.#client.request('mask', { low, high });
+      if (mask.length !== this.#editing.voxels?.length) return;
+      this.#maskRange = wanted;
+      this.#editing.mask = mask;
+      this.#followRange(this.#ui.tools.value);
+    } catch (error) {
+      this.#states.fail(text('labs.requestFailed'), error);
+    }
+  }
+
+  #forgetMask(): void {
+    this.#maskRange = undefined;
+    clearTimeout(this.#maskTimer);
+  }
+
+  #setParam(name: string, value: unknown): Promise<void> {
+    return this.#states.enqueue(async () => {
+      if (!this.#states.canChange) return;
+      try {
+        const params = await this.#client.request('setParams', { [name]: value });
+        this.#sharing.params = params;
+        this.#ui.showParams(params);
+        this.#released = undefined;
+        this.#latency = {};
+        this.#editing.follow();
+      } catch (error) {
+        const { code, message } = toFailure(error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
+        this.#ui.showParams(this.#sharing.params);
+        this.#ui.refuseParam(name, message);
+      }
+    });
+  }
+
+  #optionsChanged(): void {
+    if (this.#states?.ready) this.#sharing.updateAddress();
+  }
+
+  #describe(): string {
+    const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
+    const labels = plural('segment.surfaces', present.length);
+    const { smooth } = this.#latency;
+    if (smooth === undefined) return text('segment.ready', { labels });
+    return text('segment.followed', { labels, milliseconds: Math.round(smooth) });
+  }
+
+  #onEvent({ failure }: WorkerEvent): void {
+    this.#states.fail(text('labs.requestFailed'), new RequestError(failure));
+  }
+
+  #showState(state: LabState): void {
+    const { modelState, ready } = this.#states;
+    this.#root.dataset.state = state;
+    this.#ui.showState(modelState, ready);
+    if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
+  }
+
+  /** Opens volume and label map again; after a failure of the engine, with the present labels. */
+  async #reset(): Promise<void> {
+    const { source } = this.#opening;
+    if (this.#states.engineBroken) await this.#opening.reopen();
+    else if (this.#states.canChange && source) await this.#opening.again();
+  }
+
+  #dismiss(): void {
+    if (this.#states.dismiss()) this.#ui.status.say(this.#describe());
+  }
+}

@@ -1,0 +1,49 @@
+/** Names and colours of labels. */
+import { text } from '../texts';
+
+/** A label as the list shows it. */
+export interface Label {
+  value: number;
+  name: string;
+  /** As #rrggbb. */
+  color: string;
+}
+
+/** Distinct colours, also for most colour-blind people; labels beyond repeat them. */
+const PALETTE = [
+  '#e69f00',
+  '#56b4e9',
+  '#d6406d',
+  '#2fa572',
+  '#f0e442',
+  '#9467d8',
+  '#d55e00',
+  '#0d7fc4',
+  '#a6cf5b',
+  '#e89bc7',
+  '#8c6d4f',
+  '#7fd6cf',
+];
+
+/** Returns a label with the given value, named by `name` or else by its value. */
+export function newLabel(value: number, name = text('segment.labelName', { value })): Label {
+  return {
+    value,
+    name,
+    color: PALETTE[(((value - 1) % PALETTE.length) + PALETTE.length) % PALETTE.length] ?? '#888888',
+  };
+}
+
+/** Returns the smallest value above 0 that none of the labels has. */
+export function freeValue(labels: readonly Label[]): number {
+  const taken = new Set(labels.map(({ value }) => value));
+  let value = 1;
+  while (taken.has(value)) value += 1;
+  return value;
+}
+
+/** Returns a label's colour as red, green and blue, 0..255. */
+export function rgbOf({ color }: Pick<Label, 'color'>): [number, number, number] {
+  const number = Number.parseInt(color.slice(1), 16);
+  return [number >> 16, (number >> 8) & 255, number & 255];
+}

@@ -1,0 +1,101 @@
+/**
+ * Messages between the page and the worker of the Segment lab. Both sides import this file, and neither imports the
+ * other's code.
+ */
+import type { MeshFormat, VolumeFormat } from 'vesicle';
+import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
+
+export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
+
+/** Voxels of a label map, in the type in which they are stored in a file; 0 is the background. */
+export type LabelArray = Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array;
+
+/** A box of voxels: the index of its first voxel, and the numbers of voxels along x, y and z. */
+export interface Region {
+  min: Vec3;
+  dims: Vec3;
+}
+
+/** The voxels of a box of a label map, x fastest. */
+export interface LabelBlock extends Region {
+  data: LabelArray;
+}
+
+/** Label map that is computed from an example's intensities. */
+export type Labelling = 'tooth' | 'head';
+
+/** Source of a volume and, if there is one, its label map. */
+export interface ImageSource {
+  /** Files of the volume, or of the volume and its label map. */
+  files: NamedBytes[];
+  labelling?: Labelling;
+}
+
+/** Measures of a label, and its surface. Lengths are in world units. */
+export interface LabelSurface {
+  value: number;
+  voxels: number;
+  /** Volume of the voxels. */
+  volume: number;
+  /** Area of the surface. */
+  area: number;
+  /** Undefined if the label has no voxels. */
+  surface: Surface | undefined;
+}
+
+/** Surfaces that may have changed, and the milliseconds that the worker spent on them. */
+export interface SurfaceUpdate {
+  surfaces: LabelSurface[];
+  milliseconds: number;
+}
+
+/** The open label map, with the surfaces of all its labels, which are not smooth yet. */
+export interface OpenedLabels extends SurfaceUpdate {
+  /** Number of the map, which requests that concern it name; another one opened meanwhile has another number. */
+  map: number;
+  voxels: LabelArray;
+}
+
+export interface OpenedImage extends OpenedLabels {
+  volume: VolumeView;
+  params: ParamValues;
+  /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
+  labelFile: string | undefined;
+}
+
+/** Requests of the page to the Segment lab's worker: the body of each and its reply. */
+export interface Requests {
+  hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
+  /**
+   * Opens a volume with its label map, or with an empty one; `labels` are voxels that replace those of the file, after a
+   * failure of the engine. On failure, what was open before stays.
+   */
+  open: {
+    body: { name: string; source: ImageSource; params: ParamValues; labels: LabelArray | undefined };
+    reply: OpenedImage;
+  };
+  /** Replaces the label map of the open volume by that of a file, which must have the grid of the volume. */
+  openLabels: { body: { files: NamedBytes[] }; reply: OpenedLabels };
+  /**
+   * Changes voxels of the label map; the surfaces follow at once, along the faces of the voxels. Does nothing if another
+   * map is open.
+   */
+  edit: { body: { map: number; block: LabelBlock }; reply: SurfaceUpdate };
+  /**
+   * Makes a step that smooths what has changed; the reply to the last one has the surfaces. Does nothing if another map
+   * is open.
+   */
+  step: { body: { map: number }; reply: SurfaceUpdate & { done: boolean } };
+  /** Changes parameters of the surfaces, which the next steps adopt; replies with all parameters. */
+  setParams: { body: ParamValues; reply: ParamValues };
+  /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */
+  mask: { body: { low: number; high: number }; reply: Uint8Array };
+  /** Replies with the label map as a file, in the geometry of the volume. */
+  exportMap: { body: { format: VolumeFormat }; reply: Uint8Array };
+  /** Replies with the surface of a label as a file. */
+  exportMesh: { body: { value: number; format: MeshFormat }; reply: Uint8Array };
+}
+
+export type RequestKind = keyof Requests;
+export type ToWorker = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
+export type WorkerEvent = FailureEvent;

@@ -1,0 +1,292 @@
+/** Worker of the Segment lab: holds one volume, its label map and their surfaces, and serves the page's requests. */
+
+import init, { LabelSurfaces, paramSpecs, type Volume, version } from 'vesicle';
+import { quantize } from '../quantize';
+import { text } from '../texts';
+import { Refusal } from '../worker/refusal';
+import { reply, withTransfer } from '../worker/serving';
+import { capacityFor } from '../worker/surface-buffers';
+import { viewOf } from '../worker/volumes';
+import type {
+  LabelArray,
+  LabelBlock,
+  LabelSurface,
+  OpenedImage,
+  OpenedLabels,
+  ParamValues,
+  Region,
+  RequestKind,
+  Requests,
+  Surface,
+  SurfaceUpdate,
+  ToWorker,
+} from './protocol';
+import { forEachRow, grown } from './region';
+import { mapLike, type OpenVolume, openImage, openLabels } from './source';
+
+type Handlers = {
+  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
+};
+
+/** Distance in voxels from a change within which surfaces may move: they are smoothed again up to 8 cells away. */
+const HALO = 9;
+let maps = 0;
+
+/** A label map with its surfaces. */
+class LiveMap {
+  readonly id = ++maps;
+  readonly map: Volume;
+  readonly voxels: LabelArray;
+  readonly surfaces: LabelSurfaces;
+  /** Number of voxels of each label, the background included. */
+  readonly #counts = new Map<number, number>();
+  /** Numbers of vertices and triangles of the surfaces when they were last sent, to reserve memory for the next. */
+  readonly #sizes = new Map<number, [number, number]>();
+  readonly #voxelVolume: number;
+  /** Labels whose surfaces may have changed since they were smooth. */
+  #changed = new Set<number>();
+  #isSmooth = false;
+
+  constructor({ volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>, voxels: LabelArray, params: ParamValues) {
+    this.voxels = voxels;
+    this.map = mapLike(volume, voxels, unit);
+    this.#voxelVolume = Math.abs(determinant(volume.affine));
+    try {
+      this.surfaces = new LabelSurfaces({ volume: this.map, ...params });
+    } catch (error) {
+      this.map.free();
+      throw error;
+    }
+    for (const label of voxels) this.#count(label, 1);
+    this.#changed = new Set(this.surfaces.labels);
+  }
+
+  /** Makes a step; returns whether the surfaces are smooth. */
+  step(): boolean {
+    this.#isSmooth = this.surfaces.step(1).done;
+    return this.#isSmooth;
+  }
+
+  /** Labels whose surfaces may have changed by the last edits, until others follow when the surfaces are smooth. */
+  get changed(): ReadonlySet<number> {
+    return this.#changed;
+  }
+
+  setParams(params: ParamValues): void {
+    this.surfaces.setParams(params);
+    this.#changed = new Set(this.surfaces.labels);
+    this.#isSmooth = false;
+  }
+
+  /** Changes voxels, and has the surfaces follow; returns the labels whose surfaces may have changed. */
+  write(block: LabelBlock): Set<number> {
+    const near = grown(block, HALO, this.map.dims);
+    const affected = this.#labelsIn(near);
+    this.map.write(block);
+    let at = 0;
+    forEachRow(block, this.map.dims, (first) => {
+      for (let x = 0; x < block.dims[0]; x++) {
+        const label = block.data[at++] ?? 0;
+        this.#count(this.voxels[first + x] ?? 0, -1);
+        this.#count(label, 1);
+        this.voxels[first + x] = label;
+      }
+    });
+    const { min, dims } = block;
+    this.surfaces.refresh({ min, dims });
+    for (const label of this.#labelsIn(near)) affected.add(label);
+    if (this.#isSmooth) this.#changed.clear();
+    for (const label of affected) this.#changed.add(label);
+    this.#isSmooth = false;
+    return affected;
+  }
+
+  /** Returns all labels that have voxels. */
+  get labels(): readonly number[] {
+    return this.surfaces.labels;
+  }
+
+  describe(value: number): LabelSurface {
+    const voxels = this.#counts.get(value) ?? 0;
+    const surface = voxels > 0 ? this.#surface(value) : undefined;
+    return { value, voxels, volume: voxels * this.#voxelVolume, area: surface ? areaOf(surface) : 0, surface };
+  }
+
+  free(): void {
+    this.surfaces.free();
+    this.map.free();
+  }
+
+  /** Copies a surface into arrays with spare capacity, in one extraction of it. */
+  #surface(value: number): Surface {
+    const [vertices, triangles] = this.#sizes.get(value) ?? [0, 0];
+    const [numbers, corners] = [3 * capacityFor(vertices), 3 * capacityFor(triangles)];
+    const arrays = {
+      positions: new Float32Array(numbers),
+      normals: new Float32Array(numbers),
+      indices: new Uint32Array(corners),
+    };
+    const counts = this.surfaces.mesh(value).copyTo(arrays);
+    this.#sizes.set(value, [counts.vertices, counts.triangles]);
+    return { ...arrays, ...counts };
+  }
+
+  #labelsIn(region: Region): Set<number> {
+    const found = new Set<number>();
+    let last = 0;
+    forEachRow(region, this.map.dims, (first) => {
+      for (let x = first; x < first + region.dims[0]; x++) {
+        const label = this.voxels[x] ?? 0;
+        if (label !== last) found.add(label);
+        last = label;
+      }
+    });
+    found.delete(0);
+    return found;
+  }
+
+  #count(label: number, change: number): void {
+    this.#counts.set(label, (this.#counts.get(label) ?? 0) + change);
+  }
+}
+
+class Session {
+  #open: Pick<OpenVolume, 'volume' | 'unit'> | undefined;
+  #live: LiveMap | undefined;
+
+  readonly handlers: Handlers = {
+    hello: async () => {
+      await starting;
+      return { version: version(), specs: paramSpecs('labels') };
+    },
+    open: (body) => this.#openImage(body),
+    openLabels: ({ files }) => this.#openLabels(files),
+    edit: ({ map, block }) => {
+      const began = performance.now();
+      const live = this.#current();
+      return this.#update(map === live.id ? live.write(block) : [], began);
+    },
+    step: ({ map }) => this.#step(map),
+    setParams: (params) => {
+      const live = this.#current();
+      live.setParams(params);
+      return { ...live.surfaces.params };
+    },
+    mask: ({ low, high }) => this.#mask(low, high),
+    exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: true }),
+    exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
+  };
+
+  async #openImage({ name, source, params, labels }: Requests['open']['body']): Promise<OpenedImage> {
+    const began = performance.now();
+    const opened = await openImage(source);
+    try {
+      const live = new LiveMap(opened, labels ?? opened.labels, params);
+      this.#adopt(live);
+      this.#open?.volume.free();
+      this.#open = opened;
+      const all = this.#all(live, began);
+      const volume = viewOf(opened.volume, name);
+      const { labelFile } = opened;
+      return withTransfer({ ...all, volume, params: { ...live.surfaces.params }, labelFile }, [
+        ...arraysOf(all),
+        all.voxels,
+        volume.voxels,
+      ]);
+    } catch (error) {
+      opened.volume.free();
+      throw error;
+    }
+  }
+
+  async #openLabels(files: Requests['openLabels']['body']['files']): Promise<OpenedLabels> {
+    const began = performance.now();
+    const image = this.#image();
+    const live = new LiveMap(image, await openLabels(files, image.volume), { ...this.#current().surfaces.params });
+    this.#adopt(live);
+    const all = this.#all(live, began);
+    return withTransfer(all, [...arraysOf(all), all.voxels]);
+  }
+
+  #step(map: number): SurfaceUpdate & { done: boolean } {
+    const began = performance.now();
+    const live = this.#current();
+    if (map !== live.id) return { surfaces: [], milliseconds: 0, done: true };
+    const done = live.step();
+    const update = this.#update(done ? live.changed : [], began);
+    return withTransfer({ ...update, done }, arraysOf(update));
+  }
+
+  #adopt(live: LiveMap): void {
+    this.#live?.free();
+    this.#live = live;
+  }
+
+  #all(live: LiveMap, began: number): OpenedLabels {
+    return { ...this.#update(live.labels, began), map: live.id, voxels: live.voxels.slice() };
+  }
+
+  #update(labels: Iterable<number>, began: number): SurfaceUpdate {
+    const live = this.#current();
+    const surfaces = Array.from(labels, (label) => live.describe(label));
+    const update = { surfaces, milliseconds: performance.now() - began };
+    return withTransfer(update, arraysOf(update));
+  }
+
+  #mask(low: number, high: number): Uint8Array {
+    const mask = this.#image().volume.threshold(low, high);
+    try {
+      const [nx, ny, nz] = mask.dims;
+      const voxels = new Uint8Array(nx * ny * nz);
+      for (let z = 0; z < nz; z++) quantize(mask.slice(2, z), [0, 1], voxels, z * nx * ny);
+      return withTransfer(voxels, [voxels]);
+    } finally {
+      mask.free();
+    }
+  }
+
+  #image(): Pick<OpenVolume, 'volume' | 'unit'> {
+    if (!this.#open) throw new Refusal('invalid-argument', text('segment.noVolume'));
+    return this.#open;
+  }
+
+  #current(): LiveMap {
+    if (!this.#live) throw new Refusal('invalid-argument', text('segment.noVolume'));
+    return this.#live;
+  }
+}
+
+/** Returns the arrays of an update's surfaces, to be transferred. */
+function arraysOf({ surfaces }: SurfaceUpdate): ArrayBufferView[] {
+  return surfaces.flatMap(({ surface }) => (surface ? [surface.positions, surface.normals, surface.indices] : []));
+}
+
+function areaOf({ positions, indices, triangles }: Surface): number {
+  const at = (corner: number, axis: number) => positions[3 * (indices[corner] ?? 0) + axis] ?? 0;
+  let area = 0;
+  for (let corner = 0; corner < 3 * triangles; corner += 3) {
+    const side = (end: number, axis: number) => at(corner + end, axis) - at(corner, axis);
+    const [ax, ay, az] = [side(1, 0), side(1, 1), side(1, 2)];
+    const [bx, by, bz] = [side(2, 0), side(2, 1), side(2, 2)];
+    area += Math.hypot(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx) / 2;
+  }
+  return area;
+}
+
+/** Returns the volume of a voxel, negative for a mirrored grid. */
+function determinant(affine: ArrayLike<number>): number {
+  const a = (column: number, row: number) => affine[4 * column + row] ?? 0;
+  return (
+    a(0, 0) * (a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1)) -
+    a(1, 0) * (a(0, 1) * a(2, 2) - a(0, 2) * a(2, 1)) +
+    a(2, 0) * (a(0, 1) * a(1, 2) - a(0, 2) * a(1, 1))
+  );
+}
+
+// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
+const starting = init();
+starting.catch(() => undefined);
+
+const session = new Session();
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => void reply(session.handlers, data);
