@@ -4,7 +4,7 @@ import { defineConfig, type Plugin, type Rolldown } from 'vite';
 import { noteBundled } from '../scripts/licences.mjs';
 
 /** A live page for each host that there is an adapter for. */
-const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
+const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'draw', 'vtk', 'itk', 'element'];
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 

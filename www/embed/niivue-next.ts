@@ -4,9 +4,15 @@ import { NiivueSurface, volumeFromNiivue } from 'vesicle/niivue';
 import { page, shown } from './page';
 
 await page(async () => {
-  const nv = new NiiVue({ backgroundColor: [0.08, 0.09, 0.1, 1], showRender: 1, meshThicknessOn2D: 8, meshXRay: 0.6 });
+  const nv = new NiiVue({
+    ...{ backgroundColor: [0.08, 0.09, 0.1, 1], is3DCrosshairVisible: true },
+    // A large 3D view beside the slices.
+    ...{ showRender: 1, heroFraction: 0.55, heroSliceType: 4 },
+  });
   await nv.attachToCanvas(document.querySelector('canvas') as HTMLCanvasElement);
   await nv.loadVolumes([{ url: '../data/visible-human-head.nii.gz' }]);
+  // The 3D view shows the surface alone: the volume is beyond the clip plane.
+  nv.setClipPlane([-2, 0, 0]);
 
   await init();
   const volume = new Volume(volumeFromNiivue(nv.volumes[0]));
