@@ -110,7 +110,7 @@ export default defineConfig({
   base: './',
   resolve: {
     alias: [
-      { find: /^vesicle\/(three|niivue|vtk)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
       { find: /^vesicle\/import$/, replacement: here('../pkg/import/index.js') },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },

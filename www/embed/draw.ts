@@ -8,6 +8,7 @@ const element = <E extends HTMLElement>(id: string) => document.querySelector(`#
 await status(async (say) => {
   const nv = new Niivue({
     ...{ backColor: [0.08, 0.09, 0.1, 1], crosshairWidth: 0.4, show3Dcrosshair: false },
+    ...{ crosshairColor: [0.6, 0.8, 1, 0.8] },
     // A large 3D view beside the slices.
     ...{ multiplanarShowRender: SHOW_RENDER.ALWAYS, heroImageFraction: 0.5, heroSliceType: SLICE_TYPE.RENDER },
   });
@@ -25,27 +26,25 @@ await status(async (say) => {
     const parts = [...drawing.meshes].map(([label, mesh]) => `${label}: ${(mesh.info().volume / 1000).toFixed(1)} ml`);
     say(parts.length > 0 ? `Volume of each colour, ${parts.join(', ')}` : 'Draw in a slice.');
   };
+  fillVentricles(nv);
   tools(nv, drawing.meshes);
-  drawChamber(nv);
   await drawing.update();
+  show();
   Object.assign(window, { nv, drawing });
 });
 
-/** Draws the blood around the middle of the volume, so that there is something to see and to change. */
-function drawChamber(nv: Niivue): void {
-  const [image] = nv.volumes;
-  const [, nx = 0, ny = 0, nz = 0] = image?.dimsRAS ?? [];
-  const middle = [0.4 * nx, 0.5 * ny, 0.3 * nz];
-  for (let z = 0, i = 0; z < nz; z++) {
-    for (let y = 0; y < ny; y++) {
-      for (let x = 0; x < nx; x++, i++) {
-        const away = Math.hypot(x - (middle[0] ?? 0), y - (middle[1] ?? 0), z - (middle[2] ?? 0));
-        if (away < 0.25 * nx && nv.drawBitmap && (image?.getValue(x, y, z) ?? 0) > 85) nv.drawBitmap[i] = 1;
-      }
-    }
+/** Fills the two ventricles with NiiVue's own tool, so that there is something to see and to change. */
+function fillVentricles(nv: Niivue): void {
+  const seeds = [
+    [32, 31, 5],
+    [45, 37, 8],
+  ];
+  for (const [k, seed] of seeds.entries()) {
+    nv.setPenValue(k + 1);
+    // Blood is brighter than 85.
+    nv.drawFloodFill(seed, 0, Number.POSITIVE_INFINITY, 85, 1000);
   }
-  nv.drawAddUndoBitmap();
-  nv.refreshDrawing();
+  nv.scene.crosshairPos = nv.vox2frac([36, 33, 6]);
 }
 
 /** Lets the controls above the view change NiiVue's pen. */

@@ -12,12 +12,12 @@ await page(async () => {
   await nv.attachToCanvas(document.querySelector('canvas') as HTMLCanvasElement);
   await nv.loadVolumes([{ url: '../data/visible-human-head.nii.gz' }]);
   // The 3D view shows the surface alone: the volume is beyond the clip plane.
-  nv.setClipPlane([-2, 0, 0]);
+  nv.setClipPlane([-0.95, 270, 0]);
 
   await init();
   const volume = new Volume(volumeFromNiivue(nv.volumes[0]));
   const model = new DeformableModel({ volume, levels: 2, params: { iso: 35, isoForce: -1 } });
-  const surface = new NiivueSurface(nv);
+  const surface = new NiivueSurface(nv, { color: [1, 0.75, 0.5, 1] });
   Object.assign(window, { nv, model, surface });
   for (;;) {
     const report = model.step();
