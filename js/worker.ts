@@ -67,8 +67,8 @@ export type {
   FrameStatistics,
   ImplicitOptions,
   ImplicitParams,
-  LabelParams,
   InitInput,
+  LabelParams,
   MeshArrays,
   MeshFormat,
   MeshHit,
@@ -115,15 +115,8 @@ export type SurfaceTracker = there.SurfaceTracker;
 export type MultiresolutionModel = there.MultiresolutionModel;
 export type LabelSurfaces = there.LabelSurfaces;
 
-export const {
-  Volume,
-  Mesh,
-  DeformableModel,
-  ImplicitSurface,
-  SurfaceTracker,
-  MultiresolutionModel,
-  LabelSurfaces,
-} = remoteClasses;
+export const { Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel, LabelSurfaces } =
+  remoteClasses;
 
 /** Returns the version of the library in the worker. */
 export const version = remoteFunction('version');

@@ -32,7 +32,7 @@ export interface FollowedDrawing {
    * @throws `VesicleError` `invalid-argument`: a drawing that does not fit to the first volume.
    */
   update(): Promise<void>;
-  /** Stops following, and removes the surfaces from NiiVue. */
+  /** Stops following for good, and removes the surfaces from NiiVue. */
   stop(): Promise<void>;
 }
 
@@ -75,6 +75,7 @@ class DrawingFollower implements FollowedDrawing {
   readonly #shown = new Map<number, { surface: NiivueSurface; color: string }>();
   #map: { labels: LabelMap; grid: string } | undefined;
   #frame: number | undefined;
+  #stopped = false;
   #last: Promise<void> = Promise.resolve();
 
   constructor(nv: Niivue, options: DrawingOptions) {
@@ -104,6 +105,8 @@ class DrawingFollower implements FollowedDrawing {
   }
 
   async stop(): Promise<void> {
+    if (this.#stopped) return;
+    this.#stopped = true;
     // Uncovers the method of the class.
     delete (this.#nv as Partial<Drawer>).refreshDrawing;
     this.#nv.removeEventListener('drawingChanged', this.#schedule);
@@ -127,6 +130,7 @@ class DrawingFollower implements FollowedDrawing {
   }
 
   async #update(): Promise<void> {
+    if (this.#stopped) return;
     const init = drawingOf(this.#nv);
     if (!init) return this.#clear();
     const labels = await this.#labelsOf(init);

@@ -55,7 +55,9 @@ function intersect(positions: Float32Array, indices: Uint32Array, { normal, offs
     heights[v] = nx * x + ny * y + nz * z - offset;
   }
   const ends: number[] = [];
-  const cross = (a: number, b: number) => {
+  // From the lower index to the higher one, so that both triangles at an edge have the same point.
+  const cross = (j: number, k: number) => {
+    const [a, b] = j < k ? [j, k] : [k, j];
     const [above, below] = [heights[a] as number, heights[b] as number];
     const share = above / (above - below);
     for (let k = 0; k < 3; k++) {

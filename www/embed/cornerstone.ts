@@ -22,22 +22,23 @@ await status(async (say) => {
   const engine = new core.RenderingEngine('engine');
   const view = document.querySelector('#view') as HTMLElement;
   const pane = () => view.appendChild(Object.assign(document.createElement('div'), { className: 'pane' }));
+  const background: [number, number, number] = [0.08, 0.09, 0.1];
   engine.setViewports([
     {
       viewportId: SLICE,
       type: ViewportType.ORTHOGRAPHIC,
       element: pane(),
-      defaultOptions: { orientation: OrientationAxis.ACQUISITION },
+      defaultOptions: { background, orientation: OrientationAxis.ACQUISITION },
     },
-    { viewportId: SPACE, type: ViewportType.VOLUME_3D, element: pane() },
+    { viewportId: SPACE, type: ViewportType.VOLUME_3D, element: pane(), defaultOptions: { background } },
   ]);
   await core.setVolumesForViewports(engine, [{ volumeId: HEART }], [SLICE]);
   const slice = engine.getViewport(SLICE) as core.Types.IVolumeViewport;
   slice.setProperties({ voiRange: { lower: 0, upper: 200 } });
   brush();
   await addSegmentation();
-  // The sixth slice shows all segments.
-  tools.utilities.scroll(slice, { delta: 6 - slice.getSliceIndex() });
+  // This slice shows all segments.
+  await core.utilities.jumpToSlice(slice.element, { imageIndex: 14 });
   engine.render();
   new ResizeObserver(() => engine.resize(true, true)).observe(view);
   Object.assign(window, { core, tools, addOn, engine, volume });

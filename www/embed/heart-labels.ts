@@ -24,7 +24,7 @@ export function heartLabels({ voxels, size, spacing }: Scan): Uint8Array<ArrayBu
   const labels = new Uint8Array(voxels.length);
   for (const [k, seed] of SEEDS.entries()) fill(labels, k + 1, seed, (i) => (voxels[i] ?? 0) >= BLOOD, size);
   // Within each slice, so that the ventricle is open at both ends.
-  const wall = ball(size, [spacing[0] ?? 1, spacing[1] ?? 1, Number.POSITIVE_INFINITY], WALL);
+  const wall = ball(size, [spacing[0] ?? 1, spacing[1] ?? 1, 1000], WALL);
   for (let i = 0; i < labels.length; i++) {
     if (labels[i] !== 1) continue;
     for (const j of wall(i)) if (labels[j] === 0) labels[j] = 3;
