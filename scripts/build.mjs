@@ -50,7 +50,7 @@ const optimised = (module) => join(folder(module), `${glueName(module)}_bg.wasm`
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
 
 // Adapters to third-party software: `vesicle/three` and so on.
-const ADAPTERS = ['three', 'niivue', 'vtk'];
+const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
 async function compile({ target, features, env }) {
   const args = [

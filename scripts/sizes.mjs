@@ -17,6 +17,7 @@ const ENTRIES = {
   'vesicle/three': 'adapters/three.js',
   'vesicle/niivue': 'adapters/niivue.js',
   'vesicle/vtk': 'adapters/vtk.js',
+  'vesicle/cornerstone': 'adapters/cornerstone.js',
   'vesicle/element': 'element.js',
 };
 

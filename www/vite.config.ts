@@ -4,7 +4,18 @@ import { defineConfig, type Plugin, type Rolldown } from 'vite';
 import { noteBundled } from '../scripts/licences.mjs';
 
 /** A live page for each host that there is an adapter for. */
-const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
+const EMBEDS = [
+  'index',
+  'three',
+  'niivue',
+  'niivue-next',
+  'draw',
+  'vtk',
+  'vtk-labels',
+  'itk',
+  'cornerstone',
+  'element',
+];
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 
@@ -34,6 +45,19 @@ function dicomBeside(): Plugin {
         response.setHeader('Content-Type', name.endsWith('.js') ? 'text/javascript' : 'application/octet-stream');
         response.end(readFileSync(folder + name));
       });
+    },
+  };
+}
+
+/** Gives the tools of Cornerstone the vtk.js of its core, an older one than ours: objects of two do not fit together. */
+function sameVtk(): Plugin {
+  const core = here('../node_modules/@cornerstonejs/core/dist/esm/index.js');
+  return {
+    name: 'same-vtk',
+    enforce: 'pre',
+    resolveId(id, importer) {
+      if (!id.startsWith('@kitware/vtk.js') || !importer?.includes('@cornerstonejs/tools')) return undefined;
+      return this.resolve(id, core, { skipSelf: true });
     },
   };
 }
@@ -113,13 +137,13 @@ export default defineConfig({
   base: './',
   resolve: {
     alias: [
-      { find: /^vesicle\/(three|niivue|vtk)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
       { find: /^vesicle\/import$/, replacement: here('../pkg/import/index.js') },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), listFiles(), noted.page],
+  plugins: [relaxPolicyWhileDeveloping(), sameVtk(), dicomBeside(), listFiles(), noted.page],
   worker: { format: 'es', plugins: () => [ownMethod(), noted.worker] },
   build: {
     outDir: here('../dist'),

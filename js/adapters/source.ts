@@ -154,3 +154,15 @@ export function affineOf(columns: readonly ArrayLike<number>[], origin: ArrayLik
   const [x, y, z] = columns;
   return Float64Array.from([x, y, z, origin].flatMap((values, index) => column(values, index === 3 ? 1 : 0)));
 }
+
+/** Returns the triangles as vtk cells: each preceded by its number of corners. */
+export function polygons({ indices }: Pick<MeshArrays, 'indices'>): Uint32Array {
+  const cells = new Uint32Array((indices.length / 3) * 4);
+  for (let from = 0, to = 0; from < indices.length; from += 3, to += 4) {
+    cells[to] = 3;
+    cells[to + 1] = indices[from] as number;
+    cells[to + 2] = indices[from + 1] as number;
+    cells[to + 3] = indices[from + 2] as number;
+  }
+  return cells;
+}

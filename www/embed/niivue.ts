@@ -1,16 +1,20 @@
-import { Niivue, NVMesh, SHOW_RENDER } from '@niivue/niivue';
+import { Niivue, NVMesh, SHOW_RENDER, SLICE_TYPE } from '@niivue/niivue';
 import init, { DeformableModel, Volume } from 'vesicle';
 import { NiivueSurface, volumeFromNiivue } from 'vesicle/niivue';
 import { page, shown } from './page';
 
 await page(async () => {
   const nv = new Niivue({
-    ...{ backColor: [0.08, 0.09, 0.1, 1], multiplanarShowRender: SHOW_RENDER.ALWAYS },
-    // Slices show the part of the surface near them; the surface also shows through the volume.
-    ...{ meshThicknessOn2D: 2, meshXRay: 0.6 },
+    ...{ backColor: [0.08, 0.09, 0.1, 1], crosshairWidth: 0.4, show3Dcrosshair: false },
+    // A large 3D view beside the slices.
+    ...{ multiplanarShowRender: SHOW_RENDER.ALWAYS, heroImageFraction: 0.6, heroSliceType: SLICE_TYPE.RENDER },
   });
   await nv.attachToCanvas(document.querySelector('canvas') as HTMLCanvasElement);
   await nv.loadVolumes([{ url: '../data/heart.nii.gz' }]);
+  // The 3D view shows the surface alone, from the front: the volume is beyond the clip plane.
+  nv.setClipPlane([-2, 0, 0]);
+  nv.setScale(1.8);
+  nv.setRenderAzimuthElevation(200, 10);
 
   await init();
   const volume = new Volume(volumeFromNiivue(nv.volumes[0]));

@@ -17,10 +17,17 @@ export function shown({ iteration, phase, vertices, components }: StepReport): P
 }
 
 /** Runs the page's work, and shows in the status line how it ended: the final counts, or the error message. */
-export async function page(work: () => Promise<StepReport>): Promise<void> {
-  try {
+export function page(work: () => Promise<StepReport>): Promise<void> {
+  return status(async (say) => {
     const { iteration, vertices } = await work();
-    state('done', `Converged after ${iteration} steps: ${vertices.toLocaleString('en')} vertices.`);
+    say(`Converged after ${iteration} steps: ${vertices.toLocaleString('en')} vertices.`);
+  });
+}
+
+/** Runs the work of a page that waits for its user; what it says is shown in the status line, and its error. */
+export async function status(work: (say: (text: string) => void) => Promise<void>): Promise<void> {
+  try {
+    await work((text) => state('done', text));
   } catch (error) {
     state('error', error instanceof Error ? error.message : String(error));
   }

@@ -1,4 +1,4 @@
-// A plain vtk.js view, shared by the pages that use it: one slice of an image and one actor.
+// A plain vtk.js view, shared by the pages that use it: one slice of an image, and actors.
 import '@kitware/vtk.js/Rendering/Profiles/Volume';
 import type vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData';
 import type vtkActor from '@kitware/vtk.js/Rendering/Core/Actor';
@@ -12,18 +12,28 @@ import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRender
  * up. Returns a function that renders it.
  */
 export function sliceAndSurface(image: vtkImageData, actor: vtkActor): () => void {
+  actor.getProperty().setColor(0.95, 0.86, 0.75);
+  return sliceAndSurfaces(image, [actor], [-0.7, -1.5, 0.5], 1.5);
+}
+
+/** The same with several actors, which keep their colours, seen from the direction `from`, enlarged. */
+export function sliceAndSurfaces(
+  image: vtkImageData,
+  actors: vtkActor[],
+  from: [number, number, number],
+  zoom: number,
+): () => void {
   const view = document.querySelector('#view') as HTMLElement;
   const generic = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.1], listenWindowResize: false });
   generic.setContainer(view);
   const renderer = generic.getRenderer();
   renderer.addViewProp(middleSlice(image));
-  actor.getProperty().setColor(0.95, 0.86, 0.75);
-  renderer.addActor(actor);
+  for (const actor of actors) renderer.addActor(actor);
   const camera = renderer.getActiveCamera();
-  camera.setPosition(-0.7, -1.5, 0.5);
+  camera.setPosition(...from);
   camera.setViewUp(0, 0, 1);
   renderer.resetCamera(image.getBounds());
-  camera.zoom(1.5);
+  camera.zoom(zoom);
   new ResizeObserver(() => generic.resize()).observe(view);
   return () => generic.getRenderWindow().render();
 }

@@ -1,0 +1,87 @@
+// Shows a surface in vtk.js that follows a mesh.
+import { invalid } from '../check.js';
+import type { Space } from '../data.js';
+import { MeshReader, type MeshSource, polygons } from './source.js';
+
+interface DataArray {
+  setData(values: Float32Array | Uint32Array, components?: number): void;
+}
+
+/** The methods of a `vtkPolyData` of vtk.js that {@link VtkSurface} calls. */
+export interface VtkPolyData {
+  getPoints(): DataArray;
+  getPolys(): DataArray;
+  getPointData(): { setNormals(array: DataArray): unknown };
+  modified(): void;
+  delete(): void;
+}
+
+/** The classes of vtk.js that {@link VtkSurface} needs: `{ vtkPolyData, vtkDataArray }`. */
+export interface VtkClasses<P extends VtkPolyData> {
+  vtkPolyData: { newInstance(): P };
+  vtkDataArray: { newInstance(values: { name: string; numberOfComponents: number; values: Float32Array }): DataArray };
+}
+
+/**
+ * A `vtkPolyData` that follows a mesh, through all changes of connectivity.
+ *
+ * ```js
+ * const surface = new VtkSurface({ vtkPolyData, vtkDataArray });
+ * mapper.setInputData(surface.polyData);
+ * surface.update(model.mesh); // after every step, then render
+ * ```
+ *
+ * Points are those of the mesh, in its volume's world space unless `worldSpace` is another one; they have outward
+ * normals.
+ */
+export class VtkSurface<P extends VtkPolyData> {
+  /** The surface as input of a `vtkMapper`; the same object from start to end. */
+  readonly polyData: P;
+  readonly #normals: DataArray;
+  readonly #reader: MeshReader;
+
+  /**
+   * Creates a surface that is empty before the first update.
+   *
+   * @param vtk - The classes of vtk.js.
+   * @param options - `space` of the mesh and `worldSpace` of the view: if both are given and differ, the signs of x and
+   *   y are flipped.
+   * @throws `VesicleError` `invalid-argument`: classes that are missing, or no such space.
+   */
+  constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space } = {}) {
+    for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {
+      if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
+    }
+    this.#reader = new MeshReader(options.space, options.worldSpace);
+    this.polyData = vtk.vtkPolyData.newInstance();
+    this.#normals = vtk.vtkDataArray.newInstance({
+      name: 'Normals',
+      numberOfComponents: 3,
+      values: new Float32Array(),
+    });
+    this.polyData.getPointData().setNormals(this.#normals);
+  }
+
+  /**
+   * Updates the poly data if `mesh` has changed since the last call; the next rendering uploads it. Returns whether
+   * `mesh` had changed.
+   *
+   * @throws `VesicleError` `invalid-argument`: no mesh.
+   */
+  update(mesh: MeshSource): boolean {
+    const frame = this.#reader.read(mesh);
+    if (!frame) return false;
+    // vtk.js keeps the arrays, so they are copied.
+    this.polyData.getPoints().setData(frame.positions.slice(), 3);
+    this.#normals.setData(frame.normals.slice(), 3);
+    if (frame.topology) this.polyData.getPolys().setData(polygons(frame));
+    this.polyData.modified();
+    return true;
+  }
+
+  /** Deletes the poly data; remove its actor from the view first. */
+  dispose(): void {
+    this.#reader.clear();
+    this.polyData.delete();
+  }
+}
