@@ -5,7 +5,7 @@
 //! normal. The average is wide enough for the steps of slanted surfaces, whose differences cancel out, to stay smooth.
 
 use super::nets::halves;
-use super::zone::{Polygon, NONE, Zone, within_reach};
+use super::zone::{NONE, Polygon, Zone, within_reach};
 use crate::math::Vec3;
 
 /// Number of times that differences are averaged over neighbouring cells; the width of the average, a standard

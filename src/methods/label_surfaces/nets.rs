@@ -7,7 +7,7 @@
 //! polygon edges between the same cells; there, each gets a vertex on the face, and polygons are divided around a
 //! vertex on the edge of the grid instead of by a diagonal.
 
-use super::cells::{Cell, CellBox, Cells};
+use super::cells::{CellBox, Cells};
 use super::cube_loops::{cube_loops, edge_at};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::{DAffine3, Vec3};
