@@ -7,11 +7,15 @@ use super::cube_loops::cube_loops;
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::Vec3;
 use crate::volume::VolumeError;
+use crate::volume::cube_cases::{EDGES, corner};
 
 /// Number of cells along each side of a block.
 const SIDE: u32 = 8;
 const PER_BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
 const NONE: u32 = u32::MAX;
+/// Least distance along an edge between the vertices of the labels at its ends, as a share of the gap between labels
+/// twice over.
+const LEAST_GAP: f32 = 0.1;
 /// The corners of each face of a cell; the second and the third are next to the first.
 const FACES: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [4, 5, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 3, 6, 7]];
@@ -27,6 +31,9 @@ pub struct Cell {
     pub offset: Vec3,
     /// Number of surfaces that pass through the cell, if each does so once and they are one or two, else 0.
     pub simple: u8,
+    /// Whether two labels meet in the cell like in a saddle: at some edge between them, their vertices do not move apart
+    /// along the edge, since they do so the other way at another edge.
+    pub is_saddle: bool,
     /// Whether a label, not the background, has two diagonally opposite corners of a face, and no other of that face.
     pub has_diagonal: bool,
 }
@@ -34,7 +41,8 @@ pub struct Cell {
 impl Cell {
     /// Creates a cell with its vertices in the middle.
     pub fn new(at: [u32; 3], corners: [u16; 8]) -> Self {
-        let mut cell = Self { at, corners, offset: Vec3::ZERO, simple: 0, has_diagonal: false };
+        let mut cell =
+            Self { at, corners, offset: Vec3::ZERO, simple: 0, is_saddle: false, has_diagonal: false };
         cell.set_corners(corners);
         cell
     }
@@ -44,10 +52,24 @@ impl Cell {
         let loops = self.numbers().map(|number| cube_loops()[self.case(number)].count);
         let (surfaces, most) = loops.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
         self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
+        self.is_saddle = surfaces >= 2 && self.has_edge_without_gap();
         self.has_diagonal = FACES.iter().any(|face| {
             let [a, b, c, d] = face.map(|corner| corners[corner]);
             (a == d && a != BACKGROUND || b == c && b != BACKGROUND) && a != b && a != c && d != b && d != c
         });
+    }
+
+    fn has_edge_without_gap(&self) -> bool {
+        EDGES.iter().enumerate().any(|(edge, &(axis, offset))| {
+            let mut far = offset;
+            far[axis] += 1;
+            let [low, high] = [offset, far].map(|at| self.corners[corner(at)]);
+            let clear = |number: u16| {
+                let loops = &cube_loops()[self.case(number)];
+                loops.clear[usize::from(loops.of_edge[edge])][axis]
+            };
+            low != high && low != BACKGROUND && high != BACKGROUND && clear(high) - clear(low) < LEAST_GAP
+        })
     }
 
     /// Returns the numbers of the different labels at the corners, but for the background, in the order of the corners.

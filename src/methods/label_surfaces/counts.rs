@@ -40,12 +40,12 @@ impl Nets {
             let cell = self.cells.get(slot);
             counts.vertices += cell.numbers().map(|number| loops_of(cell, number)).sum::<usize>();
             for crossing in self.crossings(slot) {
-                let has_diagonal = self.has_diagonal(&crossing);
+                let is_divided = self.has_face_vertices(&crossing);
                 for far in [false, true] {
                     if crossing.ends[usize::from(far)] == BACKGROUND {
                         continue;
                     }
-                    if !has_diagonal {
+                    if !is_divided {
                         counts.triangles += 2;
                         continue;
                     }

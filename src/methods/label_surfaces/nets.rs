@@ -5,9 +5,10 @@
 //! position of a cell; where several surfaces pass through it, each vertex is moved towards its label's side, which
 //! leaves a gap between them. Two corners with the label that are diagonally opposite on a face would give two
 //! polygon edges between the same cells; there, each gets a vertex on the face, and polygons are divided around a
-//! vertex on the edge of the grid instead of by a diagonal.
+//! vertex on the edge of the grid instead of by a diagonal. So they are between two cells in which labels meet like in a
+//! saddle, where vertices in the cells alone leave no gap.
 
-use super::cells::{CellBox, Cells};
+use super::cells::{Cell, CellBox, Cells};
 use super::cube_loops::{cube_loops, edge_at};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::{DAffine3, Vec3};
@@ -139,7 +140,7 @@ impl Nets {
         let loops = self.loops(crossing, number);
         let corners = [0, 1, 2, 3].map(|i| NetVertex::Cell { slot: slots[i], on: loops[i] });
         let mut patch = Patch { triangles: [[corners[0]; 3]; 8], count: 0 };
-        if self.has_diagonal(crossing) {
+        if self.has_face_vertices(crossing) {
             self.divide_around_edge(crossing, far, corners, &mut patch);
         } else {
             let origin = self.cells.get(slots[0]).at;
@@ -164,13 +165,13 @@ impl Nets {
         loops
     }
 
-    /// Returns, for each of the four faces around an edge, from each of the cells to the next one, whether the labels of
-    /// `ends` are diagonally opposite on it: that at the near end and that at the far end of the edge.
-    fn diagonals(&self, Crossing { axis, ends, slots }: &Crossing) -> [[bool; 2]; 4] {
+    /// Returns, for each of the four faces around an edge, from each of the cells to the next one, whether the surfaces of
+    /// the labels at the near and at the far end of the edge have vertices on it.
+    fn face_vertices(&self, Crossing { axis, ends, slots }: &Crossing) -> [[bool; 2]; 4] {
         let bits = [4usize, 1, 2];
         let (a, b, c) = (bits[*axis], bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
         let mut found = [[false; 2]; 4];
-        for (i, diagonals) in found.iter_mut().enumerate() {
+        for (i, on_face) in found.iter_mut().enumerate() {
             let cell = self.cells.get(slots[i]);
             // The face towards the next cell lies beyond the edge along the axis in which both cells agree.
             let [here, next] = [AROUND[i], AROUND[(i + 1) % 4]];
@@ -178,25 +179,28 @@ impl Nets {
             let across = if here[0] == next[0] { b } else { c };
             let other = start ^ across;
             let (near, far) = (cell.corners[other], cell.corners[other | a]);
-            *diagonals = [far == ends[0] && near != ends[0], near == ends[1] && far != ends[1]];
+            let is_between_saddles =
+                self.cells.get(slots[i]).is_saddle && self.cells.get(slots[(i + 1) % 4]).is_saddle;
+            *on_face = [far == ends[0] && near != ends[0], near == ends[1] && far != ends[1]]
+                .map(|is_diagonal| is_diagonal || is_between_saddles);
             // The background has no surface of its own.
-            (0..2).for_each(|end| diagonals[end] &= ends[end] != BACKGROUND);
+            (0..2).for_each(|end| on_face[end] &= ends[end] != BACKGROUND);
         }
         found
     }
 
-    /// Returns whether a label at the ends of an edge is also diagonally opposite on one of the faces around the edge.
-    pub fn has_diagonal(&self, crossing: &Crossing) -> bool {
-        crossing.slots.iter().any(|&slot| self.cells.get(slot).has_diagonal)
-            && self.diagonals(crossing).iter().flatten().any(|&is_diagonal| is_diagonal)
+    /// Returns whether surfaces have vertices on the faces around an edge; the polygon is then divided around the edge.
+    pub fn has_face_vertices(&self, crossing: &Crossing) -> bool {
+        crossing.slots.map(|slot| self.cells.get(slot)).iter().any(|cell| cell.has_diagonal || cell.is_saddle)
+            && self.face_vertices(crossing).iter().flatten().any(|&is_on_face| is_on_face)
     }
 
     fn divide_around_edge(&self, crossing: &Crossing, far: bool, corners: [NetVertex; 4], patch: &mut Patch) {
         let middle = NetVertex::Edge { slot: crossing.slots[2], axis: crossing.axis as u8, far };
-        let diagonals = self.diagonals(crossing);
+        let on_faces = self.face_vertices(crossing);
         for i in 0..4 {
             let (from, to) = (corners[i], corners[(i + 1) % 4]);
-            if diagonals[i][usize::from(far)] {
+            if on_faces[i][usize::from(far)] {
                 let face = self.face_vertex(crossing, i, far);
                 patch.add([middle, from, face]);
                 patch.add([middle, face, to]);
@@ -216,7 +220,12 @@ impl Nets {
         let corner = usize::from(far) * bits[*axis]
             | (1 - place[0]) * bits[(axis + 1) % 3]
             | (1 - place[1]) * bits[(axis + 2) % 3];
-        NetVertex::Face { slot: later, axis: ((axis + 1 + changes) % 3) as u8, corner: corner as u8 }
+        let axis = (axis + 1 + changes) % 3;
+        let cell = self.cells.get(later);
+        // Two diagonally opposite corners have a vertex each; otherwise, there is one, called after the first corner.
+        let same = face_before(axis).into_iter().find(|&other| cell.corners[other] == cell.corners[corner]);
+        let corner = if is_diagonal(cell, axis, corner) { corner } else { same.unwrap_or(corner) };
+        NetVertex::Face { slot: later, axis: axis as u8, corner: corner as u8 }
     }
 
     /// Returns the position of a vertex of a label in the volume's index space, relative to the centre of cell `from`.
@@ -258,9 +267,7 @@ impl Nets {
         across[axis] = 1.0;
         let way = later.offset + across - earlier;
         let point = earlier - across + way * ((0.5 - earlier[axis]) / way[axis]);
-        let mut towards = corner_position(corner.into());
-        towards[axis] = 0.0;
-        steps(from, later.at) + point + towards * GAP
+        steps(from, later.at) + point + face_clear(later, axis, corner.into()) * GAP
     }
 
     /// The point of an edge lies at the mean height of the four cells around it.
@@ -291,6 +298,42 @@ pub fn halves([a, b, c, d]: [Vec3; 4]) -> [[usize; 3]; 2] {
 fn steps(from: [u32; 3], to: [u32; 3]) -> Vec3 {
     let step = |axis: usize| to[axis] as f32 - from[axis] as f32;
     Vec3::new(step(0), step(1), step(2))
+}
+
+/// Returns the corners of the face of a cell before it along an axis; the second and the third are next to the first.
+fn face_before(axis: usize) -> [usize; 4] {
+    let bits = [4, 1, 2];
+    let (b, c) = (bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
+    [0, b, c, b | c]
+}
+
+/// Returns whether, of the corners of the face before a cell along an axis, only the one opposite `corner` has the same
+/// label.
+fn is_diagonal(cell: &Cell, axis: usize, corner: usize) -> bool {
+    let face = face_before(axis);
+    let opposite = face[3] ^ corner;
+    face.into_iter().all(|other| {
+        let expected = other == corner || other == opposite;
+        (cell.corners[other] == cell.corners[corner]) == expected
+    })
+}
+
+/// Returns the direction, in half gaps, in which a vertex on the face before a cell along an axis moves to keep clear of
+/// other labels: towards the corners with the label of `corner`, or towards that corner only if they are two, diagonally
+/// opposite.
+fn face_clear(cell: &Cell, axis: usize, corner: usize) -> Vec3 {
+    let diagonal = is_diagonal(cell, axis, corner);
+    let has_label = |other: usize| {
+        if diagonal { other == corner } else { cell.corners[other] == cell.corners[corner] }
+    };
+    let mean = |wanted: bool| {
+        let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+        for other in face_before(axis).into_iter().filter(|&other| has_label(other) == wanted) {
+            (sum, count) = (sum + corner_position(other), count + 1.0);
+        }
+        sum / count
+    };
+    (mean(true) - mean(false)) / 2.0
 }
 
 /// Returns the position of a corner relative to the centre of its cell.
