@@ -13,6 +13,7 @@ export const PICTURES = [
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
   { file: 'docs/track.jpg', hash: '#track', type: 'jpeg', quality: 85 },
   { file: 'docs/sculpt.jpg', hash: '#sculpt', type: 'jpeg', quality: 85 },
+  { file: 'docs/segment.jpg', hash: '#segment', type: 'jpeg', quality: 85 },
   // The 3D view alone, with uncovered parts marked: for the paper's model, and for the defaults.
   {
     file: 'docs/coverage-paper.jpg',

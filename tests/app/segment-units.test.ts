@@ -137,9 +137,9 @@ test('boxes of voxels grow within the grid, and unite', () => {
 });
 
 test('labels have free values and colours of their own', () => {
-  const labels = [newLabel(1), newLabel(3), newLabel(-2)];
-  expect(freeValue(labels)).toBe(2);
-  expect(new Set(labels.map(({ color }) => color)).size).toBe(3);
+  const labels = [newLabel(1), newLabel(2), newLabel(4), newLabel(-2)];
+  expect(freeValue(labels)).toBe(3);
+  expect(new Set(labels.map(({ color }) => color)).size).toBe(4);
   expect(rgbOf({ color: '#0a64ff' })).toEqual([10, 100, 255]);
 });
 

@@ -149,7 +149,7 @@ describe('the tooth', () => {
     expect(await unnamedControls(app.page)).toEqual([]);
   });
 
-  test('changes only where it is painted, and the surfaces with it', async () => {
+  test('a stroke takes voxels from one label for another, and their surfaces change', async () => {
     const [enamel, dentine] = [await of(1), await of(2)];
     await tool('brush', 4);
     const view = app.page.locator('.scene canvas');
@@ -281,10 +281,22 @@ describe('a volume without a label map', () => {
     await followed(() => app.page.keyboard.press('p'));
     const { voxels: painted } = await of(1);
     expect(painted).toBeGreaterThan(10);
+    // A second ball, one axial slice further.
+    const axial = app.page.locator('.slice').getByLabel('Axial', { exact: true });
+    const slice = Number(await axial.inputValue());
+    await app.page.keyboard.press('.');
+    expect(await axial.inputValue()).toBe(String(slice + 1));
+    await followed(() => app.page.keyboard.press('p'));
+    const both = (await of(1)).voxels;
+    expect(both).toBeGreaterThan(painted);
+    await app.page.keyboard.press(',');
+    expect(await axial.inputValue()).toBe(String(slice));
+    const canvas = app.page.locator('.slice canvas[aria-label^="Axial"]');
+    expect(await canvas.getAttribute('aria-label')).toMatch(/Labels here: Label 1 \d+ voxels\./);
     await app.page.keyboard.press('e');
     await app.page.keyboard.press('[');
     await followed(() => app.page.keyboard.press('p'));
-    expect((await of(1)).voxels).toBeLessThan(painted);
+    expect((await of(1)).voxels).toBeLessThan(both);
   });
 });
 

@@ -139,6 +139,8 @@ export class SegmentLab implements Lab {
       tool('v', 'navigate', text('segment.navigate')),
       { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.#ui.tools.changeRadius(-1) },
       { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.#ui.tools.changeRadius(1) },
+      { key: ',', shown: ',', text: text('segment.previousSliceKey'), act: () => this.#ui.view.goAlong(-1) },
+      { key: '.', shown: '.', text: text('segment.nextSliceKey'), act: () => this.#ui.view.goAlong(1) },
       { key: 'p', shown: 'p', text: text('segment.applyKey'), act: () => this.#apply() },
       { key: 'n', shown: 'n', text: text('segment.addKey'), act: () => this.#addLabel() },
       { key: 'u', shown: 'u', text: text('labs.undo'), act: travel('undo') },

@@ -9,6 +9,8 @@ import { readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { ImageSource, LabelArray, Labelling, NamedBytes, Vec3 } from './protocol';
 
+/** Number of different values beyond which a volume is no label map. */
+const MOST_LABELS = 65_536;
 /** Largest distance in voxels between the corners of two grids that count as the same one. */
 const TOLERANCE = 0.01;
 
@@ -76,8 +78,14 @@ function isMap(one: NamedVolume, other: NamedVolume): boolean {
   return valuesIn(one) < valuesIn(other);
 }
 
+/** Returns the number of different values of a volume, or {@link MOST_LABELS} if there are more. */
 function valuesIn({ init: { data } }: NamedVolume): number {
-  return new Set<number>(data).size;
+  const found = new Set<number>();
+  for (const value of data) {
+    found.add(value);
+    if (found.size > MOST_LABELS) break;
+  }
+  return found.size;
 }
 
 /** Returns the voxels of a label map, in the type of its file unless this has slope and intercept. */

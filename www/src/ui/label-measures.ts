@@ -33,7 +33,7 @@ export class LabelMeasureTable {
     this.element = h(
       'div',
       { 'data-measures': '{}' },
-      h('div', { class: 'scroll' }, table),
+      h('div', { class: 'scroll tall' }, table),
       h('p', { class: 'help' }, text('segment.measuresHelp')),
     );
   }

@@ -136,6 +136,11 @@ export class SegmentView {
     if (dims) this.#moveTo(index.map((x, axis) => Math.min((dims[axis] ?? 1) - 1, Math.max(0, x))) as Vec3);
   }
 
+  /** Moves on by a number of axial slices. */
+  goAlong(slices: number): void {
+    this.goToVoxel(this.#crosshair.map((x, axis) => (axis === this.axial ? x + slices : x)) as Vec3);
+  }
+
   /** Voxel axis across the axial slices. */
   get axial(): Axis {
     return this.#scene?.panels.find(({ orientation }) => orientation.name === 'Axial')?.orientation.axis ?? 2;
