@@ -81,3 +81,46 @@ export async function changes(
 ): Promise<void> {
   await expect.poll(async () => difference(page, picture, await take()), { message }).toBeGreaterThanOrEqual(part);
 }
+
+/** Measures of what is drawn over a picture. */
+export interface Drawn {
+  /** Fraction of the pixels that are not drawn on and not reached from the border. */
+  enclosed: number;
+  /** Side of the largest square, in pixels, of which all is drawn on. */
+  thickest: number;
+}
+
+/** Compares two PNGs, of which the second has lines in addition; the pages are as wide as `width` pixels. */
+export async function drawn(page: Page, before: Buffer, after: Buffer, width: number): Promise<Drawn> {
+  const mask = `const mask = Array.from({ length: a.length / 4 }, (_, i) =>
+    [0, 1, 2].some((k) => Math.abs(a[4 * i + k] - b[4 * i + k]) > 24));
+    const near = (i) => [i % width > 0 ? i - 1 : -1, i % width < width - 1 ? i + 1 : -1, i - width, i + width]
+      .filter((j) => j >= 0 && j < mask.length);`;
+  const enclosed = await told(
+    page,
+    [before, after],
+    `(a, b) => { const width = ${width}; ${mask}
+      const reached = new Uint8Array(mask.length);
+      const pending = [...mask.keys()].filter((i) => near(i).length < 4);
+      while (pending.length > 0) {
+        const i = pending.pop();
+        if (mask[i] || reached[i]) continue;
+        reached[i] = 1;
+        pending.push(...near(i));
+      }
+      return mask.filter((one, i) => !one && !reached[i]).length / mask.length; }`,
+  );
+  const thickest = await told(
+    page,
+    [before, after],
+    `(a, b) => { const width = ${width}; ${mask}
+      const side = new Uint16Array(mask.length);
+      let most = 0;
+      for (let i = width + 1; i < mask.length; i++) {
+        if (mask[i] && i % width > 0) side[i] = 1 + Math.min(side[i - 1], side[i - width], side[i - width - 1]);
+        most = Math.max(most, side[i]);
+      }
+      return most; }`,
+  );
+  return { enclosed, thickest };
+}
