@@ -31,6 +31,10 @@ const BENCHES = {
     inNode: async () => (await import('../bench/voxelise.mjs')).measure(REPEATS),
     rows: voxeliseRows,
   },
+  strokes: {
+    inNode: async () => (await import('../bench/strokes.mjs')).measure(),
+    rows: strokeRows,
+  },
   skin: {
     file: BUST,
     inNode: async () => (await import('../bench/skin.mjs')).measure(new Uint8Array(await readFile(at(BUST))), REPEATS),
@@ -148,6 +152,15 @@ function voxeliseRows({ host, sizes }) {
     ...rows.map(row),
   ];
   return [[host, '', `best of ${REPEATS}`], ...sizes.flatMap(part)];
+}
+
+function strokeRows({ host, rows }) {
+  const row = ({ labels, vertices, median, longest, full }) => [
+    `  ${labels === 1 ? 'one label' : `${labels} labels`}, ${vertices} vertices`,
+    `${median.toFixed(1)} ms`,
+    `longest ${longest.toFixed(1)} ms; marching cubes of all labels ${(full / median).toFixed(1)} times the median`,
+  ];
+  return [[host, '', 'median of the strokes of a brush, settled'], ...rows.map(row)];
 }
 
 function skinRows({ host, rows }) {

@@ -39,7 +39,7 @@ export interface Cornerstone {
 /** The classes of this library and the modules of Cornerstone that {@link cornerstoneAddOn} needs. */
 export interface CornerstoneClasses extends LabelClasses, Cornerstone {}
 
-/** What {@link cornerstoneAddOn} returns: the conversions that Cornerstone's tools call. */
+/** The conversions that Cornerstone's tools call, as returned by {@link cornerstoneAddOn}. */
 export interface CornerstoneAddOn {
   init(): void;
   canComputeRequestedRepresentation(segmentationId: string, type: string): boolean;

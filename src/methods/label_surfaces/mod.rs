@@ -40,6 +40,8 @@ const ITERATIONS: u32 = 10;
 /// Number of times that a cell is smoothed in a step, if the part to be smoothed is so small that this needs more
 /// iterations: after a change of some voxels, one step settles the surfaces.
 const WORK: usize = 200_000;
+/// Number of smoothing iterations after which volumes are balanced.
+const BETWEEN: u32 = 4;
 /// Number of times that volumes are balanced at the end.
 const BALANCES: u32 = 3;
 /// Distance from a change, in cells, up to which surfaces are smoothed again.
@@ -203,11 +205,16 @@ impl LabelSurfaces {
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
             self.timed("smoothing", &mut times, |surfaces| {
-                (0..wanted).for_each(|_| surfaces.residual = zone.smooth());
+                for i in 1..=wanted {
+                    surfaces.residual = zone.smooth();
+                    if i % BETWEEN == 0 {
+                        zone.balance();
+                    }
+                }
             });
             self.timed("volumes", &mut times, |surfaces| {
-                let balances = if is_last { BALANCES } else { 1 };
-                (0..if wanted > 0 { balances } else { 0 }).for_each(|_| zone.balance());
+                let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
+                (0..balances).for_each(|_| zone.balance());
                 zone.write(&mut surfaces.nets);
             });
             self.timed("intersections", &mut times, |surfaces| {
