@@ -105,9 +105,9 @@ impl CellBox {
     /// Returns the box with `by` more cells on each side, within a volume of `dims` voxels.
     pub fn grown(&self, by: u32, dims: [usize; 3]) -> Self {
         let mut grown = *self;
-        for axis in 0..3 {
-            grown.low[axis] = grown.low[axis].saturating_sub(by);
-            grown.high[axis] = (grown.high[axis] + by).min(dims[axis] as u32);
+        grown.low.iter_mut().for_each(|low| *low = low.saturating_sub(by));
+        for (high, size) in grown.high.iter_mut().zip(dims) {
+            *high = (*high + by).min(size as u32);
         }
         grown
     }

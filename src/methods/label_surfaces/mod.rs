@@ -2,9 +2,9 @@
 //! follow changes of the label map.
 //!
 //! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
-//! ([`nets`]), whose vertices are smoothed within the grid's cells ([`smooth`]), so that each voxel stays on its side of
-//! every surface. What smoothing takes from the volume of a label is given back ([`balance`]), and intersections are
-//! resolved ([`untangle`]). All of this is local: after a change of some voxels, only cells nearby are touched.
+//! (`nets`), whose vertices are smoothed within the grid's cells (`smooth`), so that each voxel stays on its side of
+//! every surface. What smoothing takes from the volume of a label is given back (`balance`), and intersections are
+//! resolved (`untangle`). All of this is local: after a change of some voxels, only cells nearby are touched.
 //!
 //! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
 

@@ -175,7 +175,7 @@ impl Nets {
             let cell = self.cells.get(slots[i]);
             // The face towards the next cell lies beyond the edge along the axis in which both cells agree.
             let [here, next] = [AROUND[i], AROUND[(i + 1) % 4]];
-            let start = (1 - here[0]) * b | (1 - here[1]) * c;
+            let start = ((1 - here[0]) * b) | ((1 - here[1]) * c);
             let across = if here[0] == next[0] { b } else { c };
             let other = start ^ across;
             let (near, far) = (cell.corners[other], cell.corners[other | a]);
@@ -217,9 +217,9 @@ impl Nets {
         let changes = usize::from(here[0] == next[0]);
         let (later, place) = if next[changes] == 1 { (slots[(i + 1) % 4], next) } else { (slots[i], here) };
         let bits = [4, 1, 2];
-        let corner = usize::from(far) * bits[*axis]
-            | (1 - place[0]) * bits[(axis + 1) % 3]
-            | (1 - place[1]) * bits[(axis + 2) % 3];
+        let corner = (usize::from(far) * bits[*axis])
+            | ((1 - place[0]) * bits[(axis + 1) % 3])
+            | ((1 - place[1]) * bits[(axis + 2) % 3]);
         let axis = (axis + 1 + changes) % 3;
         let cell = self.cells.get(later);
         // Two diagonally opposite corners have a vertex each; otherwise, there is one, called after the first corner.

@@ -59,7 +59,7 @@ fn balls(n: usize, seed: u64, count: usize) -> Volume {
     let label = |p: DVec3| {
         let squared = |k: &usize| centres[*k].distance_squared(p);
         let nearest = (0..count).min_by(|a, b| squared(a).total_cmp(&squared(b))).unwrap();
-        if squared(&nearest) < (n as f64 * 0.22).powi(2) { nearest as u8 + 1 } else { 0 }
+        if squared(&nearest).sqrt() < n as f64 * 0.22 { nearest as u8 + 1 } else { 0 }
     };
     volume([n, n, n], (0..n * n * n).map(|i| label(centre_of(i, n))).collect())
 }
@@ -139,7 +139,8 @@ fn normals_are_near_those_of_a_ball() {
             let [a, b, c] = corners.map(|p| p.as_dvec3());
             let area = (b - a).cross(c - a);
             let out = ((a + b + c) / 3.0 - centre).normalize();
-            sum += area.length() * area.normalize().dot(out).clamp(-1.0, 1.0).acos().powi(2);
+            let angle = area.angle_between(out);
+            sum += area.length() * angle * angle;
             total += area.length();
         }
         let angle = (sum / total).sqrt().to_degrees();
@@ -174,7 +175,8 @@ impl Brush {
             for y in 0..size[1] {
                 for x in 0..size[0] {
                     let squared: f64 = [(x, size[0]), (y, size[1]), (z, size[2])]
-                        .map(|(i, n)| ((2 * i + 1) as f64 / n as f64 - 1.0).powi(2))
+                        .map(|(i, n)| (2 * i + 1) as f64 / n as f64 - 1.0)
+                        .map(|x| x * x)
                         .iter()
                         .sum();
                     let index = min[0] + x + dims[0] * (min[1] + y + dims[1] * (min[2] + z));

@@ -106,10 +106,7 @@ impl Zone {
         let least = if is_on_line { 3 } else { 2 };
         let mut links = Links { towards: [NONE; 6], alike: [NONE; 6] };
         let own = pair(cell);
-        for face in 0..6 {
-            if labels[face] < least {
-                continue;
-            }
+        for (face, _) in labels.iter().enumerate().filter(|&(_, &labels)| labels >= least) {
             let Some(slot) = nets.cells.find(beyond(cell.at, face)) else { continue };
             links.towards[face] = index[slot as usize];
             if own.is_some() && pair(nets.cells.get(slot)) == own {
@@ -128,14 +125,14 @@ pub fn within_reach(offset: Vec3) -> Vec3 {
 /// Returns the step from a cell to its neighbour beyond a face, numbered as in [`Links`].
 pub fn step_to(face: usize) -> Vec3 {
     let mut step = Vec3::ZERO;
-    step[face / 2] = if face % 2 == 0 { -1.0 } else { 1.0 };
+    step[face / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
     step
 }
 
 fn beyond(at: [u32; 3], face: usize) -> [u32; 3] {
     let mut next = at;
     let n = &mut next[face / 2];
-    *n = if face % 2 == 0 { n.wrapping_sub(1) } else { *n + 1 };
+    *n = if face.is_multiple_of(2) { n.wrapping_sub(1) } else { *n + 1 };
     next
 }
 
@@ -152,7 +149,7 @@ fn labels_on_face(cell: &Cell, face: usize) -> usize {
     let bits = [4usize, 1, 2];
     let axis = face / 2;
     let (b, c) = (bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
-    let start = if face % 2 == 0 { 0 } else { bits[axis] };
+    let start = if face.is_multiple_of(2) { 0 } else { bits[axis] };
     let corners = [start, start | b, start | c, start | b | c].map(|corner| cell.corners[corner]);
     (0..4).filter(|&i| !corners[..i].contains(&corners[i])).count()
 }
