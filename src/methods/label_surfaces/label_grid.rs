@@ -4,6 +4,7 @@ use crate::math::order::{rank_f64, sort_by_rank};
 use crate::methods::MethodError;
 use crate::methods::saved::Hash;
 use crate::volume::{Region, Volume, VolumeError};
+use std::collections::BTreeMap;
 
 /// The number that stands for the background, and for labels that have no surface.
 pub const BACKGROUND: u16 = 0;
@@ -18,6 +19,8 @@ pub struct LabelGrid {
     numbers: Vec<u16>,
     /// The label that each number stands for; that of number 1 comes first.
     values: Vec<f64>,
+    /// The number of each label, by the rank of the label.
+    by_rank: BTreeMap<u64, u16>,
     /// Number of voxels of each label, in the same order.
     voxels: Vec<usize>,
     /// The labels that have surfaces, in ascending order, if not all have.
@@ -38,8 +41,8 @@ impl LabelGrid {
         let dims = volume.dims();
         let mut numbers = reserved(dims.map(|n| n + 2))?;
         numbers.resize(dims.iter().map(|n| n + 2).product(), BACKGROUND);
-        let mut grid =
-            Self { dims, numbers, values: Vec::new(), voxels: Vec::new(), wanted: wanted.map(sorted) };
+        let (values, by_rank, voxels) = Default::default();
+        let mut grid = Self { dims, numbers, values, by_rank, voxels, wanted: wanted.map(sorted) };
         grid.read(volume, Region { min: [0; 3], dims })?;
         Ok(grid)
     }
@@ -56,7 +59,7 @@ impl LabelGrid {
 
     /// Returns the number that stands for a label, if the volume has, or had, voxels of it that get a surface.
     pub fn number(&self, value: f64) -> Option<u16> {
-        self.values.iter().position(|&known| known == value).map(|index| index as u16 + 1)
+        self.by_rank.get(&rank_f64(value)).copied()
     }
 
     /// Returns the labels that have voxels and a surface, in ascending order.
@@ -94,11 +97,12 @@ impl LabelGrid {
     /// Returns the same label map with other numbers, which stand for `values` from 1 on; `None` if these are not
     /// different, or a label with voxels is not among them.
     pub fn renumbered(&self, values: &[f64]) -> Option<Self> {
-        let is_first = |(i, value): (usize, &f64)| value.is_finite() && !values[..i].contains(value);
-        if values.len() > MOST_LABELS || !values.iter().enumerate().all(is_first) {
+        let by_rank: BTreeMap<u64, u16> = values.iter().map(|&value| rank_f64(value)).zip(1..).collect();
+        if values.len() > MOST_LABELS || by_rank.len() < values.len() {
             return None;
         }
-        let mut grid = Self { values: values.to_vec(), voxels: vec![0; values.len()], ..self.clone() };
+        let mut grid =
+            Self { values: values.to_vec(), by_rank, voxels: vec![0; values.len()], ..self.clone() };
         let mut numbers = vec![BACKGROUND];
         for (&value, &voxels) in self.values.iter().zip(&self.voxels) {
             let number = grid.number(value);
@@ -120,13 +124,13 @@ impl LabelGrid {
         }
     }
 
-    /// Reads the labels in a region of the volume's first frame anew. Labels that are met for the first time get the
-    /// next numbers.
+    /// Reads the labels in a region of the volume's first frame again, and returns the numbers before, for
+    /// [`Self::replace`]. Labels that are met for the first time get the next numbers.
     ///
     /// # Errors
     /// An error about the region if it is not within the volume, or about the volume if it is no label map or has too
     /// many labels; nothing has changed then.
-    pub fn read(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
+    pub fn read(&mut self, volume: &Volume, region: Region) -> Result<Vec<u16>, MethodError> {
         let known = self.values.len();
         let mut numbers = reserved(region.dims)?;
         let read = volume.label_runs(region, 0, &mut |label, voxels| {
@@ -135,41 +139,48 @@ impl LabelGrid {
         });
         if read.is_err() || self.values.len() > MOST_LABELS {
             self.values.truncate(known);
+            self.by_rank.retain(|_, &mut number| usize::from(number) <= known);
             read?;
             let problem = format!("must have at most {MOST_LABELS} labels with surfaces");
             return Err(MethodError::invalid("volume", problem));
         }
         self.voxels.resize(self.values.len(), 0);
-        self.replace(region, &numbers);
-        Ok(())
+        self.replace(region, &mut numbers);
+        Ok(numbers)
     }
 
     fn number_or_new(&mut self, label: f64) -> u16 {
-        let has_surface = self.wanted.as_ref().is_none_or(|wanted| wanted.contains(&label));
+        let has_surface = self.wanted.as_ref().is_none_or(|wanted| contains(wanted, label));
         if label == 0.0 || !has_surface {
             return BACKGROUND;
         }
-        self.number(label).unwrap_or_else(|| {
+        if let Some(number) = self.number(label) {
+            return number;
+        }
+        // One label too many is remembered, so that this is noticed; the numbers are then not used.
+        if self.values.len() <= MOST_LABELS {
             self.values.push(label);
-            // One beyond the last number, if there are too many labels, is never used.
-            self.values.len().min(MOST_LABELS) as u16
-        })
+        }
+        let Ok(number) = u16::try_from(self.values.len()) else { return BACKGROUND };
+        self.by_rank.insert(rank_f64(label), number);
+        number
     }
 
-    fn replace(&mut self, region: Region, numbers: &[u16]) {
+    /// Exchanges the numbers in a region, x fastest, with those in `numbers`.
+    pub fn replace(&mut self, region: Region, numbers: &mut [u16]) {
         let [width, height] = [self.dims[0] + 2, self.dims[1] + 2];
         let [nx, ny, _] = region.dims;
-        for (row, new) in numbers.chunks_exact(nx).enumerate() {
+        for (row, new) in numbers.chunks_exact_mut(nx).enumerate() {
             let [y, z] = [region.min[1] + row % ny + 1, region.min[2] + row / ny + 1];
             let start = region.min[0] + 1 + width * (y + height * z);
-            for (old, &number) in self.numbers[start..start + nx].iter_mut().zip(new) {
-                for (label, change) in [(*old, -1), (number, 1)] {
+            for (old, number) in self.numbers[start..start + nx].iter_mut().zip(new) {
+                for (label, change) in [(*old, -1), (*number, 1)] {
                     if label != BACKGROUND {
                         let count = &mut self.voxels[usize::from(label) - 1];
                         *count = count.wrapping_add_signed(change);
                     }
                 }
-                *old = number;
+                std::mem::swap(old, number);
             }
         }
     }
@@ -178,6 +189,11 @@ impl LabelGrid {
 fn sorted(mut values: Vec<f64>) -> Vec<f64> {
     sort_by_rank(&mut values, |&value| rank_f64(value));
     values
+}
+
+/// Returns whether values in ascending order contain one.
+fn contains(values: &[f64], value: f64) -> bool {
+    values.binary_search_by(|other| other.total_cmp(&value)).is_ok()
 }
 
 /// Returns an empty array with room for the numbers of `dims` voxels.
@@ -193,6 +209,6 @@ fn check_wanted(wanted: &[f64], present: &[f64]) -> Result<(), MethodError> {
     if wanted.is_empty() {
         return Err(MethodError::invalid("labels", "must be at least one label"));
     }
-    let Some(missing) = wanted.iter().find(|value| !present.contains(value)) else { return Ok(()) };
+    let Some(missing) = wanted.iter().find(|&&value| !contains(present, value)) else { return Ok(()) };
     Err(MethodError::invalid("labels", format!("must be labels of the volume, got {missing}")))
 }

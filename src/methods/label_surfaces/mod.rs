@@ -157,8 +157,13 @@ impl LabelSurfaces {
         };
         let touched = changed.grown(1, dims);
         let before = self.nets.counts(&touched);
-        self.nets.grid.read(volume, region)?;
-        self.nets.cells.update(&self.nets.grid, changed)?;
+        let mut old = self.nets.grid.read(volume, region)?;
+        if let Err(error) = self.nets.cells.update(&self.nets.grid, changed) {
+            // The cells as they were need no memory that they did not have.
+            self.nets.grid.replace(region, &mut old);
+            self.nets.cells.update(&self.nets.grid, changed)?;
+            return Err(error.into());
+        }
         self.nets.untangle(touched);
         self.counts = self.counts.replaced(before, self.nets.counts(&touched));
         self.components = self.nets.components();

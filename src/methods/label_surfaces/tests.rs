@@ -339,3 +339,22 @@ fn bad_input_is_named_and_changes_nothing() {
     }
     check(&surfaces, "after bad input");
 }
+
+#[test]
+fn too_many_labels_are_refused_and_change_nothing() {
+    let dims = [256, 257, 1];
+    let of = |voxels: Vec<u32>| Volume::new(VolumeInit::new(Voxels::U32(voxels), [256, 257, 1, 1])).unwrap();
+    let few = of(vec![7; 256 * 257]);
+    let many = of((0..256 * 257).map(|i| i.min(65_536)).collect());
+    let refused = LabelSurfaces::new(&many, None, LabelParams::default()).err().unwrap().to_string();
+    assert!(refused.contains("at most 65535 labels"), "{refused}");
+    let some = (0..65_535).map(|i| f64::from(i + 1)).collect();
+    assert!(LabelGrid::new(&many, Some(some)).is_ok());
+
+    let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0 }).unwrap();
+    let before = surfaces.save();
+    let refused = surfaces.refresh(&many, Region { min: [0; 3], dims }).unwrap_err().to_string();
+    assert!(refused.contains("at most 65535 labels"), "{refused}");
+    assert!(surfaces.save() == before);
+    assert_eq!((surfaces.labels(), surfaces.nets.grid.number(9.0)), (vec![7.0], None));
+}
