@@ -480,7 +480,7 @@ export class Mesh {
    * - `'coverage'`: the fraction of each voxel inside, 0..1, 32-bit floats. Triangles are clipped to the voxels, so it
    *   is exact to single precision; only in voxels where the surface intersects itself may it be wrong.
    * - `'distance'`: the signed distance of each voxel centre from the surface, in world units, negative inside, 32-bit
-   *   floats. Exact to single precision. Takes longest: about half a microsecond a voxel.
+   *   floats. Exact to single precision. Takes longest: up to a microsecond a voxel.
    *
    * Entry points with one method lack it.
    *
