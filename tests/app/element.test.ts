@@ -188,12 +188,18 @@ test('a volume with frames', async () => {
 test('removed from the page it stops, and inserted again it restarts', async () => {
   await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR}></vesicle-lab>`);
   await state('done');
+  // A run may end before a look at the page finds it running, so the states are recorded.
   await page.evaluate(() => {
     const lab = document.querySelector('vesicle-lab');
-    lab?.remove();
-    if (lab) document.body.append(lab);
+    if (!lab) return;
+    const before: (string | null)[] = [];
+    const record = (changes: MutationRecord[]) => before.push(...changes.map(({ oldValue }) => oldValue));
+    new MutationObserver(record).observe(lab, { attributeFilter: ['data-state'], attributeOldValue: true });
+    Object.assign(window, { before });
+    lab.remove();
+    document.body.append(lab);
   });
-  await state('running');
+  await page.waitForFunction(() => (window as unknown as { before: string[] }).before.includes('running'));
   await state('done');
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
