@@ -2,7 +2,7 @@
 
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
-import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+import { copyFile, cp, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { makeElement } from './element.mjs';
 import { METHODS, makeEntries, PARTS } from './entries.mjs';
@@ -68,20 +68,35 @@ async function compile({ target, features, env }) {
   return at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
 }
 
-async function stamp(compiled) {
+/** Files and folders that a module depends on. */
+const SOURCES = [
+  ...['src', 'xtask', 'Cargo.toml', 'Cargo.lock', '.cargo/config.toml', 'rust-toolchain.toml'],
+  ...['package-lock.json', 'scripts/build.mjs'],
+];
+
+/** Returns a hash of all that the modules depend on. */
+async function sourceHash() {
   const hash = createHash('sha256');
-  for (const file of [compiled, at('Cargo.lock'), at('package-lock.json'), at('scripts/build.mjs')])
-    hash.update(await readFile(file));
+  for (const source of SOURCES) {
+    const isFolder = (await stat(at(source))).isDirectory();
+    const names = isFolder
+      ? (await readdir(at(source), { recursive: true })).sort().map((name) => join(source, name))
+      : [source];
+    for (const name of names) {
+      if ((await stat(at(name))).isFile()) hash.update(`${name}\n`).update(await readFile(at(name)));
+    }
+  }
   return hash.digest('hex');
 }
 
-/** Compiles a module, and makes its glue. Both are kept between builds, since they depend on the compiled module alone. */
-async function make(module) {
-  // Compiled modules of one target directory replace each other.
-  const compiled = await compile(module);
-  const wanted = await stamp(compiled);
+/**
+ * Compiles a module, and makes its glue, unless that was done from the same `sources`: cargo itself would compile every
+ * module again, since those of one target directory replace each other.
+ */
+async function make(module, sources) {
   const stampFile = join(folder(module), 'stamp');
-  if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === wanted) return;
+  if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === sources) return;
+  const compiled = await compile(module);
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
@@ -92,7 +107,7 @@ async function make(module) {
     ...['--omit-default-module-path', '--remove-producers-section'],
   ]);
   await optimise(optimised(module));
-  await writeFile(stampFile, wanted);
+  await writeFile(stampFile, sources);
 }
 
 /** The modules of the whole library are called by the same glue. */
@@ -165,14 +180,15 @@ async function manifest() {
   };
 }
 
-async function inTurn(modules) {
-  for (const module of modules) await make(module);
+async function inTurn(modules, sources) {
+  for (const module of modules) await make(module, sources);
 }
 
 /** The whole package; fast where nothing changed. */
 export async function build() {
   const started = performance.now();
-  await Promise.all(LANES.map(inTurn));
+  const sources = await sourceHash();
+  await Promise.all(LANES.map((modules) => inTurn(modules, sources)));
   await compareGlue();
   await assemble();
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;
