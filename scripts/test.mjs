@@ -112,14 +112,18 @@ const GROUPS = [
 ];
 
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
-const SLOW = ['scenes::', 'tracking::', 'fuzz::'];
+const SLOW = ['scenes::', 'tracking::', 'fuzz'];
 
 /** Stages that only `npm run test:all` runs: too long for every change. */
 const LONG = [
   [
     [
       ['features', works(checkFeatures), 120],
-      ['slow', cargoTests(...['--release', '--test', 'core', '--', '--ignored', '--show-output', ...SLOW]), 900],
+      [
+        'slow',
+        cargoTests(...['--release', '--lib', '--test', 'core', '--', '--ignored', '--show-output', ...SLOW]),
+        900,
+      ],
       ['slow wasm', cargoTests('--lib', '--tests', ...WASM, '--', '--ignored'), 900],
     ],
   ],

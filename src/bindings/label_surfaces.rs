@@ -42,7 +42,7 @@ impl RawLabelSurfaces {
 
     /// Returns the surface of a label as a live mesh, which changes with the surfaces.
     pub fn mesh(&self, label: f64) -> Result<RawMesh, JsValue> {
-        self.0.borrow().check_label(label).map_err(Failure::from)?;
+        self.0.borrow().number_of(label).map_err(Failure::from)?;
         let mesh = LabelMesh { surfaces: Rc::clone(&self.0), label };
         Ok(RawMesh::live(&Rc::new(RefCell::new(mesh))))
     }

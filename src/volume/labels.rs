@@ -172,13 +172,15 @@ fn check_wanted(values: &[f64], labels: &[StoredLabel]) -> Result<(), VolumeErro
     let Some(missing) = values.iter().find(|&&value| !is_label(value)) else { return Ok(()) };
     Err(VolumeError::invalid(
         "value",
-        format!("must be a label of the volume ({}), got {missing}", listed(labels)),
+        format!(
+            "must be a label of the volume ({}), got {missing}",
+            listed(labels.iter().map(|l| l.label).collect())
+        ),
     ))
 }
 
 /// Returns the first labels as text, for an error message.
-fn listed(labels: &[StoredLabel]) -> String {
-    let mut values: Vec<f64> = labels.iter().map(|l| l.label).collect();
+pub(crate) fn listed(mut values: Vec<f64>) -> String {
     values.dedup();
     let shown: Vec<String> = values.iter().take(SHOWN_LABELS).map(f64::to_string).collect();
     match values.len() {

@@ -56,6 +56,7 @@ pub(crate) use error::filled;
 pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::{FillRule, for_each_inside, voxels_inside};
 pub use labels::LabelCount;
+pub(crate) use labels::listed;
 pub use region::Region;
 pub use resample::{Interpolation, ResampleGrid};
 pub(crate) use sampling::trilinear;

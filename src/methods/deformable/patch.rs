@@ -7,7 +7,7 @@
 
 use super::contour::{ObjectIs, contour_of_grid, placed};
 use super::image::LevelImage;
-use crate::math::order::{combined_rank, sort_distinct, sort_ranks};
+use crate::math::order::{combined_rank, sort_by_rank, sort_distinct, sort_ranks};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices};
 use crate::methods::MethodError;
@@ -150,7 +150,7 @@ fn change_of_components(mut pairs: Vec<(u32, u32)>, before: usize, after: usize)
         sort_distinct(parts);
         parts.len()
     };
-    pairs.sort_unstable();
+    sort_by_rank(&mut pairs, |&(before, after)| combined_rank(before, after));
     pairs.dedup();
     let open_before = distinct(&mut pairs.iter().map(|pair| pair.0).collect());
     let open_after = distinct(&mut pairs.iter().map(|pair| pair.1).collect());

@@ -3,7 +3,7 @@
 //! A cell is a cube between the centres of eight voxels; cell (x, y, z) lies between the voxels (x − 1, y − 1, z − 1)
 //! and (x, y, z). It is stored if its corners have different labels.
 
-use super::cube_loops::cube_loops;
+use super::cube_loops::{cube_loops, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::Vec3;
 use crate::volume::VolumeError;
@@ -16,9 +16,6 @@ const NONE: u32 = u32::MAX;
 /// Least distance along an edge between the vertices of the labels at its ends, as a share of the gap between labels
 /// twice over.
 const LEAST_GAP: f32 = 0.1;
-/// The corners of each face of a cell; the second and the third are next to the first.
-const FACES: [[usize; 4]; 6] =
-    [[0, 1, 2, 3], [4, 5, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 3, 6, 7]];
 
 /// A cell through which surfaces pass.
 #[derive(Clone, Copy, Debug)]
@@ -53,10 +50,14 @@ impl Cell {
         let (surfaces, most) = loops.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
         self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
         self.is_saddle = surfaces >= 2 && self.has_edge_without_gap();
-        self.has_diagonal = FACES.iter().any(|face| {
-            let [a, b, c, d] = face.map(|corner| corners[corner]);
-            (a == d && a != BACKGROUND || b == c && b != BACKGROUND) && a != b && a != c && d != b && d != c
-        });
+        self.has_diagonal =
+            (0..3).any(|axis| [false, true].iter().any(|&far| self.has_diagonal_on(axis, far)));
+    }
+
+    fn has_diagonal_on(&self, axis: usize, far: bool) -> bool {
+        let [a, b, c, d] = face(axis, far).map(|corner| self.corners[corner]);
+        let is_one_label = a == c && a != BACKGROUND || b == d && b != BACKGROUND;
+        is_one_label && a != b && b != c && c != d && d != a
     }
 
     fn has_edge_without_gap(&self) -> bool {

@@ -1,7 +1,7 @@
 //! The numbers of vertices, triangles and components of all surfaces together.
 
 use super::cells::{Cell, CellBox};
-use super::cube_loops::{cube_loops, edge_at};
+use super::cube_loops::{cube_loops, edge_at, face};
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
 use crate::mesh::DisjointSets;
@@ -86,8 +86,7 @@ impl Nets {
     /// Joins the vertices in a cell with those in the next one along an axis that share a polygon edge with them.
     fn join_across(&self, axis: usize, slot: u32, next: u32, first: &[u32], sets: &mut DisjointSets) {
         let [cell, other] = [slot, next].map(|slot| self.cells.get(slot));
-        let face = face_towards(axis);
-        let labels = face.map(|corner| cell.corners[corner]);
+        let labels = face(axis, true).map(|corner| cell.corners[corner]);
         for (i, &number) in labels.iter().enumerate() {
             if number == BACKGROUND || labels[..i].contains(&number) || labels.iter().all(|&l| l == number) {
                 continue;
@@ -139,14 +138,8 @@ impl Nets {
     }
 }
 
-/// Returns the corners of the face of a cell towards the next one along an axis, around the face.
-fn face_towards(axis: usize) -> [usize; 4] {
-    let bits = [4, 1, 2];
-    let (a, b, c) = (bits[axis], bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
-    [a, a | b, a | b | c, a | c]
-}
-
-/// Returns the edges between these corners, from each to the next, as edges of the cell and of the next one.
+/// Returns the edges of the far face of a cell along an axis, between each of its corners and the next, as edges of the
+/// cell and of the next one.
 fn edges_towards(axis: usize) -> [(usize, usize); 4] {
     let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
     // The other two coordinates of an edge along the next axis are the last one and `axis`, and so on.

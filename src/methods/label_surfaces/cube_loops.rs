@@ -41,9 +41,19 @@ pub fn edge_at(axis: usize, b: usize, c: usize) -> usize {
     })[axis][b][c]
 }
 
+/// For each axis, the bit of a corner's number that is set if the corner is on the far side of its cell.
+pub const FAR: [usize; 3] = [4, 1, 2];
+
+/// Returns the corners of the near or the far face of a cell along an axis, around the face: the third one is opposite
+/// the first.
+pub fn face(axis: usize, far: bool) -> [usize; 4] {
+    let (b, c) = (FAR[(axis + 1) % 3], FAR[(axis + 2) % 3]);
+    [0, b, b | c, c].map(|corner| corner | if far { FAR[axis] } else { 0 })
+}
+
 /// Returns the offset of a corner from the origin of its cell.
 pub fn corner_offset(corner: usize) -> [usize; 3] {
-    [corner >> 2 & 1, corner & 1, corner >> 1 & 1]
+    FAR.map(|bit| usize::from(corner & bit != 0))
 }
 
 fn derive(case: usize) -> CubeLoops {

@@ -1,5 +1,6 @@
 //! The surfaces as meshes in world space.
 
+use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
 use crate::mesh::TriangleMesh;
@@ -26,7 +27,7 @@ impl Nets {
     /// Returns the surfaces of all labels in one mesh, in world space, label by label.
     pub fn all_meshes(&self) -> TriangleMesh {
         let mut extraction = Extraction::new(self);
-        let numbers = self.grid.table().count() as u16;
+        let numbers = self.grid.values().len() as u16;
         (1..=numbers).for_each(|number| extraction.add(number));
         extraction.mesh
     }
@@ -47,7 +48,7 @@ impl<'a> Extraction<'a> {
             if !cell.corners.contains(&number) {
                 continue;
             }
-            let count = super::cube_loops::cube_loops()[cell.case(number)].count;
+            let count = cube_loops()[cell.case(number)].count;
             self.first[slot as usize] = self.mesh.positions.len() as u32;
             for on in 0..count {
                 self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));

@@ -68,11 +68,6 @@ impl LabelGrid {
         sorted(present.map(|(&value, _)| value).collect())
     }
 
-    /// Returns all numbers with their labels and the numbers of their voxels: those of the numbers 1, 2 and so on.
-    pub fn table(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
-        self.values.iter().copied().zip(self.voxels.iter().copied())
-    }
-
     /// Returns the numbers of the labels of all voxels, with the layer around them, x fastest.
     pub fn numbers(&self) -> &[u16] {
         &self.numbers

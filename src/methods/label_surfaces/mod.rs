@@ -28,7 +28,7 @@ use crate::mesh::TriangleMesh;
 use crate::methods::method::method;
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
 use crate::remesh::Changes;
-use crate::volume::{Region, Volume};
+use crate::volume::{Region, Volume, listed};
 use cells::CellBox;
 use counts::Counts;
 use label_grid::LabelGrid;
@@ -123,16 +123,17 @@ impl LabelSurfaces {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if the label has no surface.
     pub fn mesh(&self, label: f64) -> Result<TriangleMesh, MethodError> {
-        Ok(self.nets.mesh(self.check_label(label)?))
+        Ok(self.nets.mesh(self.number_of(label)?))
     }
 
     /// Returns the number of a label that has, or had, a surface.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if it never had one.
-    pub(crate) fn check_label(&self, label: f64) -> Result<u16, MethodError> {
+    pub(crate) fn number_of(&self, label: f64) -> Result<u16, MethodError> {
         self.nets.grid.number(label).ok_or_else(|| {
-            let problem = format!("must be a label that has a surface ({:?}), got {label}", self.labels());
+            let problem =
+                format!("must be a label that has a surface ({}), got {label}", listed(self.labels()));
             MethodError::invalid("label", problem)
         })
     }

@@ -9,9 +9,10 @@
 //! saddle, where vertices in the cells alone leave no gap.
 
 use super::cells::{Cell, CellBox, Cells};
-use super::cube_loops::{cube_loops, edge_at};
+use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
-use crate::math::{DAffine3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::volume::VolumeError;
 
 /// Width of the gap between surfaces that touch, in voxels.
 pub const GAP: f32 = 0.01;
@@ -94,8 +95,8 @@ impl Nets {
     /// space of the volume to world space.
     ///
     /// # Errors
-    /// [`VolumeError::TooLarge`](crate::volume::VolumeError::TooLarge).
-    pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, crate::volume::VolumeError> {
+    /// [`VolumeError::TooLarge`].
+    pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
         let mut nets = Self { cells: Cells::new(grid.dims())?, grid, to_world };
         nets.cells.update(&nets.grid, nets.everywhere())?;
         Ok(nets)
@@ -116,21 +117,27 @@ impl Nets {
     #[inline]
     pub fn crossings(&self, slot: u32) -> impl Iterator<Item = Crossing> + '_ {
         let cell = *self.cells.get(slot);
-        // Corner numbers of the voxels next to the first corner along x, y and z.
-        [4, 1, 2].into_iter().enumerate().filter_map(move |(axis, corner)| {
-            let ends = [cell.corners[0], cell.corners[corner]];
+        (0..3).filter_map(move |axis| {
+            let ends = [cell.corners[0], cell.corners[FAR[axis]]];
             if ends[0] == ends[1] {
                 return None;
             }
-            let mut slots = [slot; 4];
-            for (found, [b, c]) in slots.iter_mut().zip(AROUND) {
-                let mut at = cell.at;
-                at[(axis + 1) % 3] -= 1 - b as u32;
-                at[(axis + 2) % 3] -= 1 - c as u32;
-                *found = self.cells.find(at)?;
-            }
-            Some(Crossing { axis, ends, slots })
+            Some(Crossing { axis, ends, slots: self.cells_around(cell.at, axis)? })
         })
+    }
+
+    /// Returns the slots of the cells around the edge that begins at the first corner of a cell, along an axis; `None`
+    /// unless surfaces pass through all four.
+    #[inline]
+    fn cells_around(&self, cell: [u32; 3], axis: usize) -> Option<[u32; 4]> {
+        let mut slots = [0; 4];
+        for (slot, [b, c]) in slots.iter_mut().zip(AROUND) {
+            let mut at = cell;
+            at[(axis + 1) % 3] -= 1 - b as u32;
+            at[(axis + 2) % 3] -= 1 - c as u32;
+            *slot = self.cells.find(at)?;
+        }
+        Some(slots)
     }
 
     /// Returns the polygon of the label at the `far` or near end of a crossed edge.
@@ -168,8 +175,7 @@ impl Nets {
     /// Returns, for each of the four faces around an edge, from each of the cells to the next one, whether the surfaces of
     /// the labels at the near and at the far end of the edge have vertices on it.
     fn face_vertices(&self, Crossing { axis, ends, slots }: &Crossing) -> [[bool; 2]; 4] {
-        let bits = [4usize, 1, 2];
-        let (a, b, c) = (bits[*axis], bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
+        let [a, b, c] = [0, 1, 2].map(|k| FAR[(axis + k) % 3]);
         let mut found = [[false; 2]; 4];
         for (i, on_face) in found.iter_mut().enumerate() {
             let cell = self.cells.get(slots[i]);
@@ -216,14 +222,13 @@ impl Nets {
         let [here, next] = [AROUND[i], AROUND[(i + 1) % 4]];
         let changes = usize::from(here[0] == next[0]);
         let (later, place) = if next[changes] == 1 { (slots[(i + 1) % 4], next) } else { (slots[i], here) };
-        let bits = [4, 1, 2];
-        let corner = (usize::from(far) * bits[*axis])
-            | ((1 - place[0]) * bits[(axis + 1) % 3])
-            | ((1 - place[1]) * bits[(axis + 2) % 3]);
+        let corner = (usize::from(far) * FAR[*axis])
+            | ((1 - place[0]) * FAR[(axis + 1) % 3])
+            | ((1 - place[1]) * FAR[(axis + 2) % 3]);
         let axis = (axis + 1 + changes) % 3;
         let cell = self.cells.get(later);
         // Two diagonally opposite corners have a vertex each; otherwise, there is one, called after the first corner.
-        let same = face_before(axis).into_iter().find(|&other| cell.corners[other] == cell.corners[corner]);
+        let same = face(axis, false).into_iter().find(|&other| cell.corners[other] == cell.corners[corner]);
         let corner = if is_diagonal(cell, axis, corner) { corner } else { same.unwrap_or(corner) };
         NetVertex::Face { slot: later, axis: axis as u8, corner: corner as u8 }
     }
@@ -245,7 +250,7 @@ impl Nets {
             }
         };
         let at = self.cells.get(slot).at;
-        let centre = crate::math::DVec3::from(at.map(|n| f64::from(n) - 0.5));
+        let centre = DVec3::from(at.map(|n| f64::from(n) - 0.5));
         let local = self.position(number, vertex, at).as_dvec3();
         self.to_world.transform_point3(centre + local).as_vec3()
     }
@@ -273,13 +278,8 @@ impl Nets {
     /// The point of an edge lies at the mean height of the four cells around it.
     fn edge_position(&self, slot: u32, axis: usize, far: bool, from: [u32; 3]) -> Vec3 {
         let cell = self.cells.get(slot);
-        let mut height = 0.0;
-        for [b, c] in AROUND {
-            let mut at = cell.at;
-            at[(axis + 1) % 3] -= 1 - b as u32;
-            at[(axis + 2) % 3] -= 1 - c as u32;
-            height += self.cells.find(at).map_or(0.0, |slot| self.cells.get(slot).offset[axis]) / 4.0;
-        }
+        let around = self.cells_around(cell.at, axis).unwrap_or([slot; 4]);
+        let height: f32 = around.iter().map(|&slot| self.cells.get(slot).offset[axis] / 4.0).sum();
         let mut point = Vec3::splat(-0.5);
         point[axis] = height + if far { GAP / 2.0 } else { -GAP / 2.0 };
         steps(from, cell.at) + point
@@ -300,18 +300,11 @@ fn steps(from: [u32; 3], to: [u32; 3]) -> Vec3 {
     Vec3::new(step(0), step(1), step(2))
 }
 
-/// Returns the corners of the face of a cell before it along an axis; the second and the third are next to the first.
-fn face_before(axis: usize) -> [usize; 4] {
-    let bits = [4, 1, 2];
-    let (b, c) = (bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
-    [0, b, c, b | c]
-}
-
 /// Returns whether, of the corners of the face before a cell along an axis, only the one opposite `corner` has the same
 /// label.
 fn is_diagonal(cell: &Cell, axis: usize, corner: usize) -> bool {
-    let face = face_before(axis);
-    let opposite = face[3] ^ corner;
+    let face = face(axis, false);
+    let opposite = face[2] ^ corner;
     face.into_iter().all(|other| {
         let expected = other == corner || other == opposite;
         (cell.corners[other] == cell.corners[corner]) == expected
@@ -328,7 +321,7 @@ fn face_clear(cell: &Cell, axis: usize, corner: usize) -> Vec3 {
     };
     let mean = |wanted: bool| {
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
-        for other in face_before(axis).into_iter().filter(|&other| has_label(other) == wanted) {
+        for other in face(axis, false).into_iter().filter(|&other| has_label(other) == wanted) {
             (sum, count) = (sum + corner_position(other), count + 1.0);
         }
         sum / count
@@ -338,6 +331,5 @@ fn face_clear(cell: &Cell, axis: usize, corner: usize) -> Vec3 {
 
 /// Returns the position of a corner relative to the centre of its cell.
 fn corner_position(corner: usize) -> Vec3 {
-    let [x, y, z] = super::cube_loops::corner_offset(corner).map(|n| n as f32 - 0.5);
-    Vec3::new(x, y, z)
+    Vec3::from(corner_offset(corner).map(|n| n as f32 - 0.5))
 }

@@ -227,7 +227,8 @@ fn surfaces_follow_random_strokes() {
 }
 
 #[test]
-#[ignore = "10,000 strokes take minutes"]
+#[cfg(not(target_arch = "wasm32"))]
+#[ignore = "10,000 strokes take minutes: npm run test:all"]
 fn fuzz_surfaces_follow_many_random_strokes() {
     (100..1100).for_each(|seed| fuzz_strokes(seed, 10));
 }

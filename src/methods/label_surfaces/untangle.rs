@@ -5,8 +5,11 @@
 //! cell: tests are local to each cell. They use the positions in world space in single precision, as they are returned.
 
 use super::cells::CellBox;
+use super::cube_loops::corner_offset;
+use super::label_grid::BACKGROUND;
 use super::nets::{Crossing, NetVertex, Nets};
 use crate::math::Vec3;
+use crate::math::order::sort_distinct;
 use crate::mesh::{Facet, facets_intersect};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -73,7 +76,7 @@ impl Nets {
                 neighbourhood.fill(self, slot);
                 neighbourhood.find_intersections(self, &mut tangled);
             }
-            crate::math::order::sort_distinct(&mut tangled);
+            sort_distinct(&mut tangled);
             tangled.retain(|slot| halved.get(slot).is_none_or(|&times| times <= HALVINGS));
             for &slot in &tangled {
                 let times = halved.entry(slot).or_default();
@@ -94,7 +97,7 @@ impl Nets {
             let area = CellBox { low: at, high: at }.grown(1, self.grid.dims());
             found.extend(self.cells.within(&area));
         }
-        crate::math::order::sort_distinct(&mut found);
+        sort_distinct(&mut found);
         found
     }
 }
@@ -110,7 +113,7 @@ impl Neighbourhood {
         self.positions.clear();
         let at = nets.cells.get(slot).at;
         for owner in 0..7 {
-            let last = super::cube_loops::corner_offset(owner);
+            let last = corner_offset(owner);
             let mut cell = at;
             (0..3).for_each(|axis| cell[axis] += last[axis] as u32);
             let Some(owner) = nets.cells.find(cell) else { continue };
@@ -119,7 +122,7 @@ impl Neighbourhood {
                 let first = self.polygons.len();
                 for far in [false, true] {
                     let number = crossing.ends[usize::from(far)];
-                    if number != super::label_grid::BACKGROUND {
+                    if number != BACKGROUND {
                         self.add(nets, at, number, &crossing, far);
                     }
                 }

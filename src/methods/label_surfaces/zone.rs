@@ -1,6 +1,7 @@
 //! A part of the surfaces that is being smoothed: copies of its cells' positions, with what links them.
 
 use super::cells::{Cell, CellBox};
+use super::cube_loops;
 use super::nets::Nets;
 use crate::math::Vec3;
 
@@ -146,10 +147,6 @@ fn pair(cell: &Cell) -> Option<[u16; 2]> {
 
 /// Returns the number of different labels at the corners of a face of a cell.
 fn labels_on_face(cell: &Cell, face: usize) -> usize {
-    let bits = [4usize, 1, 2];
-    let axis = face / 2;
-    let (b, c) = (bits[(axis + 1) % 3], bits[(axis + 2) % 3]);
-    let start = if face.is_multiple_of(2) { 0 } else { bits[axis] };
-    let corners = [start, start | b, start | c, start | b | c].map(|corner| cell.corners[corner]);
+    let corners = cube_loops::face(face / 2, !face.is_multiple_of(2)).map(|corner| cell.corners[corner]);
     (0..4).filter(|&i| !corners[..i].contains(&corners[i])).count()
 }

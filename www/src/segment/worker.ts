@@ -28,8 +28,8 @@ type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
 };
 
-/** Distance in voxels from a change within which surfaces may move: they are smoothed again up to 8 cells away. */
-const HALO = 9;
+/** Distance in voxels from a change within which surfaces may move: they are smoothed again up to 6 cells away. */
+const HALO = 8;
 let maps = 0;
 
 /** A label map with its surfaces. */
