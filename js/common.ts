@@ -2,7 +2,6 @@
 import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
-export { animationGlb } from './animation.js';
 export type {
   LengthUnit,
   MeshExtra,

@@ -15,6 +15,7 @@ import {
   trackingParamSpecs,
 } from './vesicle.js';
 
+export { animationGlb } from './animation.js';
 export * from './common.js';
 export { default } from './common.js';
 export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';

@@ -15,7 +15,9 @@ import {
 } from './check.js';
 import type { LengthUnit, Space, Vec3, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
-import { RawFrames, RawVolume } from './vesicle.js';
+// Entry points without sequences lack `RawFrames`, which an import by name would demand.
+import * as glue from './vesicle.js';
+import { RawVolume } from './vesicle.js';
 
 const INIT = [
   ...['data', 'dims', 'affine', 'spacing', 'origin'],
@@ -87,6 +89,8 @@ export class Volume {
    * Joins volumes on the same grid, in order, into the frames of a 4D volume. Volumes that are already 4D contribute
    * all their frames, in order.
    *
+   * Entry points with one method lack it, but for `vesicle/tracking`.
+   *
    * @param options - `frameSeconds`: from one frame to the next; default that of the first volume.
    * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
    */
@@ -95,7 +99,7 @@ export class Volume {
     if (frameSeconds !== undefined) positive('frameSeconds', frameSeconds);
     const handles = denseCopy('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
     return wrap(() => {
-      const collected = new RawFrames();
+      const collected = new glue.RawFrames();
       for (const handle of handles) handle.use((raw) => collected.push(raw));
       return collected.join(frameSeconds);
     });

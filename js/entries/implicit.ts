@@ -1,7 +1,8 @@
 /**
  * `vesicle` with the implicit surface as its only method, in a smaller WebAssembly module of its own.
  *
- * All else is as in `vesicle`, but without the readers of files and `enrichSlices`, and results are bit-identical.
+ * All else is as in `vesicle`, but without the readers of files, and without `enrichSlices`, `Volume.fromFrames` and
+ * `animationGlb`, which are for sequences. Results are bit-identical.
  * Objects belong to their module: a `Mesh` or `Volume` of another entry point is a different type, and is passed on as
  * arrays (`Mesh.fromArrays`, `new Volume`), which `vesicle/import` returns for files. Errors are those of `vesicle`.
  *

@@ -10,6 +10,7 @@
 import { type ParamSpec, paramSpecsOf } from '../params.js';
 import { trackingParamSpecs } from '../vesicle.js';
 
+export { animationGlb } from '../animation.js';
 export * from '../common.js';
 export { default } from '../common.js';
 export * from '../tracking.js';

@@ -3,7 +3,8 @@
 //! These exports are private to the npm package. Its public classes are the TypeScript ones in `js/`, which hold these
 //! as raw handles and check all arguments first.
 
-#[cfg(feature = "processing")]
+// Only sequences and the strokes of a sculptor are saved as animations.
+#[cfg(any(feature = "tracking", feature = "multires"))]
 mod animation;
 mod convert;
 #[cfg(feature = "deformable")]
@@ -13,6 +14,8 @@ mod enrich;
 mod error;
 #[cfg(all(feature = "import", not(feature = "processing")))]
 mod files;
+#[cfg(feature = "tracking")]
+mod frames;
 #[cfg(feature = "implicit")]
 mod implicit;
 #[cfg(all(feature = "import", feature = "processing"))]

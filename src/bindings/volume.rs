@@ -16,11 +16,6 @@ use crate::volume::{Space, Volume, VolumeInit, Voxels};
 #[wasm_bindgen]
 pub struct RawVolume(pub(super) Volume);
 
-/// The raw handle of a list of volumes to be joined into one 4D volume.
-#[wasm_bindgen]
-#[derive(Default)]
-pub struct RawFrames(Vec<Volume>);
-
 #[wasm_bindgen]
 impl RawVolume {
     /// Creates a volume from a typed array of stored values, x fastest. `dims` are the numbers of voxels along x, y and
@@ -133,26 +128,6 @@ impl RawVolume {
     pub fn binned(&self, factors: &[u32]) -> Result<RawVolume, JsValue> {
         let factors = [0, 1, 2].map(|axis| factors.get(axis).map_or(1, |&n| n as usize));
         Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
-    }
-}
-
-#[wasm_bindgen]
-impl RawFrames {
-    /// Creates an empty list of volumes.
-    #[wasm_bindgen(constructor)]
-    pub fn new() -> RawFrames {
-        Self::default()
-    }
-
-    /// Appends a volume, which contributes all its frames. Its voxels are not copied.
-    pub fn push(&mut self, volume: &RawVolume) {
-        self.0.push(volume.0.clone());
-    }
-
-    /// Returns the 4D volume of all frames; the list cannot be used afterwards. Without `frame_seconds`, the time
-    /// between frames is that of the first volume.
-    pub fn join(self, frame_seconds: Option<f64>) -> Result<RawVolume, JsValue> {
-        Ok(RawVolume(Volume::from_frames(&self.0, frame_seconds).map_err(Failure::from)?))
     }
 }
 

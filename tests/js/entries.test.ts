@@ -96,8 +96,10 @@ describe('an entry point with one method', () => {
 
   test.each(METHODS)('%s has all that vesicle has but the other methods', (method) => {
     const models = ['DeformableModel', 'ImplicitSurface', 'MultiresolutionModel', 'SurfaceTracker', 'LabelSurfaces'];
-    const others = [...models, 'parsePoints'];
+    const animated = method === 'tracking' || method === 'multires';
+    const others = [...models, 'parsePoints', ...(animated ? [] : ['animationGlb'])];
     const own = Object.keys(entries[method]);
+    expect('animationGlb' in entries[method]).toBe(animated);
     expect(Object.keys(vesicle).filter((name) => !own.includes(name) && !others.includes(name))).toEqual([]);
     expect(own.filter((name) => !(name in vesicle))).toEqual([]);
     const specs = entries[method].paramSpecs as typeof vesicle.paramSpecs;
@@ -117,13 +119,14 @@ describe('an entry point with one method', () => {
     ]);
   });
 
-  test('has no readers of files, nor, but for tracking, interpolation of slices', () => {
+  test('has no readers of files, nor, but for tracking, interpolation of slices and volumes of frames', () => {
     const { Mesh, Volume } = vesicle;
     expect('parse' in Mesh && 'parse' in Volume && 'enrichSlices' in Volume.prototype).toBe(true);
     for (const method of METHODS) {
       const own = entries[method];
       expect('parse' in own.Mesh || 'parse' in own.Volume).toBe(false);
       expect('enrichSlices' in own.Volume.prototype).toBe(method === 'tracking');
+      expect('fromFrames' in own.Volume).toBe(method === 'tracking');
       const missing = (whole: object, part: object) =>
         Object.getOwnPropertyNames(whole).filter((name) => !(name in part) && name !== 'enrichSlices');
       expect(missing(Volume.prototype, own.Volume.prototype).sort()).toEqual(LABEL_MAPS);
