@@ -57,7 +57,7 @@ impl DeformableModel {
             return false;
         }
         self.convergence.sized = true;
-        let all: Vec<VertexId> = self.mesh.vertices().collect();
+        let all = self.followed_vertices();
         self.set_sizes_of(&all);
         true
     }

@@ -1,0 +1,70 @@
+//! What a surface of a computed volume of a terabyte takes: bricks, memory and time, printed as JSON.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
+
+#[path = "../tests/common/stores.rs"]
+mod stores;
+
+use std::time::Instant;
+use stores::{Store, branching};
+use vesicle::math::DVec3;
+use vesicle::methods::MethodError;
+use vesicle::methods::deformable::{DeformableModel, SparseOptions, WorldBox};
+
+fn main() {
+    let arg = |k: usize, default: usize| std::env::args().nth(k).map_or(default, |x| x.parse().unwrap());
+    let (side, levels, finest, boxed) = (arg(1, 1024), arg(2, 4), arg(3, 0), arg(4, 0));
+    let whole = arg(5, levels - 1);
+    let store = Store::new(side, levels as u32, branching(side));
+    let volume = store.volume();
+    let unit = side as f64;
+    let within = (boxed > 0).then(|| {
+        let min = DVec3::new(0.6, 0.4, 0.35) * unit;
+        WorldBox { min, max: min + boxed as f64 }
+    });
+    let options = SparseOptions { finest, within, whole: Some(whole), ..SparseOptions::default() };
+    let mut model = DeformableModel::on_sparse(&volume, options).unwrap();
+    let (mut in_store, mut asked, mut asks, mut most) = (0.0, vec![0; levels], 0, 0);
+    let began = Instant::now();
+    loop {
+        let here = Instant::now();
+        match model.step() {
+            Ok(report) => {
+                println!(
+                    "{:4} {} {:8} vertices, {} parts, χ {}, residual {:.2e}, {:.0} ms",
+                    report.iteration,
+                    report.phase,
+                    report.vertices,
+                    report.components,
+                    report.euler,
+                    report.residual,
+                    here.elapsed().as_secs_f64() * 1e3
+                );
+                if report.done {
+                    break;
+                }
+            }
+            Err(MethodError::NeedsData { needs }) => {
+                asks += 1;
+                let before = volume.loaded();
+                let here = Instant::now();
+                store.load(&volume, &needs);
+                in_store += here.elapsed().as_secs_f64();
+                let after = volume.loaded();
+                let bytes: usize = after.iter().map(|level| level[1]).sum();
+                most = most.max(bytes);
+                for k in 0..levels {
+                    asked[k] += after[k][0] - before[k][0];
+                }
+                println!("asks for {} boxes of level {}", needs.len(), needs[0].level);
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    println!(
+        "{:.1} s in all, {in_store:.1} s in the store; {asks} asks; bricks by level {asked:?}; at most {} MB of bricks",
+        began.elapsed().as_secs_f64(),
+        most >> 20
+    );
+    println!("check {:?}", model.mesh().check());
+}
