@@ -274,7 +274,7 @@ impl DeformableModel {
         let before = self.model_delta();
         self.refine()?;
         self.level -= 1;
-        self.keep_sizes_outside(before / self.model_delta());
+        self.begin_sizes(before / self.model_delta());
         self.convergence.began = self.iteration;
         self.wake_all();
         self.prepare_level()

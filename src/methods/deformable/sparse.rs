@@ -13,6 +13,7 @@ use super::contour::ObjectIs;
 use super::image::{LevelImage, Pyramid, REDUCTION, SparseLevels};
 use super::motion::SpeedSummary;
 use super::schedule::Convergence;
+use super::sizes::LARGEST;
 use super::{DeformableModel, DeformableParams, Origin, Seeding, Start, Topology, coarse};
 use crate::math::order::{median, sort_ranks};
 use crate::math::{Bounds, DVec3, Vec3};
@@ -287,8 +288,8 @@ impl DeformableModel {
         vertices
     }
 
-    /// Returns how often the mesh is refined by √3 for the next finer level: once per factor √3 between the levels' δ; not
-    /// if only part of the surface is followed there, whose edges are split instead.
+    /// Returns how often the mesh is refined by √3 for the next finer level: once per factor √3 by which edges become
+    /// shorter; not if only part of the surface is followed there, whose edges are split instead.
     pub(super) fn refinements(&self) -> u32 {
         if self.params.topology == Topology::Fixed || self.bounds_on(self.level - 1).is_some() {
             return 0;
@@ -296,19 +297,31 @@ impl DeformableModel {
         if self.pyramid.sparse.is_none() {
             return 1;
         }
-        let ratio = f64::from(self.model_delta() / self.pyramid.delta_at(self.finest_delta, self.level - 1));
+        let shortest = self.pyramid.delta_at(self.finest_delta, self.level - 1)
+            * (1.0 + self.first_size(self.level - 1));
+        let ratio = f64::from(self.model_delta() / shortest);
         (libm::log(ratio) / libm::log(REDUCTION) + ROUNDING) as u32
     }
 
-    /// Keeps the edge lengths of the part of the surface that the level just begun does not follow, where δ was larger by
-    /// the factor `ratio`.
-    pub(super) fn keep_sizes_outside(&mut self, ratio: f32) {
-        let Some(bounds) = self.followed_bounds() else { return };
+    /// Returns the size, less 1, of the vertices of a sparse level when it begins: the largest on the finest level if it
+    /// will be sized by curvature, so that vertices are not made only to be removed.
+    fn first_size(&self, level: usize) -> f32 {
+        let is_sized = level == 0 && self.params.adapts_to_image();
+        if is_sized { self.params.adaptivity as f32 * (LARGEST - 1.0) } else { 0.0 }
+    }
+
+    /// Sets the sizes of the vertices on a sparse level just begun. The part of the surface that it does not follow keeps
+    /// its edge lengths: δ was larger there by the factor `ratio`.
+    pub(super) fn begin_sizes(&mut self, ratio: f32) {
+        if self.pyramid.sparse.is_none() {
+            return;
+        }
+        let first = self.first_size(self.level);
         let vertices: Vec<VertexId> = self.mesh.vertices().collect();
         for v in vertices {
-            let is_followed = bounds.contains(self.mesh.position(v));
+            let is_followed = self.follows(v);
             let size = &mut self.mesh.scalar_mut(self.keys.size)[v.index()];
-            *size = if is_followed { 0.0 } else { (1.0 + *size) * ratio - 1.0 };
+            *size = if is_followed { first } else { (1.0 + *size) * ratio - 1.0 };
         }
     }
 }
