@@ -5,11 +5,13 @@
 #[path = "../tests/common/stores.rs"]
 mod stores;
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 use stores::{Store, branching};
-use vesicle::math::DVec3;
+use vesicle::math::{DVec3, Vec3};
 use vesicle::methods::MethodError;
 use vesicle::methods::deformable::{DeformableModel, SparseOptions, WorldBox};
+use vesicle::volume::BRICK;
 
 fn main() {
     let arg = |k: usize, default: usize| std::env::args().nth(k).map_or(default, |x| x.parse().unwrap());
@@ -66,5 +68,23 @@ fn main() {
         began.elapsed().as_secs_f64(),
         most >> 20
     );
-    println!("check {:?}", model.mesh().check());
+    println!("check {:?}, {} bricks at the surface", model.mesh().check(), bricks_at(&model, finest, within));
+}
+
+/// Returns the number of bricks of the finest level that triangles in the box pass through.
+fn bricks_at(model: &DeformableModel, finest: usize, within: Option<WorldBox>) -> usize {
+    let surface = model.mesh().to_triangles();
+    let voxel = f64::from(1 << finest);
+    let mut bricks = BTreeSet::new();
+    for corners in surface.corners() {
+        let is_in = |p: &Vec3| {
+            let p = (p.as_dvec3() + 0.5) * voxel - 0.5;
+            within.is_none_or(|within| p.cmpge(within.min).all() && p.cmple(within.max).all())
+        };
+        if corners.iter().all(is_in) {
+            let brick = |p: Vec3| (p / BRICK as f32).floor().as_ivec3().to_array();
+            bricks.extend(corners.map(brick));
+        }
+    }
+    bricks.len()
 }

@@ -11,9 +11,9 @@ use crate::math::Vec3;
 use crate::math::order::sort_ranks;
 use std::sync::Mutex;
 
-/// The number of voxels along each side of a brick. With 16 there are half as many voxels around a surface, but twice as
-/// many reads cross from one brick to the next; with 64, memory is wasted on voxels that no surface is near.
-pub const BRICK: usize = 32;
+/// The number of voxels along each side of a brick. With 32 there are 1.6 times as many voxels around a surface; with 8,
+/// half of the reads between voxels cross from one brick to the next.
+pub const BRICK: usize = 16;
 
 /// The number of bricks along each side of a page of the table, of which those without bricks take no memory.
 const PAGE: usize = 8;

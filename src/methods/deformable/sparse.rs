@@ -22,13 +22,14 @@ use crate::methods::{MethodError, StepReport};
 use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
 
-/// The distance from a vertex, in δ, within which a step reads the image: it moves by at most half a δ, and on the
-/// finest level thin walls are searched for up to 2.3 δ away. Reads beyond it are rare, and only cost time.
-const REACH: f32 = 3.0;
+/// The distance from a vertex, in δ, within which the bricks of a level are loaded before a step: the vertex moves by at
+/// most half a δ, and thin walls are searched for up to 2.3 δ away. A step that reads beyond it is undone and repeated,
+/// which costs time only.
+const REACH: f32 = 2.5;
 
 /// The distance beyond [`REACH`], in δ, up to which missing bricks are asked for when one within it is missing, so that
 /// asking is rare. With more, more bricks are loaded that the surface never reaches.
-const MARGIN: f32 = 2.0;
+const MARGIN: f32 = 1.0;
 
 /// The largest ratio of the loaded bricks of a level to those near the surface; above it the others are dropped.
 const MOST_SPARE: usize = 2;
