@@ -346,3 +346,131 @@ fn padded<T: VoxelNumber>(values: &[T], region: Region, dims: [usize; 3]) -> Res
     }
     Ok(brick)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::volume::{Volume, VolumeInit};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    const DIMS: [usize; 3] = [37, 32, 19];
+
+    /// Returns random voxels of all types.
+    fn all_types(random: &mut Random) -> Vec<Voxels> {
+        let stored: Vec<f64> = (0..DIMS.iter().product()).map(|_| 250.0 * random.unit() - 100.0).collect();
+        let empty = [
+            Voxels::U8(vec![]),
+            Voxels::I8(vec![]),
+            Voxels::U16(vec![]),
+            Voxels::I16(vec![]),
+            Voxels::U32(vec![]),
+            Voxels::I32(vec![]),
+            Voxels::F32(vec![]),
+            Voxels::F64(vec![]),
+        ];
+        empty.iter().map(|empty| empty.like(&stored).unwrap()).collect()
+    }
+
+    /// Returns the grid of a volume and the bricks of it for which `is_loaded` is true.
+    fn both(voxels: Voxels, is_loaded: impl Fn(BrickId) -> bool) -> (Grid, BrickGrid) {
+        let volume = Volume::new(VolumeInit::new(voxels, [DIMS[0], DIMS[1], DIMS[2], 1])).unwrap();
+        let normalisation = Normalisation::new([1.0, 0.0], volume.range());
+        let mut bricks = BrickGrid::new(DIMS, normalisation).unwrap();
+        for k in 0..3 * 2 * 2 {
+            let at = BrickId([k % 3, k / 3 % 2, k / 6]);
+            let region = bricks.region(at);
+            if is_loaded(at) {
+                let data = volume.voxels().gathered(region.len(), region.rows(DIMS, 0)).unwrap();
+                bricks.insert(region, &data).unwrap();
+            }
+        }
+        (volume.normalised_grid(0).unwrap(), bricks)
+    }
+
+    fn random_point(random: &mut Random) -> Vec3 {
+        Vec3::from(DIMS.map(|n| ((n as f64 + 4.0) * random.unit() - 2.5) as f32))
+    }
+
+    #[test]
+    fn samples_have_the_bits_of_a_grid() {
+        let mut random = Random::new(1);
+        for voxels in all_types(&mut random) {
+            let (grid, bricks) = both(voxels, |_| true);
+            let [mut cache, mut other] = [CellCache::default(); 2];
+            for _ in 0..4000 {
+                let p = random_point(&mut random);
+                let nearby = p + Vec3::splat(0.01);
+                for p in [p, nearby] {
+                    let expected = grid.sample_padded(p, 0.25, &mut cache);
+                    assert_eq!(
+                        bricks.sample_padded(p, 0.25, &mut other).to_bits(),
+                        expected.to_bits(),
+                        "at {p}"
+                    );
+                }
+            }
+            assert!(bricks.take_missed().is_empty());
+            let region = Region { min: [3, 10, 9], dims: [30, 12, 10] };
+            assert_eq!(bricks.part(region).unwrap(), Some(grid.part(region).unwrap()));
+        }
+    }
+
+    /// A sample is either that of the grid, or names a brick that is missing.
+    #[test]
+    fn missing_bricks_are_recorded_and_never_read() {
+        let mut random = Random::new(2);
+        let voxels = all_types(&mut random).swap_remove(2);
+        let is_loaded = |at: BrickId| !(at.0[0] + at.0[1] + at.0[2]).is_multiple_of(2);
+        let (grid, bricks) = both(voxels, is_loaded);
+        let [mut found, mut missed] = [0, 0];
+        let mut cache = CellCache::default();
+        for _ in 0..4000 {
+            let p = random_point(&mut random);
+            let sample = bricks.sample_padded(p, 0.25, &mut cache);
+            let absent = bricks.take_missed();
+            if absent.is_empty() {
+                found += 1;
+                assert_eq!(
+                    sample.to_bits(),
+                    grid.sample_padded(p, 0.25, &mut CellCache::default()).to_bits()
+                );
+            } else {
+                missed += 1;
+                assert!(absent.iter().all(|&rank| !is_loaded(BrickId::ranked(rank))));
+            }
+        }
+        assert!(found > 500 && missed > 500, "{found} and {missed}");
+    }
+
+    #[test]
+    fn dropped_bricks_are_missing_until_they_are_inserted_again() {
+        let mut random = Random::new(3);
+        let (_, mut bricks) = both(all_types(&mut random).swap_remove(0), |_| true);
+        let count = bricks.len();
+        bricks.retain(|at| at.0[0] == 1);
+        assert_eq!((bricks.len(), bricks.bytes()), (4, 4 * BRICK * BRICK * BRICK));
+        assert!(bricks.has(BrickId([1, 1, 1])) && !bricks.has(BrickId([0, 1, 1])));
+        let region = Region { min: [0; 3], dims: DIMS };
+        let again = Voxels::U8(vec![9; region.len()]);
+        let kept = bricks.value([20, 5, 5]);
+        bricks.insert(region, &again).unwrap();
+        assert_eq!(bricks.len(), count);
+        assert_eq!(bricks.value([20, 5, 5]), kept, "a brick was replaced");
+        assert_eq!(bricks.value([3, 5, 5]), Some(bricks.normalisation.of(9.0) as f32));
+    }
+
+    #[test]
+    fn ranks_are_those_of_bricks_around_a_box() {
+        let (_, bricks) = both(all_types(&mut Random::new(4)).swap_remove(0), |_| false);
+        let mut found = Vec::new();
+        bricks.for_each_around(Vec3::new(-9.0, 15.5, 3.0), Vec3::new(16.0, 16.5, 99.0), |rank| {
+            found.push(rank)
+        });
+        let expected =
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
+        assert_eq!(found, expected.map(|at| BrickId(at).rank()));
+        assert_eq!(found.iter().map(|&rank| BrickId::ranked(rank).0).collect::<Vec<_>>(), expected);
+    }
+}
