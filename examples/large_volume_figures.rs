@@ -1,4 +1,6 @@
-//! What a surface of a computed volume of a terabyte takes: bricks, memory and time, printed as JSON.
+//! Bricks, memory and time of a surface in a computed volume of a terabyte.
+//!
+//! Arguments: voxels along a side, number of levels, level to end at, side of the box (0: none), finest level outside it.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 

@@ -71,7 +71,7 @@ impl RawSparseVolume {
 
     /// Adds the voxels of a box of whole bricks of a level, which begins at a multiple of the brick and ends at one or at
     /// the border: a typed array of the voxels' type, x fastest; voxels that the file leaves out if it is not given.
-    /// Bricks that are loaded stay as they are.
+    /// Loaded bricks are unchanged.
     pub fn insert(&self, level: usize, min: &[u32], dims: &[u32], data: &JsValue) -> Result<(), JsValue> {
         let region = Region { min: three(min, "min")?, dims: three(dims, "dims")? };
         let at = BrickBox { level, region };

@@ -149,7 +149,7 @@ impl BrickGrid {
     }
 
     /// Adds the bricks of a box of whole bricks, which ends at a brick or at the border of the grid; `data` are its
-    /// voxels, x fastest. Bricks that are loaded stay as they are.
+    /// voxels, x fastest. Loaded bricks are unchanged.
     ///
     /// # Errors
     /// [`VolumeError::InvalidArgument`] if the box is not of whole bricks or not within the grid, or `data` has another
@@ -284,7 +284,7 @@ impl BrickGrid {
             let corners =
                 CORNERS.map(|corner| base + corner[0] * step[0] + corner[1] * step[1] + corner[2] * step[2]);
             return Some(each!(&brick.voxels, values => {
-                corners.map(|index| self.normalisation.of(values[index].into()) as f32)
+                corners.map(|index| self.normalised(values[index]))
             }));
         }
         // All eight are read even if one is missing, so that all missing bricks are recorded.
@@ -300,8 +300,13 @@ impl BrickGrid {
     /// Returns the value of a voxel; `None` if it is missing.
     fn value(&self, voxel: [usize; 3]) -> Option<f32> {
         let brick = self.brick_with(voxel)?;
-        let stored = each!(&brick.voxels, values => values[index_in_brick(voxel.map(|k| k % BRICK))].into());
-        Some(self.normalisation.of(stored) as f32)
+        let index = index_in_brick(voxel.map(|k| k % BRICK));
+        Some(each!(&brick.voxels, values => self.normalised(values[index])))
+    }
+
+    #[inline]
+    fn normalised<T: VoxelNumber>(&self, stored: T) -> f32 {
+        self.normalisation.of(stored.into()) as f32
     }
 
     /// Returns the values of a region within the grid; `None` if some are missing.

@@ -96,8 +96,8 @@ impl SparseVolume {
         span(self.range)
     }
 
-    /// Adds the voxels of a box of whole bricks, which ends at a brick or at the border of the level, x fastest. Bricks
-    /// that are loaded stay as they are.
+    /// Adds the voxels of a box of whole bricks, which ends at a brick or at the border of the level, x fastest. Loaded
+    /// bricks are unchanged.
     ///
     /// # Errors
     /// [`VolumeError::InvalidArgument`] if there is no such level, the box is not of whole bricks or not within the

@@ -164,7 +164,7 @@ struct Keys {
     size: ScalarKey,
 }
 
-/// What a model begins with, whatever its image.
+/// The options of a model, whatever its image.
 struct Origin {
     frame: usize,
     start: Start,

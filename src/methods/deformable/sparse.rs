@@ -4,8 +4,8 @@
 //! after all, it is undone and asks for that. So no missing voxel is ever replaced by a number, and the surface has the
 //! same bits in whatever order bricks arrive, as if all were there.
 //!
-//! What is computed over a whole level of other volumes comes from the coarsest level, which is loaded whole (the start,
-//! the range), or is sampled at the vertices (the steepness of the image). Parts that the coarsest level does not show
+//! Quantities that depend on a whole level of other volumes come from the coarsest level, which is loaded whole (the start,
+//! the range), or are sampled at the vertices (the steepness of the image). Parts that the coarsest level does not show
 //! are not found: finer levels are not searched.
 
 use super::awake::ITERATIONS_TO_SLEEP;
@@ -45,7 +45,7 @@ pub struct SparseOptions {
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_range`] of the volume's range.
     pub params: Option<DeformableParams>,
-    /// The box in which finer levels are followed; outside of it the surface stays as it was on level
+    /// The box in which finer levels are followed; outside of it the surface is that of level
     /// [`Self::whole`]. By default they are followed everywhere.
     pub within: Option<WorldBox>,
     /// The finest level that is followed everywhere if there is a box; by default the coarsest.
