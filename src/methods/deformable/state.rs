@@ -3,7 +3,7 @@
 use super::domain::Domain;
 use super::motion::SpeedSummary;
 use super::schedule::Convergence;
-use super::{Attractor, DeformableModel, DeformableParams, coarse, delta_at, image};
+use super::{Attractor, DeformableModel, DeformableParams, coarse, image};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, encode};
@@ -64,10 +64,14 @@ impl DeformableModel {
     /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] if the bytes are not such a state, [`MethodError::InvalidArgument`] if a parameter or
+    /// [`MethodError::BadState`] if the bytes are not such a state or the volume is sparse, [`MethodError::InvalidArgument`] if a parameter or
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
+        if self.pyramid.sparse.is_some() {
+            let problem = "runs on sparse volumes cannot be restored".into();
+            return Err(MethodError::BadState { field: "volume", problem });
+        }
         let state: State = decode(&MAGIC, bytes)?;
         if state.fingerprint != self.fingerprint() {
             let problem = "the state belongs to another volume, frame or number of levels".into();
@@ -125,7 +129,7 @@ impl DeformableModel {
     }
 
     fn domain_for(&self, finest_delta: f64) -> Domain {
-        let coarsest = delta_at(finest_delta, self.pyramid.levels.len() - 1);
+        let coarsest = self.pyramid.delta_at(finest_delta, self.pyramid.levels.len() - 1);
         Domain::new(self.pyramid.dims(), coarsest)
     }
 
@@ -139,8 +143,8 @@ impl DeformableModel {
         next.domain = self.domain_for(state.finest_delta);
         next.mesh = state.mesh;
         next.mesh.advance_versions_past(&self.mesh);
-        next.resolver =
-            Resolver::with_max_vertices(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
+        let finest = next.pyramid.delta_at(state.finest_delta, 0);
+        next.resolver = Resolver::with_max_vertices(next.domain.most_vertices(finest));
         next.watch_output();
         next.resolver.set_pending(state.waiting);
         next.iteration = state.iteration;
