@@ -16,6 +16,11 @@ export type ErrorCode =
   | 'self-intersecting'
   /** A linear system of an implicit surface without a usable solution; the message names the likely cause. */
   | 'singular-system'
+  /**
+   * Data of a store, such as a chunk of `vesicle/zarr`, that could not be fetched: refused, not reached, or no answer
+   * within the time limit, after retries where these can help. The same call may be made again.
+   */
+  | 'unavailable'
   /** More memory needed than there is, or more vertices than are allowed; the message says how much. */
   | 'too-large'
   /**

@@ -1,0 +1,99 @@
+// A store behind an address: zarrita's, with errors that state why a request failed.
+import type { AsyncReadable } from '@zarrita/storage';
+import type { Zarrita } from './error.js';
+import { HttpError } from './requests.js';
+
+/**
+ * Returns the store at an address. Its requests fail with an {@link HttpError} for an answer without data, except 404,
+ * and when no byte comes for `timeoutMs` milliseconds: a large chunk on a slow line may take longer.
+ */
+export function httpStore(zarrita: Zarrita, url: URL, timeoutMs: number): AsyncReadable {
+  return new zarrita.FetchStore(url, {
+    fetch: (request) => answer(request, timeoutMs),
+    // Otherwise each index of a shard takes two requests.
+    useSuffixRequest: true,
+  });
+}
+
+async function answer(request: Request, timeoutMs: number): Promise<Response> {
+  const range = request.headers.get('Range');
+  const first = await send(request, timeoutMs);
+  const isSuffix = range?.startsWith('bytes=-') && (first.status === 200 || first.status === 400);
+  if (!isSuffix) return first;
+  // Some servers, as those of Azure, do not know ranges that are counted from the end.
+  return send(new Request(request, { headers: { Range: await fromStart(request, range as string) } }), timeoutMs);
+}
+
+/** Returns a range counted from the end, `bytes=-N`, as one counted from the start. */
+async function fromStart(request: Request, range: string): Promise<string> {
+  const head = await fetch(request.url, { method: 'HEAD', signal: request.signal });
+  const length = Number(head.headers.get('Content-Length'));
+  if (!head.ok) throw refusal(head, request);
+  return `bytes=${Math.max(0, length - Number(range.slice('bytes=-'.length)))}-${length - 1}`;
+}
+
+/** Sends a request, and returns the answer with all of its body. */
+async function send(request: Request, timeoutMs: number): Promise<Response> {
+  const watch = new StallWatch(request.signal, timeoutMs);
+  try {
+    const response = await fetch(request, { signal: watch.signal });
+    const { status } = response;
+    if (hasData(request, status)) return new Response(await read(response, watch), { status });
+    await response.body?.cancel();
+    const isSuffix = request.headers.get('Range')?.startsWith('bytes=-');
+    if (status === 404 || (isSuffix && (status === 200 || status === 400))) return new Response(null, { status });
+    throw refusal(response, request);
+  } finally {
+    watch.end();
+  }
+}
+
+const hasData = (request: Request, status: number): boolean =>
+  status === 206 || (status === 200 && !request.headers.has('Range'));
+
+function refusal({ status, statusText }: Response, { url }: Request): HttpError {
+  if (status === 200) return new HttpError(400, `${url}: the server ignores byte ranges, which sharded arrays need`);
+  return new HttpError(status, `${url}: ${status} ${statusText}`.trimEnd());
+}
+
+async function read(response: Response, watch: StallWatch): Promise<Blob> {
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  const reader = response.body?.getReader();
+  for (;;) {
+    const part = await reader?.read();
+    if (!part?.value) return new Blob(parts);
+    watch.progress();
+    parts.push(part.value);
+  }
+}
+
+/** A signal that aborts with another one, and when nothing has happened for a while. */
+class StallWatch {
+  readonly #stop = new AbortController();
+  readonly #outer: AbortSignal;
+  readonly #timeoutMs: number;
+  readonly #abort = () => this.#stop.abort(this.#outer.reason);
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(outer: AbortSignal, timeoutMs: number) {
+    [this.#outer, this.#timeoutMs] = [outer, timeoutMs];
+    outer.addEventListener('abort', this.#abort);
+    if (outer.aborted) this.#abort();
+    this.progress();
+  }
+
+  get signal(): AbortSignal {
+    return this.#stop.signal;
+  }
+
+  progress(): void {
+    clearTimeout(this.#timer);
+    const stalled = () => this.#stop.abort(new Error(`no data for ${this.#timeoutMs / 1000} s`));
+    this.#timer = setTimeout(stalled, this.#timeoutMs);
+  }
+
+  end(): void {
+    clearTimeout(this.#timer);
+    this.#outer.removeEventListener('abort', this.#abort);
+  }
+}
