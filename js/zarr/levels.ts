@@ -155,6 +155,16 @@ function copyRow(from: VoxelArray, start: number, step: number, to: VoxelArray, 
   for (let i = 0; i < count; i++) to[at + i] = from[start + i * step] as number;
 }
 
+/** Throws `bad-file` unless all arrays have the same numbers of channels and times. */
+export function checkSeries(arrays: readonly ZarrArray<'uint8'>[], { axes, levels }: Multiscale): void {
+  const sizes = ({ shape }: ZarrArray<'uint8'>) =>
+    axes.flatMap((axis, index) => (axis === 'c' || axis === 't' ? [`${axis} ${shape[index]}`] : [])).join(', ');
+  const [first] = arrays.map(sizes);
+  const wrong = arrays.findIndex((array) => sizes(array) !== first);
+  const [path, found] = [levels[wrong]?.path, arrays[wrong]];
+  if (found) throw badZarr(`array "${path}".shape`, `must have the ${first} of level 0, got ${sizes(found)}`);
+}
+
 function checkSizes({ shape, chunks }: ZarrArray<'uint8'>, axes: AxisName[], part: string): void {
   const isCounts = (values: unknown, most: number) =>
     Array.isArray(values) &&

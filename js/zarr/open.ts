@@ -2,7 +2,7 @@
 import type { Group, Location, Readable, Array as ZarrArray } from 'zarrita';
 import { invalid } from '../check.js';
 import { badZarr, RefusedError, translated, type Zarrita } from './error.js';
-import { checkPyramid, Level, type Selection } from './levels.js';
+import { checkPyramid, checkSeries, Level, type Selection } from './levels.js';
 import { parseMultiscale } from './multiscales.js';
 
 /** Imports zarrita; throws `invalid-argument` if it is missing or too old. */
@@ -27,13 +27,15 @@ export async function openLevels(
   signal: AbortSignal | undefined,
 ): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
   const opener = new Opener(zarrita, signal);
-  const group = await opener.group(zarrita.root(store).resolve(path.replace(/^\/+/, '')));
+  const group = await opener.group(zarrita.root(store).resolve(path.replace(/^\/+|\/+$/g, '')));
   const image = parseMultiscale(Object(group.attrs));
-  const arrays = image.levels.map(async (transform) => {
-    const array = await opener.array(group.resolve(transform.path), `array "${transform.path}"`);
-    return new Level(zarrita, array, image, transform, selection);
-  });
-  const levels = await Promise.all(arrays);
+  const arrays = await Promise.all(
+    image.levels.map(({ path }) => opener.array(group.resolve(path), `array "${path}"`)),
+  );
+  checkSeries(arrays, image);
+  const levels = image.levels.map(
+    (transform, index) => new Level(zarrita, arrays[index] as ZarrArray<'uint8'>, image, transform, selection),
+  );
   checkPyramid(
     levels,
     image.levels.map((transform) => transform.path),

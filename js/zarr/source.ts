@@ -43,7 +43,8 @@ async function localStore(source: Exclude<ZarrSource, string | URL>): Promise<Re
   const parts = Object(source) as Record<string, unknown>;
   if (typeof parts.getFileHandle === 'function') return handleStore(source as FileSystemDirectoryHandle);
   if (parts.isDirectory === true) return entryStore(source as FileSystemDirectoryEntry);
-  return typeof parts.length === 'number' ? filesStore(source as ArrayLike<File>) : undefined;
+  const isList = typeof source === 'object' && typeof parts.length === 'number';
+  return isList ? filesStore(source as ArrayLike<File>) : undefined;
 }
 
 function unknownSource(): Error {
