@@ -70,15 +70,14 @@ async function read(response: Response, watch: StallWatch): Promise<Blob> {
 /** A signal that aborts with another one, and when nothing has happened for a while. */
 class StallWatch {
   readonly #stop = new AbortController();
-  readonly #outer: AbortSignal;
   readonly #timeoutMs: number;
-  readonly #abort = () => this.#stop.abort(this.#outer.reason);
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(outer: AbortSignal, timeoutMs: number) {
-    [this.#outer, this.#timeoutMs] = [outer, timeoutMs];
-    outer.addEventListener('abort', this.#abort);
-    if (outer.aborted) this.#abort();
+    this.#timeoutMs = timeoutMs;
+    const abort = () => this.#stop.abort(outer.reason);
+    outer.addEventListener('abort', abort);
+    if (outer.aborted) abort();
     this.progress();
   }
 
@@ -94,6 +93,5 @@ class StallWatch {
 
   end(): void {
     clearTimeout(this.#timer);
-    this.#outer.removeEventListener('abort', this.#abort);
   }
 }

@@ -56,7 +56,7 @@ const CACHE_BYTES = 256e6;
  * body: volumes are RAS by default.
  *
  * @param source - An address, a store, a folder or its files, or a ZIP; see {@link ZarrSource}.
- * @throws {@link VesicleError} `bad-file`: no image, or metadata that is inconsistent or not supported; `unavailable`: a
+ * @throws `VesicleError` `bad-file`: no image, or metadata that is inconsistent or not supported; `unavailable`: a
  *   request that failed; `invalid-argument` naming the option; `too-large`: chunks that do not fit into memory.
  *   `signal.reason` when aborted.
  */

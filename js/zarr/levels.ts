@@ -216,7 +216,7 @@ export function checkPyramid(levels: readonly Level[], paths: readonly string[])
 function checkAxis(finest: ZarrLevel, before: ZarrLevel, level: ZarrLevel, axis: 0 | 1 | 2, part: string): void {
   const name = `${'xyz'[axis]}`;
   const spacing = level.spacing[axis];
-  if (spacing < before.spacing[axis] || level.dims[axis] > before.dims[axis]) {
+  if (spacing < before.spacing[axis]) {
     throw badZarr(part, `must not be finer along ${name} than the level before; levels go from fine to coarse`);
   }
   const extent = ({ dims, spacing }: ZarrLevel) => dims[axis] * spacing[axis];

@@ -27,7 +27,7 @@ export interface ZarrParts {
 /**
  * An OME-Zarr image, one channel and one time of it, of which only the chunks are read that are asked for.
  *
- * @throws All methods: {@link VesicleError} `freed` after {@link ZarrVolume.free}.
+ * @throws All methods: `VesicleError` `freed` after {@link ZarrVolume.free}.
  */
 export class ZarrVolume {
   /** The levels of the image, finest first. */
@@ -71,7 +71,7 @@ export class ZarrVolume {
    * @param level - Index of the level; 0 is the finest.
    * @param box - Voxel indices of that level.
    * @param options - `signal`: aborts the requests.
-   * @throws {@link VesicleError} `invalid-argument`: no such level, a box that is empty or extends beyond the level, or
+   * @throws `VesicleError` `invalid-argument`: no such level, a box that is empty or extends beyond the level, or
    *   has no finite voxel; `unavailable`: a chunk that could not be fetched; `bad-file`: one that is damaged;
    *   `too-large`. `signal.reason` when aborted. No request is left open, and what was read stays in the cache.
    */

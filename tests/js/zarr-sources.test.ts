@@ -1,4 +1,4 @@
-// What `vesicle/zarr` reads from, and what it is asked for.
+// Sources and arguments of `vesicle/zarr`.
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
@@ -93,7 +93,6 @@ describe('an image is read from', () => {
       }
       const zarr = await openZarr(source);
       expect([...(await zarr.voxels(0, WHOLE)).data]).toEqual(SOURCE);
-      // Beyond the shapes of the arrays nothing is looked for.
       expect(zarr.loaded()[0]?.chunks).toBe(27);
     }
   });
@@ -101,6 +100,10 @@ describe('an image is read from', () => {
   test('a folder within a folder, by its path', async () => {
     const files = await filesOf('v3-zstd-zyx');
     const nested = new Map([...files].map(([key, bytes]) => [`/a b/image.zarr${key}`, bytes]));
+    for (const path of ['a b', 'a b/image.zarr/zarr.json', 'nowhere']) {
+      const error = await rejection(openZarr(handleOf(nested), { path }));
+      expect(error.message).toContain(`group "/${path}": no Zarr group is there`);
+    }
     for (const path of ['a b/image.zarr', '/a b/image.zarr/', 'a b/image.zarr//']) {
       const zarr = await openZarr(handleOf(nested), { path });
       expect([...(await zarr.voxels(0, WHOLE)).data]).toEqual(SOURCE);
