@@ -437,13 +437,14 @@ describe('an abort', () => {
       const store = await storeOf('v3-zstd-zyx');
       const zarr = await openZarr(store, { concurrency: 1 });
       const stop = new AbortController();
+      const abort = async () => {
+        for (let i = 0; i < delay; i++) await undefined;
+        stop.abort('enough');
+      };
       store.fault = async (_, bytes) => {
-        // The second region waits for the slot of this request.
-        setTimeout(async () => {
-          for (let i = 0; i < delay; i++) await undefined;
-          stop.abort('enough');
-        });
         await new Promise((resolve) => setTimeout(resolve));
+        // The second region waits for the slot of this request.
+        abort();
         return bytes;
       };
       const first = voxels(zarr, CHUNK);
