@@ -49,7 +49,7 @@ const OPTIONS = ['path', 'channel', 'time', 'signal', 'cache', 'concurrency', 'r
 const CACHE_BYTES = 256e6;
 
 /**
- * Opens an OME-Zarr image: reads its metadata, but no voxels.
+ * Opens an OME-Zarr image: reads its metadata, and the coarsest level, if that is not larger than 256 MB.
  *
  * Axes may have any order; z, channel and time may be missing. World coordinates are those of
  * `coordinateTransformations`, in millimetres if the axes have units of length. OME-Zarr does not say how they lie in a
@@ -68,7 +68,9 @@ export async function openZarr(source: ZarrSource, given?: ZarrOptions): Promise
   const { store, limits } = await openSource(zarrita, source, options);
   const requests = new Requests(store, { ...limits, concurrency });
   const image = await openLevels(zarrita, requests, path, { channel, time }, signal);
-  return new ZarrVolume({ ...image, cache, concurrency });
+  const volume = new ZarrVolume({ ...image, cache, concurrency });
+  await volume.readCoarsest(signal);
+  return volume;
 }
 
 function checked(given: ZarrOptions | undefined): ZarrOptions {

@@ -1,15 +1,18 @@
 import { checkProperties, invalid, numbers, shallowCopy } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
+import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
 import { Volume } from '../volume.js';
 import { type Brick, BrickCache } from './cache.js';
-import { badZarr } from './error.js';
 import { type Level, levelAt, volumeOf } from './levels.js';
 import type { ZarrBox, ZarrLevel, ZarrLoaded } from './types.js';
 
 /** Largest number of bytes of a region: what fits into the memory of a WebAssembly module. */
 const LARGEST_REGION = 2 ** 32;
+
+/** Largest number of bytes of a coarsest level that is read when the image is opened. */
+const LARGEST_COARSEST = 256e6;
 
 /**
  * Constituents of a {@link ZarrVolume}.
@@ -40,6 +43,7 @@ export class ZarrVolume {
   // Positions of the chunks of each level that have been read.
   readonly #seen: Set<string>[];
   readonly #bytes: number[];
+  #coarsest: VoxelArray | undefined;
   #range: [number, number] | undefined;
   #freed = false;
 
@@ -99,23 +103,47 @@ export class ZarrVolume {
   }
 
   /**
-   * Returns the smallest and the largest finite intensity of the coarsest level, which is read as a whole the first
-   * time.
-   *
-   * @throws As {@link ZarrVolume.region}; `bad-file` if it has no finite voxel.
+   * Smallest and largest finite intensity of the coarsest level; undefined if it has no finite voxel, or is larger than
+   * 256 MB and so was not read when the image was opened.
    */
-  async range(options?: { signal?: AbortSignal }): Promise<[number, number]> {
+  get range(): [number, number] | undefined {
     this.#check();
-    if (!this.#range) {
-      const coarsest = this.#levels.length - 1;
-      const { data } = await this.voxels(
-        coarsest,
-        { min: [0, 0, 0], max: levelAt(this.#levels, coarsest).info.dims },
-        options,
-      );
-      this.#range = rangeOf(data);
-    }
-    return [...this.#range];
+    return this.#range && [...this.#range];
+  }
+
+  /**
+   * Reads the coarsest level, unless it is very large.
+   *
+   * @internal
+   */
+  async readCoarsest(signal: AbortSignal | undefined): Promise<void> {
+    const index = this.#levels.length - 1;
+    const level = levelAt(this.#levels, index);
+    if (level.bytes > LARGEST_COARSEST) return;
+    const { data } = await this.voxels(index, { min: [0, 0, 0], max: level.info.dims }, signal && { signal });
+    this.#coarsest = data;
+    this.#range = rangeOf(data);
+  }
+
+  /** @internal */
+  [SPARSE_SOURCE](): SparseSource {
+    this.#check();
+    const [finest] = this.#levels as [Level];
+    const [coarsest, range] = [this.#coarsest, this.#range];
+    if (!coarsest) throw new VesicleError('too-large', 'volume: the coarsest level must not be larger than 256 MB');
+    if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
+    return {
+      ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
+      ...{ range, coarsest, concurrency: this.#concurrency },
+      read: async ({ level, min, dims }, signal) => {
+        const max = min.map((first, axis) => first + (dims[axis] as number)) as Vec3;
+        return (await this.voxels(level, { min, max }, signal && { signal })).data;
+      },
+      loaded: () => ({
+        chunks: this.#seen.reduce((sum, { size }) => sum + size, 0),
+        bytes: this.#bytes.reduce((sum, size) => sum + size, 0),
+      }),
+    };
   }
 
   async #fill(target: Brick, index: number, level: Level, signal: AbortSignal | undefined): Promise<void> {
@@ -162,6 +190,7 @@ export class ZarrVolume {
   /** Aborts all requests, which then reject with `freed`, and forgets all chunks; the image cannot be used afterwards. */
   free(): void {
     this.#freed = true;
+    this.#coarsest = undefined;
     this.#cache.clear(freed());
   }
 
@@ -227,13 +256,12 @@ function copyOverlap(from: Brick, to: Brick): void {
   }
 }
 
-function rangeOf(data: VoxelArray): [number, number] {
+function rangeOf(data: VoxelArray): [number, number] | undefined {
   let [low, high] = [Infinity, -Infinity];
   for (const value of data) {
     if (!Number.isFinite(value)) continue;
     if (value < low) low = value;
     if (value > high) high = value;
   }
-  if (low <= high) return [low, high];
-  throw badZarr('coarsest level', 'must have a finite voxel');
+  return low <= high ? [low, high] : undefined;
 }
