@@ -28,8 +28,73 @@ export interface SparseSource {
   fill: number;
   /** Reads a box. */
   read(box: SparseBox, signal: AbortSignal | undefined): Promise<VoxelArray>;
-  /** Number of boxes that are read at the same time. */
+  /** Number of chunks that are read at the same time. */
   concurrency: number;
   /** Returns the numbers of chunks and bytes that have been read from all levels. */
   loaded(): { chunks: number; bytes: number };
+}
+
+/** How much of a volume has been read, for {@link supply}. */
+export interface DataReport {
+  /** Size of all chunks that have been read from all levels, decoded, bytes. */
+  bytes: number;
+  /** Number of these chunks. */
+  chunks: number;
+  /** Number of boxes that the model still waits for; 0 when it goes on. */
+  waiting: number;
+}
+
+/**
+ * Reads boxes and passes each to `insert` as it arrives, in any order. Neighbours are read together, so that a chunk that
+ * several of them touch is read once.
+ *
+ * @param onData - Called after each box.
+ * @throws Errors of the source, of `insert` and of `onData`; `signal.reason` when aborted. Boxes inserted before stay.
+ */
+export async function supply(
+  source: SparseSource,
+  boxes: readonly SparseBox[],
+  insert: (box: SparseBox, voxels: VoxelArray) => void,
+  signal?: AbortSignal,
+  onData?: (report: DataReport) => void,
+): Promise<void> {
+  signal?.throwIfAborted();
+  const stop = new AbortController();
+  const abort = () => stop.abort(signal?.reason);
+  signal?.addEventListener('abort', abort);
+  const left = inOrder(boxes).values();
+  let waiting = boxes.length;
+  const take = async () => {
+    // All take from the same iterator.
+    for (const box of left) {
+      const voxels = await source.read(box, stop.signal);
+      // The source may have had them already when it was aborted.
+      stop.signal.throwIfAborted();
+      insert(box, voxels);
+      waiting -= 1;
+      onData?.({ ...source.loaded(), waiting });
+    }
+  };
+  try {
+    await Promise.all(Array.from({ length: source.concurrency }, take));
+  } catch (error) {
+    stop.abort(error);
+    throw error;
+  } finally {
+    signal?.removeEventListener('abort', abort);
+  }
+}
+
+/** Number of voxels along the edge of the blocks within which boxes are read together; that of common chunks. */
+const BLOCK = 128;
+
+/** Returns boxes ordered by level, then by the block that they begin in. */
+function inOrder(boxes: readonly SparseBox[]): SparseBox[] {
+  const block = (box: SparseBox, axis: 0 | 1 | 2) => Math.floor(box.min[axis] / BLOCK);
+  const compare = (one: SparseBox, other: SparseBox) =>
+    one.level - other.level ||
+    block(one, 2) - block(other, 2) ||
+    block(one, 1) - block(other, 1) ||
+    block(one, 0) - block(other, 0);
+  return [...boxes].sort(compare);
 }

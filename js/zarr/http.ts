@@ -8,28 +8,9 @@ import { HttpError } from './requests.js';
  * and when no byte comes for `timeoutMs` milliseconds: a large chunk on a slow line may take longer.
  */
 export function httpStore(zarrita: Zarrita, url: URL, timeoutMs: number): AsyncReadable {
-  return new zarrita.FetchStore(url, {
-    fetch: (request) => answer(request, timeoutMs),
-    // Otherwise each index of a shard takes two requests.
-    useSuffixRequest: true,
-  });
-}
-
-async function answer(request: Request, timeoutMs: number): Promise<Response> {
-  const range = request.headers.get('Range');
-  const first = await send(request, timeoutMs);
-  const isSuffix = range?.startsWith('bytes=-') && (first.status === 200 || first.status === 400);
-  if (!isSuffix) return first;
-  // Some servers, as those of Azure, do not know ranges that are counted from the end.
-  return send(new Request(request, { headers: { Range: await fromStart(request, range as string) } }), timeoutMs);
-}
-
-/** Returns a range counted from the end, `bytes=-N`, as one counted from the start. */
-async function fromStart(request: Request, range: string): Promise<string> {
-  const head = await fetch(request.url, { method: 'HEAD', signal: request.signal });
-  const length = Number(head.headers.get('Content-Length'));
-  if (!head.ok) throw refusal(head, request);
-  return `bytes=${Math.max(0, length - Number(range.slice('bytes=-'.length)))}-${length - 1}`;
+  // Ranges that are counted from the end are not asked for: servers of other origins would have to allow each in
+  // advance, and those of Azure do not know them.
+  return new zarrita.FetchStore(url, { fetch: (request) => send(request, timeoutMs) });
 }
 
 /** Sends a request, and returns the answer with all of its body. */
@@ -37,11 +18,11 @@ async function send(request: Request, timeoutMs: number): Promise<Response> {
   const watch = new StallWatch(request.signal, timeoutMs);
   try {
     const response = await fetch(request, { signal: watch.signal });
-    const { status } = response;
-    if (hasData(request, status)) return new Response(await read(response, watch), { status });
+    const { status, headers } = response;
+    if (status === 200 && request.method === 'HEAD') checkLength(headers, request);
+    if (hasData(request, status)) return new Response(await read(response, watch), { status, headers });
     await response.body?.cancel();
-    const isSuffix = request.headers.get('Range')?.startsWith('bytes=-');
-    if (status === 404 || (isSuffix && (status === 200 || status === 400))) return new Response(null, { status });
+    if (status === 404) return new Response(null, { status });
     throw refusal(response, request);
   } finally {
     watch.end();
@@ -50,6 +31,11 @@ async function send(request: Request, timeoutMs: number): Promise<Response> {
 
 const hasData = (request: Request, status: number): boolean =>
   status === 206 || (status === 200 && !request.headers.has('Range'));
+
+function checkLength(headers: Headers, { url }: Request): void {
+  if (headers.has('Content-Length')) return;
+  throw new HttpError(400, `${url}: the server does not tell the length of files, which sharded arrays need`);
+}
 
 function refusal({ status, statusText }: Response, { url }: Request): HttpError {
   if (status === 200) return new HttpError(400, `${url}: the server ignores byte ranges, which sharded arrays need`);

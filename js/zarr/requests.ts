@@ -77,7 +77,8 @@ export class Requests implements AsyncReadable {
         if (error instanceof VesicleError) throw error;
         if (isPermanent(error)) throw new RefusedError('unavailable', `${key}: ${messageOf(error)}`);
         if (attempt >= this.#options.retries) {
-          throw new VesicleError('unavailable', `${key}: ${messageOf(error)}; ${attempt + 1} attempts`);
+          const attempts = attempt > 0 ? `; ${attempt + 1} attempts` : '';
+          throw new VesicleError('unavailable', `${key}: ${messageOf(error)}${attempts}`);
         }
       }
       await pause(FIRST_PAUSE_MS * 2 ** attempt, signal);

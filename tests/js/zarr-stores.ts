@@ -146,13 +146,14 @@ export async function serveImage(image: string): Promise<ImageServer> {
 
 function send(file: Uint8Array | undefined, { method, headers }: IncomingMessage, response: ServerResponse): void {
   if (!file) {
-    response.writeHead(404).end();
+    response.writeHead(404, { 'Access-Control-Allow-Origin': '*' }).end();
     return;
   }
   const [, from = '', to = ''] = /^bytes=(\d*)-(\d*)$/.exec(headers.range ?? '') ?? [];
   const start = from === '' && to !== '' ? Math.max(0, file.length - Number(to)) : Number(from);
   const end = from === '' || to === '' ? file.length : Number(to) + 1;
   const part = file.slice(start, end);
-  response.writeHead(headers.range ? 206 : 200, { 'Content-Length': part.length });
+  const sharing = { 'Access-Control-Allow-Origin': '*' };
+  response.writeHead(headers.range ? 206 : 200, { 'Content-Length': part.length, ...sharing });
   response.end(method === 'HEAD' ? undefined : part);
 }
