@@ -6,7 +6,7 @@
 //!
 //! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
 //! files to the bindings, `enrich` the interpolation of slices, `labels` label maps, the writers of volume files,
-//! voxelisation, and smoothing and transforms of meshes. All are on by default.
+//! voxelisation, and smoothing and transforms of meshes, `sparse` volumes larger than memory. All are on by default.
 
 #![cfg_attr(
     not(all(
@@ -16,7 +16,8 @@
         feature = "multires",
         feature = "import",
         feature = "enrich",
-        feature = "labels"
+        feature = "labels",
+        feature = "sparse"
     )),
     allow(
         dead_code,

@@ -19,7 +19,7 @@ use crate::methods::deformable::{
 
 /// The raw handle of a start surface, from which a deformable model begins.
 #[wasm_bindgen]
-pub struct RawStart(Start);
+pub struct RawStart(pub(super) Start);
 
 #[wasm_bindgen]
 impl RawStart {

@@ -95,6 +95,7 @@ impl From<MethodError> for Failure {
             MethodError::Volume(error) => error.into(),
             MethodError::TooManyVertices { .. } => Self::new("too-large", error.to_string()),
             MethodError::Singular { .. } => Self::new("singular-system", error.to_string()),
+            MethodError::NeedsData { .. } => Self::new("needs-data", error.to_string()),
             MethodError::BadState { .. } => Self::new("bad-file", error.to_string()),
             MethodError::InvalidArgument { .. } => Self::new("invalid-argument", error.to_string()),
         }

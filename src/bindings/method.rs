@@ -19,7 +19,11 @@ pub fn shared<M: Method>(model: Result<M, MethodError>) -> Result<Rc<RefCell<M>>
 
 /// Makes `iterations` steps; returns the `StepReport`. See `step` of [`method_bindings!`], as for the functions below.
 pub fn step(model: &RefCell<impl Method>, iterations: u32) -> Result<JsValue, Failure> {
-    to_js(&model.borrow_mut().steps(iterations)?)
+    match model.borrow_mut().steps(iterations) {
+        #[cfg(all(feature = "sparse", feature = "deformable"))]
+        Err(MethodError::NeedsData { needs }) => super::sparse::needs(&needs),
+        report => to_js(&report?),
+    }
 }
 
 /// Returns the parameters as a plain object.
@@ -51,7 +55,8 @@ macro_rules! method_bindings {
         #[wasm_bindgen]
         impl $Raw {
             /// Makes `iterations` steps, or fewer if the model is done before; returns the `StepReport` of the last
-            /// step, with the events of all these steps.
+            /// step, with the events of all these steps. If bricks of a sparse volume are missing for the first one, nothing
+            /// changes, and an object with the boxes it `needs` is returned.
             pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
                 Ok($crate::bindings::method::step(&self.0, iterations)?)
             }

@@ -29,6 +29,8 @@ mod method;
 mod multires;
 #[cfg(feature = "import")]
 mod readers;
+#[cfg(all(feature = "sparse", feature = "deformable"))]
+mod sparse;
 mod texture;
 #[cfg(feature = "tracking")]
 mod tracking;

@@ -179,7 +179,7 @@ fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
 
 /// Converts the sixteen numbers of a 4 × 4 matrix, column by column, to an affine transform; an error if the last row
 /// is not 0, 0, 0, 1.
-fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
+pub(super) fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
     let (columns, _) = affine.as_chunks::<4>();
     let last_row: Vec<f64> = columns.iter().map(|column| column[3]).collect();
     if last_row != [0.0, 0.0, 0.0, 1.0] {

@@ -1,7 +1,7 @@
 //! The error type of all methods.
 
 use crate::mesh::MeshError;
-use crate::volume::VolumeError;
+use crate::volume::{BrickBox, VolumeError};
 
 /// An error from setting up, stepping or restoring a method.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,6 +37,12 @@ pub enum MethodError {
         constraints: usize,
         /// The likely cause of the failure, and how to avoid it.
         cause: &'static str,
+    },
+    /// Bricks of a sparse volume are missing that the next step may read; nothing has changed.
+    #[error("needs voxels that are not loaded, in {} boxes", needs.len())]
+    NeedsData {
+        /// The boxes to insert into the volume, with a margin, so that this error is rare.
+        needs: Vec<BrickBox>,
     },
     /// The bytes from which a run should be restored are not a valid state of this model.
     #[error("saved state, {field}: {problem}")]

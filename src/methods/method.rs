@@ -53,7 +53,7 @@ pub trait Method: LiveSurface {
     fn restore(&mut self, state: &[u8]) -> Result<(), MethodError>;
 
     /// Makes `most` steps, at least one, or fewer if the method is done before; returns the report of the last one,
-    /// with the events of all.
+    /// with the events of all. Fewer steps are made, too, if one after the first needs voxels that are not loaded.
     ///
     /// # Errors
     /// That of the first step that is impossible; those before it are made.
@@ -64,7 +64,10 @@ pub trait Method: LiveSurface {
                 break;
             }
             let events = report.events;
-            report = self.step()?;
+            report = match self.step() {
+                Err(MethodError::NeedsData { .. }) => break,
+                next => next?,
+            };
             report.events += events;
         }
         Ok(report)

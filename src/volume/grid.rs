@@ -19,14 +19,32 @@ pub struct Grid {
 /// from memory is slow.
 #[derive(Clone, Copy, Debug)]
 pub struct CellCache {
-    base: usize,
+    key: u64,
     corners: [f32; 8],
+}
+
+impl CellCache {
+    /// Creates a cache of the values of a cell, given a number that no other cell has.
+    #[inline]
+    pub(super) fn new(key: u64, corners: [f32; 8]) -> Self {
+        Self { key, corners }
+    }
+
+    #[inline]
+    pub(super) fn is_at(&self, key: u64) -> bool {
+        self.key == key
+    }
+
+    #[inline]
+    pub(super) fn corners(&self) -> &[f32; 8] {
+        &self.corners
+    }
 }
 
 impl Default for CellCache {
     /// Returns an empty cache, which matches no cell.
     fn default() -> Self {
-        Self { base: usize::MAX, corners: [0.0; 8] }
+        Self { key: u64::MAX, corners: [0.0; 8] }
     }
 }
 
@@ -93,14 +111,11 @@ impl Grid {
     /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]
     pub fn sample_padded(&self, p: Vec3, padding: f32, cache: &mut CellCache) -> f32 {
-        let last = |n: usize| (n - 1) as f32;
-        let share = padding_weight(p.x, last(self.dims[0]))
-            * padding_weight(p.y, last(self.dims[1]))
-            * padding_weight(p.z, last(self.dims[2]));
+        let share = share_of_values(self.dims, p);
         if share > 0.0 {
             let cell = Cell::at(self.dims, p);
-            if cache.base != cell.base() {
-                *cache = CellCache { base: cell.base(), corners: cell.corners(|index| self.values[index]) };
+            if !cache.is_at(cell.base() as u64) {
+                *cache = CellCache::new(cell.base() as u64, cell.corners(|index| self.values[index]));
             }
             padding + share * (cell.blend(&cache.corners) - padding)
         } else {
@@ -206,6 +221,15 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
         );
         out.push(gradient * (1.0 / 32.0));
     }
+}
+
+/// Returns the weight of the values of a grid of `dims` voxels against those of its padding at a point, in voxel indices.
+#[inline]
+pub(super) fn share_of_values(dims: [usize; 3], p: Vec3) -> f32 {
+    let last = |n: usize| (n - 1) as f32;
+    padding_weight(p.x, last(dims[0]))
+        * padding_weight(p.y, last(dims[1]))
+        * padding_weight(p.z, last(dims[2]))
 }
 
 /// Returns the weight of a grid's values against those of its padding at coordinate `x` of one axis, in voxel indices:

@@ -23,6 +23,7 @@
 //! ```
 
 mod binning;
+mod bricks;
 mod contour;
 mod coverage;
 mod crop;
@@ -42,12 +43,14 @@ mod same_grid;
 mod sampling;
 mod sequence;
 mod slices;
+mod sparse;
 mod surface_extractor;
 mod threshold;
 mod unscaled;
 mod voxels;
 mod write;
 
+pub use bricks::{BRICK, BrickGrid, BrickId};
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use coverage::coverage;
 pub use enrich::Enrichment;
@@ -60,6 +63,8 @@ pub(crate) use labels::listed;
 pub use region::Region;
 pub use resample::{Interpolation, ResampleGrid};
 pub(crate) use sampling::trilinear;
+pub(crate) use sparse::merged;
+pub use sparse::{BrickBox, SparseInit, SparseLevel, SparseVolume};
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 
@@ -258,8 +263,7 @@ impl Volume {
     /// Returns the largest minus the smallest finite intensity over all frames, or 1 if they are equal, so that it is
     /// safe to divide by.
     pub fn span(&self) -> f64 {
-        let [low, high] = self.range;
-        if high > low { high - low } else { 1.0 }
+        span(self.range)
     }
 
     /// Returns all intensities of one frame, x fastest, then y, z.
@@ -310,13 +314,8 @@ impl Volume {
 
     /// Returns the map from stored values to intensities scaled from [`Self::range`] to [0, 1].
     fn normalisation(&self) -> impl Fn(f64) -> f64 + use<> {
-        let factor = 1.0 / self.span();
-        let (slope, intercept) = (self.slope * factor, (self.intercept - self.range[0]) * factor);
-        move |stored| {
-            let value = stored * slope + intercept;
-            // NaN fails the comparison and becomes 0.
-            if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
-        }
+        let normalisation = Normalisation::new([self.slope, self.intercept], self.range);
+        move |stored| normalisation.of(stored)
     }
 
     /// Returns the trilinearly interpolated intensity at a world point; outside the volume the border is replicated.
@@ -388,6 +387,34 @@ impl Volume {
     fn convert<T: Copy + Into<f64>>(&self, stored: &[T]) -> Result<Vec<f32>, VolumeError> {
         converted(stored, |v| self.finite(v * self.slope + self.intercept))
     }
+}
+
+/// The map from stored values to intensities scaled from a range to [0, 1].
+#[derive(Clone, Copy, Debug, Default)]
+struct Normalisation {
+    slope: f64,
+    intercept: f64,
+}
+
+impl Normalisation {
+    /// Creates the map for values whose intensity is slope × value + intercept.
+    fn new([slope, intercept]: [f64; 2], range: [f64; 2]) -> Self {
+        let factor = 1.0 / span(range);
+        Self { slope: slope * factor, intercept: (intercept - range[0]) * factor }
+    }
+
+    /// Returns the scaled intensity of a stored value, from 0 to 1.
+    #[inline]
+    fn of(&self, stored: f64) -> f64 {
+        let value = stored * self.slope + self.intercept;
+        // NaN fails the comparison and becomes 0.
+        if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
+    }
+}
+
+/// Returns the length of a range of intensities, or 1 if its ends are equal, so that it is safe to divide by.
+fn span([low, high]: [f64; 2]) -> f64 {
+    if high > low { high - low } else { 1.0 }
 }
 
 fn converted<T: Copy + Into<f64>>(

@@ -51,10 +51,18 @@ impl Cell {
     where
         T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
     {
-        let [fx, fy, fz] = self.fraction;
-        let along_x = |k: usize| mix(corners[k], corners[k + 1], fx);
-        mix(mix(along_x(0), along_x(2), fy), mix(along_x(4), along_x(6), fy), fz)
+        blend(self.fraction, corners)
     }
+}
+
+/// Interpolates between the eight values of a cell, x fastest, at a fractional position along each axis.
+#[inline]
+pub(super) fn blend<T>([fx, fy, fz]: [f32; 3], corners: &[T; 8]) -> T
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+{
+    let along_x = |k: usize| mix(corners[k], corners[k + 1], fx);
+    mix(mix(along_x(0), along_x(2), fy), mix(along_x(4), along_x(6), fy), fz)
 }
 
 #[inline]

@@ -4,6 +4,7 @@
 //! an edit reaches it. Before a pyramid level ends, the forces on all vertices are evaluated once, and vertices that
 //! have not settled wake.
 
+use crate::math::Bounds;
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
 /// The number of still iterations in a row, those in which a vertex is slower than [`stillness`], after which the
@@ -32,15 +33,19 @@ pub(super) struct Awake {
 
 impl Awake {
     /// Selects the vertices to process: those with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, counted by the
-    /// attribute `still`, or all vertices if `all` is set or the share of sleeping ones is below [`FEW_ASLEEP`].
-    pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
+    /// attribute `still`, or all vertices if `all` is set or the share of sleeping ones is below [`FEW_ASLEEP`]. With
+    /// `within`, vertices outside that box sleep in any case.
+    pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool, within: Option<Bounds>) {
         let still = mesh.scalar(still);
         self.moving.clear();
-        let awake = still.iter().enumerate().filter(|(_, still)| **still < ITERATIONS_TO_SLEEP);
-        self.moving.extend(awake.map(|(i, _)| VertexId::from_index(i)).filter(|&v| mesh.is_live(v)));
+        let is_awake = |v: &VertexId| {
+            (still[v.index()] < ITERATIONS_TO_SLEEP || all && within.is_some())
+                && within.is_none_or(|bounds| bounds.contains(mesh.position(*v)))
+        };
+        self.moving.extend(mesh.vertices().filter(is_awake));
         self.with_neighbours.clear();
         let asleep = mesh.vertex_count() - self.moving.len();
-        if all || (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64 {
+        if within.is_none() && (all || (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64) {
             self.moving.clear();
             self.moving.extend(mesh.vertices());
             self.with_neighbours.extend_from_slice(&self.moving);
@@ -79,7 +84,7 @@ mod tests {
         let tip = mesh.vertices().last().unwrap();
         mesh.scalar_mut(still)[tip.index()] = ITERATIONS_TO_SLEEP - 1.0;
         let mut awake = Awake::default();
-        awake.find(&mesh, still, false);
+        awake.find(&mesh, still, false, None);
         assert_eq!(awake.moving, [tip]);
         let mut expected = mesh.ring(tip).as_slice().to_vec();
         expected.push(tip);
@@ -95,15 +100,15 @@ mod tests {
         let few = mesh.vertex_count() / 5;
         mesh.scalar_mut(still)[..few].fill(ITERATIONS_TO_SLEEP);
         let mut awake = Awake::default();
-        awake.find(&mesh, still, false);
+        awake.find(&mesh, still, false, None);
         assert_eq!(
             (awake.moving.len(), awake.with_neighbours.len()),
             (mesh.vertex_count(), mesh.vertex_count())
         );
         mesh.scalar_mut(still)[..2 * few].fill(ITERATIONS_TO_SLEEP);
-        awake.find(&mesh, still, false);
+        awake.find(&mesh, still, false, None);
         assert_eq!(awake.moving.len(), mesh.vertex_count() - 2 * few);
-        awake.find(&mesh, still, true);
+        awake.find(&mesh, still, true, None);
         assert_eq!(
             (awake.moving.len(), awake.with_neighbours.len()),
             (mesh.vertex_count(), mesh.vertex_count())

@@ -82,14 +82,33 @@ pub(super) fn gain(
     level: usize,
     [iso, delta]: [f32; 2],
 ) -> f32 {
-    if params.adapts_to_image() && params.integrator == Integrator::Implicit {
-        let steepness = pyramid.levels[level].median_steepness(iso);
+    let image = &pyramid.levels[level];
+    if is_measured_by_median(params) {
+        return factor(params, level, delta, &|| image.median_steepness(iso));
+    }
+    factor(params, level, delta, &|| image.steepness(iso))
+}
+
+/// Returns whether the factor on α_I depends on the median of the steepness of the image, not on its root mean square.
+fn is_measured_by_median(params: &DeformableParams) -> bool {
+    params.adapts_to_image() && params.integrator == Integrator::Implicit
+}
+
+/// Returns the factor of [`gain`] for an image of the given steepness, which is measured only if it matters.
+pub(super) fn factor(
+    params: &DeformableParams,
+    level: usize,
+    delta: f32,
+    steepness: &dyn Fn() -> f32,
+) -> f32 {
+    if is_measured_by_median(params) {
+        let steepness = steepness();
         return if steepness > 0.0 { (MIN_STEEPNESS / steepness).clamp(1.0, MAX_AMPLIFICATION) } else { 1.0 };
     }
     if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
         return 1.0;
     }
-    let stiffness = params.iso_force.abs() as f32 * delta * pyramid.levels[level].steepness(iso);
+    let stiffness = params.iso_force.abs() as f32 * delta * steepness();
     let by_stiffness = MAX_STIFFNESS * (params.mass / (params.time_step * params.time_step)) as f32;
     let by_rigidity = params.rigidity as f32 / MIN_RIGIDITY;
     [by_stiffness / stiffness, by_rigidity].into_iter().fold(MAX_GAIN, f32::min).max(1.0)

@@ -6,7 +6,7 @@
 use crate::math::Vec3;
 use crate::math::order::median;
 use crate::methods::MethodError;
-use crate::volume::{CellCache, Grid, Region, VectorGrid, Volume};
+use crate::volume::{BrickGrid, CellCache, Grid, Region, SparseVolume, VectorGrid, Volume};
 
 /// The reduction factor ρ = √3: δ and the shortest side of a voxel grow by it with each level of the pyramid. It is
 /// that of √3 refinement, by which the mesh gets finer (15).
@@ -19,7 +19,10 @@ pub(super) const MAX_NORMALISED: f64 = 100.0;
 /// One level of the image pyramid, sampled at positions in model space.
 #[derive(Clone, Debug)]
 pub(super) struct LevelImage {
+    /// The intensities of the level; without values if the level is sparse.
     grid: Grid,
+    /// The loaded bricks of a sparse level, while the model computes; between its steps the volume has them.
+    pub(super) bricks: Option<BrickGrid>,
     gradient: Option<VectorGrid>,
     /// Maps positions in model space to this level, together with `offset`: voxel index = position · scale + offset.
     scale: Vec3,
@@ -29,7 +32,12 @@ pub(super) struct LevelImage {
 impl LevelImage {
     fn new(grid: Grid, finest: [usize; 3]) -> Self {
         let scale = Vec3::from([0, 1, 2].map(|axis| grid.dims[axis] as f32 / finest[axis] as f32));
-        Self { grid, gradient: None, scale, offset: (scale - Vec3::ONE) * 0.5 }
+        Self { grid, bricks: None, gradient: None, scale, offset: (scale - Vec3::ONE) * 0.5 }
+    }
+
+    /// Returns the length of the side of a cube with the volume of a voxel of this level, in model units.
+    pub(super) fn side(&self) -> f64 {
+        1.0 / libm::cbrt(self.scale.as_dvec3().element_product())
     }
 
     #[inline]
@@ -42,7 +50,10 @@ impl LevelImage {
     /// the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
-        self.grid.sample_padded(self.index(p), background, known)
+        match &self.bricks {
+            None => self.grid.sample_padded(self.index(p), background, known),
+            Some(bricks) => bricks.sample_padded(self.index(p), background, known),
+        }
     }
 
     /// Returns ∇Π, the gradient of the intensity by the Sobel operator, at a position in model space, for the gradient
@@ -141,6 +152,11 @@ impl LevelImage {
         self.scale.max_element()
     }
 
+    /// Returns the number of voxels of this level per model unit, along each axis.
+    pub(super) fn scale(&self) -> Vec3 {
+        self.scale
+    }
+
     /// Returns the grid of this level, and a map from its voxel indices to model space.
     pub(super) fn grid(&self) -> (&Grid, impl Fn(Vec3) -> Vec3) {
         (&self.grid, |index| (index - self.offset) / self.scale)
@@ -155,8 +171,18 @@ pub(super) struct Pyramid {
     spacing: [f64; 3],
     low: f64,
     range: f64,
-    /// The sum of the hashes of all voxels of the finest level, by which a saved state is matched to its volume.
+    /// The sum of the hashes of all voxels of the finest level, or of the coarsest of a sparse volume, by which a saved
+    /// state is matched to its volume.
     hash: u64,
+    pub(super) sparse: Option<SparseLevels>,
+}
+
+/// The levels of a sparse volume that a pyramid has: all but the finest ones.
+#[derive(Clone, Debug)]
+pub(super) struct SparseLevels {
+    pub(super) volume: SparseVolume,
+    /// The index of the pyramid's finest level in the volume.
+    pub(super) finest: usize,
 }
 
 impl Pyramid {
@@ -184,9 +210,53 @@ impl Pyramid {
         }
         levels.push(LevelImage::new(grid, volume.dims()));
         let spacing = volume.spacing();
-        let mut pyramid = Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash: 0 };
-        pyramid.hash = pyramid.hash_of(Region { min: [0; 3], dims: volume.dims() });
-        Ok(pyramid)
+        let hash = hash_of(&levels[0].grid, Region { min: [0; 3], dims: volume.dims() });
+        Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse: None })
+    }
+
+    /// Makes the pyramid of a sparse volume from its level `finest` on, the coarsest level whole.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if there is no such level; [`MethodError::NeedsData`] unless the coarsest level
+    /// is loaded whole; [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn of_sparse(volume: &SparseVolume, finest: usize) -> Result<Self, MethodError> {
+        let all = volume.levels();
+        let Some(&first) = all.get(finest) else {
+            return Err(MethodError::invalid("finest", format!("must be below {}, got {finest}", all.len())));
+        };
+        let last = all.len() - 1;
+        let Some(coarsest) = volume.whole(last)? else {
+            return Err(MethodError::NeedsData { needs: volume.missing(last)? });
+        };
+        let hash = hash_of(&coarsest, Region { min: [0; 3], dims: coarsest.dims });
+        let mut levels = Vec::with_capacity(all.len() - finest);
+        for level in &all[finest..] {
+            let map = level.affine.inverse() * first.affine;
+            let [x, y, z] = [map.matrix3.x_axis.x, map.matrix3.y_axis.y, map.matrix3.z_axis.z];
+            levels.push(LevelImage {
+                grid: Grid { dims: level.dims, values: Vec::new() },
+                bricks: Some(BrickGrid::default()),
+                gradient: None,
+                scale: Vec3::new(x as f32, y as f32, z as f32),
+                offset: map.translation.as_vec3(),
+            });
+        }
+        if let Some(level) = levels.last_mut() {
+            *level = LevelImage { grid: coarsest, bricks: None, ..level.clone() };
+        }
+        let sparse = Some(SparseLevels { volume: volume.clone(), finest });
+        let axes = first.affine.matrix3;
+        let spacing = [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()];
+        Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse })
+    }
+
+    /// Returns δ, the lower bound of the edge length, on a level in voxels of the finest level; it grows by
+    /// [`REDUCTION`] with each level (15), or, in a sparse volume, with the size of the level's voxels.
+    pub(super) fn delta_at(&self, finest: f64, level: usize) -> f32 {
+        if self.sparse.is_some() {
+            return (finest * self.levels[level].side()) as f32;
+        }
+        (0..level).fold(finest, |delta, _| delta * REDUCTION) as f32
     }
 
     /// Returns the smallest box around the voxels of a region at which `new`, intensities for the region, differs from
@@ -218,9 +288,9 @@ impl Pyramid {
     /// # Errors
     /// [`MethodError::Volume`] if memory does not suffice; part of the levels is out of date then.
     pub(super) fn update(&mut self, region: Region, new: &Grid) -> Result<(), MethodError> {
-        let before = self.hash_of(region);
+        let before = hash_of(&self.levels[0].grid, region);
         self.levels[0].grid.overwrite(region, new);
-        self.hash = self.hash.wrapping_sub(before).wrapping_add(self.hash_of(region));
+        self.hash = self.hash.wrapping_sub(before).wrapping_add(hash_of(&self.levels[0].grid, region));
         self.levels[0].update_gradient(region)?;
         let (mut changed, mut spacing) = (region, self.spacing);
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
@@ -237,15 +307,8 @@ impl Pyramid {
         Ok(())
     }
 
-    /// Returns the sum of the hashes of the voxels of the finest level in a region.
-    fn hash_of(&self, region: Region) -> u64 {
-        let grid = &self.levels[0].grid;
-        let rows = region.rows(grid.dims, 0);
-        let voxels = rows.flat_map(|row| row.clone().zip(&grid.values[row]));
-        voxels.fold(0, |sum, (k, value)| sum.wrapping_add(hash_of_voxel(k, *value)))
-    }
-
-    /// Returns the sum of the hashes of all voxels of the finest level, for the fingerprint of a saved state.
+    /// Returns the sum of the hashes of all voxels of the finest level, or of the coarsest of a sparse volume, for the
+    /// fingerprint of a saved state.
     pub(super) fn hash(&self) -> u64 {
         self.hash
     }
@@ -266,10 +329,22 @@ impl Pyramid {
         [self.low, self.range]
     }
 
+    /// Returns the spacing of the finest level in world units.
+    pub(super) fn spacing(&self) -> [f64; 3] {
+        self.spacing
+    }
+
     /// Returns the dimensions of the finest level in voxels.
     pub(super) fn dims(&self) -> [usize; 3] {
         self.levels[0].grid.dims
     }
+}
+
+/// Returns the sum of the hashes of the voxels of a grid in a region.
+fn hash_of(grid: &Grid, region: Region) -> u64 {
+    let rows = region.rows(grid.dims, 0);
+    let voxels = rows.flat_map(|row| row.clone().zip(&grid.values[row]));
+    voxels.fold(0, |sum, (k, value)| sum.wrapping_add(hash_of_voxel(k, *value)))
 }
 
 /// Returns the hash of one voxel, given its index in the grid and its intensity. The hashes of an image are added up, so

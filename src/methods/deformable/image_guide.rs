@@ -7,7 +7,7 @@
 use super::DeformableParams;
 use super::contour::ObjectIs;
 use super::image::LevelImage;
-use crate::math::Vec3;
+use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{TopologyGuide, Unguided};
 use crate::volume::CellCache;
@@ -38,11 +38,18 @@ pub(super) struct ImageGuide<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) iso: f32,
     pub(super) object: ObjectIs,
+    /// The box outside of which nothing is changed, since the image is not loaded there.
+    within: Option<Bounds>,
 }
 
 impl<'a> ImageGuide<'a> {
     pub(super) fn new(image: &'a LevelImage, iso: f32, params: &DeformableParams) -> Self {
-        Self { image, iso, object: ObjectIs::by(params) }
+        Self { image, iso, object: ObjectIs::by(params), within: None }
+    }
+
+    /// Returns whether the image is followed at all of some vertices.
+    fn follows(&self, mesh: &Mesh, vertices: &[VertexId]) -> bool {
+        self.within.is_none_or(|bounds| vertices.iter().all(|&v| bounds.contains(mesh.position(v))))
     }
 
     fn depth(&self, p: Vec3) -> f32 {
@@ -81,7 +88,20 @@ pub(super) fn guide<'a>(
     iso: f32,
     params: &DeformableParams,
 ) -> Box<dyn TopologyGuide + 'a> {
-    if params.adapts_to_image() { Box::new(ImageGuide::new(image, iso, params)) } else { Box::new(Unguided) }
+    guide_within(image, iso, params, None)
+}
+
+/// Returns the rule of [`guide`] for a surface that follows the image only in a box.
+pub(super) fn guide_within<'a>(
+    image: &'a LevelImage,
+    iso: f32,
+    params: &DeformableParams,
+    within: Option<Bounds>,
+) -> Box<dyn TopologyGuide + 'a> {
+    if !params.adapts_to_image() {
+        return Box::new(Unguided);
+    }
+    Box::new(ImageGuide { within, ..ImageGuide::new(image, iso, params) })
 }
 
 impl TopologyGuide for ImageGuide<'_> {
@@ -89,6 +109,9 @@ impl TopologyGuide for ImageGuide<'_> {
     /// if all samples in between are object; and across a wall, where their inward sides do, if all are background. Two
     /// vertices that do not face each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
+        if !self.follows(mesh, &[u, v]) {
+            return false;
+        }
         let (p, offset) = (mesh.position(u), mesh.position(v) - mesh.position(u));
         let [m, n] = [u, v].map(|w| offset.normalize_or_zero().dot(mesh.unit_normal(w)));
         let is_gap = match (m, n) {
@@ -102,6 +125,9 @@ impl TopologyGuide for ImageGuide<'_> {
     /// Allows a cut along the cycle of edges `ring` through a strand if its middle is background, and through a tunnel
     /// if its middle is object.
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
+        if !self.follows(mesh, &ring) {
+            return false;
+        }
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
         let outwards: f32 = (0..3).map(|k| mesh.unit_normal(ring[k]).dot(corners[k] - middle)).sum();
@@ -112,6 +138,9 @@ impl TopologyGuide for ImageGuide<'_> {
     /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
     /// sheets would merge there, and at a rim the next pair of vertices would follow.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
+        if !self.follows(mesh, &[u, v]) {
+            return false;
+        }
         let [m, n] = [u, v].map(|w| mesh.unit_normal(w));
         if m.dot(n) >= -FACING {
             return true;
@@ -122,6 +151,9 @@ impl TopologyGuide for ImageGuide<'_> {
     }
 
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool {
+        if !self.follows(mesh, members) {
+            return true;
+        }
         let side = if is_solid { -SAMPLE_DEPTH } else { SAMPLE_DEPTH };
         let sample_point = |&w: &VertexId| mesh.position(w) + mesh.unit_normal(w) * side;
         let depth: f32 = members.iter().map(|w| self.depth(sample_point(w))).sum();

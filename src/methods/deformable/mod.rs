@@ -58,11 +58,13 @@ mod renewal;
 mod schedule;
 mod seeds;
 mod sizes;
+mod sparse;
 mod start;
 mod state;
 
 pub use coverage::{Coverage, CoverageSurvey, Missing, UncoveredRegion};
 pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology};
+pub use sparse::{SparseOptions, WorldBox};
 pub use start::Start;
 
 use super::method::method;
@@ -77,6 +79,7 @@ use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
 use motion::{Motion, MotionContext, SpeedSummary};
 use schedule::Convergence;
+use sparse::Follow;
 use start::{StartContext, contour_mesh};
 use std::ops::RangeInclusive;
 
@@ -161,6 +164,14 @@ struct Keys {
     size: ScalarKey,
 }
 
+/// What a model begins with, whatever its image.
+struct Origin {
+    frame: usize,
+    start: Start,
+    edge: Option<f64>,
+    params: DeformableParams,
+}
+
 /// A closed mesh that evolves in an image under internal and external forces and changes its topology automatically.
 #[derive(Clone, Debug)]
 pub struct DeformableModel {
@@ -182,6 +193,10 @@ pub struct DeformableModel {
     /// The factor by which α_I, the strength of the image force, is multiplied at the beginning of the current pyramid
     /// level; it decays with the explicit integrators.
     image_force_factor: f32,
+    /// Whether [`Self::image_force_factor`] is still to be measured at the vertices, on a sparse level that has just begun.
+    needs_factor: bool,
+    /// The part of the surface that finer levels of a sparse volume follow; all of it if `None`.
+    follow: Option<Follow>,
     mesh: Mesh,
     keys: Keys,
     resolver: Resolver,
@@ -222,32 +237,40 @@ impl DeformableModel {
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
-        let voxel = libm::cbrt(volume.affine().matrix3.determinant().abs());
-        let finest_delta = finest_delta(options.edge, voxel)?;
         let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
-        let delta = delta_at(finest_delta, options.levels);
-        let domain = Domain::new(volume.dims(), delta);
+        let origin = Origin { frame: options.frame, start: options.start, edge: options.edge, params };
+        Self::from_pyramid(pyramid, volume.affine(), origin)
+    }
+
+    fn from_pyramid(pyramid: Pyramid, to_world: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+        let Origin { frame, start, edge, params } = origin;
+        let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
+        let finest_delta = finest_delta(edge, voxel)?;
+        let level = pyramid.levels.len() - 1;
+        let delta = pyramid.delta_at(finest_delta, level);
+        let domain = Domain::new(pyramid.dims(), delta);
+        let seeds = pyramid.sparse.is_none() && params.seeding != Seeding::Off;
         let context = StartContext {
-            image: &pyramid.levels[options.levels],
-            brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, options.levels)),
+            image: &pyramid.levels[level],
+            brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
             iso: pyramid.normalised(params.iso),
             object: ObjectIs::by(&params),
             smallest_part: params.smallest_part,
-            dims: volume.dims(),
+            dims: pyramid.dims(),
             domain,
-            from_world: volume.inverse_affine(),
-            spacing: volume.spacing(),
+            from_world: to_world.inverse(),
+            spacing: pyramid.spacing(),
             sampling: Sampling::new(delta),
-            may_be_empty: params.adapts_to_image() && params.seeding != Seeding::Off,
+            may_be_empty: params.adapts_to_image() && seeds,
         };
-        let from_contour = options.start == Start::Contour;
+        let from_contour = start == Start::Contour;
         let contour = if from_contour { contour_mesh(&context)? } else { None };
         let begins_on_contour = contour.is_some();
         let mut mesh = match contour {
             Some(mesh) => mesh,
             None => {
                 let guide = image_guide::guide(context.image, context.iso, &params);
-                options.start.make(&context, |value| pyramid.normalised(value), &*guide)?
+                start.make(&context, |value| pyramid.normalised(value), &*guide)?
             }
         };
         let keys = Keys {
@@ -259,21 +282,23 @@ impl DeformableModel {
             size: mesh.add_scalar(),
         };
         let mut model = Self {
-            to_world: volume.affine(),
-            frame: options.frame,
-            pyramid,
+            to_world,
+            frame,
             domain,
             voxel,
             params,
             attractors: Vec::new(),
             from_contour,
             finest_delta,
-            level: options.levels,
+            level,
             level_iso: 0.0,
             image_force_factor: 1.0,
+            needs_factor: false,
             mesh,
             keys,
-            resolver: Resolver::with_max_vertices(domain.most_vertices(delta_at(finest_delta, 0))),
+            resolver: Resolver::with_max_vertices(domain.most_vertices(pyramid.delta_at(finest_delta, 0))),
+            pyramid,
+            follow: None,
             motion: Motion::default(),
             iteration: 0,
             convergence: Convergence::default(),
@@ -301,10 +326,15 @@ impl DeformableModel {
     /// Once the finest level has converged, calls change nothing and report `done`.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`] if the surface grows without bound. It remains valid, but some edges are too
+    /// [`MethodError::NeedsData`] if bricks of a sparse volume are missing; nothing has changed then, so that the results
+    /// do not depend on when bricks arrive. [`MethodError::TooManyVertices`] if the surface grows without bound. It remains valid, but some edges are too
     /// long; other parameters may reduce it again. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        if self.pyramid.sparse.is_some() { self.step_if_loaded() } else { self.iterate() }
+    }
+
+    fn iterate(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
@@ -325,8 +355,11 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
+        if std::mem::take(&mut self.needs_factor) {
+            self.image_force_factor = self.measured_factor();
+        }
         let examine_all = std::mem::take(&mut self.convergence.examine_next);
-        self.motion.prepare(&self.mesh, self.keys, examine_all);
+        self.motion.prepare(&self.mesh, self.keys, examine_all, self.followed_bounds());
         let normals = (self.clock)();
         let delta = self.model_delta();
         let attractors = self.local_attractors();
@@ -375,7 +408,7 @@ impl DeformableModel {
         let moving = self.motion.awake.moving.iter().copied();
         let mut active: Vec<VertexId> = moving.filter(|&v| travelled(v) > limit * limit).collect();
         let in_turn = (turn..self.mesh.slots()).step_by(CHECK_PERIOD).map(VertexId::from_index);
-        active.extend(in_turn.filter(|&v| self.mesh.is_live(v) && travelled(v) > 0.0));
+        active.extend(in_turn.filter(|&v| self.mesh.is_live(v) && travelled(v) > 0.0 && self.follows(v)));
         let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
         active.iter().for_each(|v| checked[v.index()] = positions[v.index()]);
         active
@@ -388,7 +421,8 @@ impl DeformableModel {
         let sampling = self.sampling();
         let changes = {
             let image = &self.pyramid.levels[self.level];
-            let guide = image_guide::guide(image, self.level_iso, &self.params);
+            let guide =
+                image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
             self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
         };
         let since_edit = self.mesh.scalar_mut(self.keys.since_edit);
@@ -413,6 +447,7 @@ impl DeformableModel {
     /// added; the parameter `seeding` decides.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
+            _ if self.pyramid.sparse.is_some() => false,
             Seeding::Auto => self.from_contour,
             Seeding::On => true,
             Seeding::Off => false,
@@ -470,6 +505,9 @@ impl DeformableModel {
     /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         params.validate()?;
+        if self.pyramid.sparse.is_some() {
+            sparse::check_params(&params)?;
+        }
         let before = std::mem::replace(&mut self.params, params);
         if let Err(error) = self.prepare_level() {
             self.params = before;
@@ -524,7 +562,12 @@ impl DeformableModel {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
         self.motion.forces.forget_image();
-        self.level_iso = if self.seeds_levels() {
+        self.needs_factor = self.pyramid.levels[self.level].bricks.is_some();
+        if self.needs_factor {
+            self.level_iso = self.pyramid.normalised(self.params.iso);
+            return Ok(());
+        }
+        self.level_iso = if self.seeds_levels() || self.pyramid.sparse.is_some() {
             self.pyramid.normalised(self.params.iso)
         } else {
             coarse::iso(&self.pyramid, &self.params, self.level)
@@ -546,7 +589,7 @@ impl DeformableModel {
     }
 
     fn model_delta(&self) -> f32 {
-        delta_at(self.finest_delta, self.level)
+        self.pyramid.delta_at(self.finest_delta, self.level)
     }
 
     /// The mesh in model space, the index space of the volume, where voxels are unit cubes.
@@ -593,10 +636,4 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
         "edge",
         format!("must be from {low:.3} to {high:.3} for these voxels, got {edge}"),
     ))
-}
-
-/// Returns δ, the lower bound of the edge length, on a pyramid level in voxels of the finest level; it grows by
-/// [`image::REDUCTION`] with each level (15).
-fn delta_at(finest: f64, level: usize) -> f32 {
-    (0..level).fold(finest, |delta, _| delta * image::REDUCTION) as f32
 }

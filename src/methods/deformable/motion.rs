@@ -5,7 +5,7 @@ use super::awake::{Awake, ITERATIONS_TO_SLEEP, stillness};
 use super::domain::Domain;
 use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
-use crate::math::{Vec3, higher};
+use crate::math::{Bounds, Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
 /// The speed of the mesh in one iteration, by which convergence is judged.
@@ -73,10 +73,10 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Selects the vertices that [`Self::advance`] will process, those awake or all if `examine_all`, and computes
-    /// normals and Laplacians of these and of their neighbours.
-    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool) {
-        self.awake.find(mesh, keys.still_iterations, examine_all);
+    /// Selects the vertices that [`Self::advance`] will process, those awake or all if `examine_all`, only those in the
+    /// box `within` if there is one, and computes normals and Laplacians of these and of their neighbours.
+    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool, within: Option<Bounds>) {
+        self.awake.find(mesh, keys.still_iterations, examine_all, within);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }

@@ -228,7 +228,11 @@ choices! {
 impl DeformableParams {
     /// Returns the default parameters, with `iso` halfway between the least and the largest intensity of the volume.
     pub fn for_volume(volume: &Volume) -> Self {
-        let [low, high] = volume.range();
+        Self::for_range(volume.range())
+    }
+
+    /// Returns the default parameters, with `iso` halfway between the ends of a range of intensities.
+    pub fn for_range([low, high]: [f64; 2]) -> Self {
         Self { iso: 0.5 * (low + high), ..Self::default() }
     }
 

@@ -44,7 +44,7 @@ impl DeformableModel {
         if added.triangles.is_empty() {
             return Ok(Renewal::default());
         }
-        let added = simplified(added, image, super::delta_at(self.finest_delta, level));
+        let added = simplified(added, image, self.pyramid.delta_at(self.finest_delta, level));
         Ok(Renewal { removed, added: Mesh::from_triangles(&added)? })
     }
 

@@ -36,10 +36,10 @@ const SETTLED_DISPLACEMENT: f32 = 0.1;
 /// The state of convergence on the current pyramid level, which decides when the level ends; part of a saved run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Convergence {
-    quiet: u32,
+    pub(super) quiet: u32,
     /// Whether the forces on all vertices, asleep or not, have been evaluated once since the surface was first quiet on
     /// this level, or since parts were seeded; a level ends only after that.
-    was_examined: bool,
+    pub(super) was_examined: bool,
     /// Whether the next iteration examines all vertices, asleep or not: it evaluates the forces on them, and wakes
     /// those that have not settled.
     pub(super) examine_next: bool,
@@ -95,7 +95,9 @@ impl DeformableModel {
     /// Returns the mean kinetic energy of the vertices along their normals, by which convergence is judged: of all
     /// vertices, or of those that refreshes have added or woken if the others had settled.
     pub(super) fn energy(&self) -> f64 {
-        let (all, some) = (self.mesh.vertex_count() as f64, f64::from(self.convergence.refreshed));
+        let (all, refreshed) = (self.mesh.vertex_count() as f64, f64::from(self.convergence.refreshed));
+        let some =
+            if self.followed_bounds().is_some() { self.followed_vertices().len() as f64 } else { refreshed };
         let is_local = some > 0.0 && some < all;
         if is_local { self.speed.energy * (all / some) } else { self.speed.energy }
     }
@@ -177,7 +179,7 @@ impl DeformableModel {
     /// Returns the number of quiet iterations in a row, those with energy and speed below their bounds, after which a
     /// level has converged: at least as many as the response time m/γ takes, but at most [`MAX_QUIET_ITERATIONS`]. A
     /// surface that has just begun to move is slow, too, without having converged.
-    fn quiet_iterations(&self) -> u32 {
+    pub(super) fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let is_settled = integrator == Integrator::Implicit && !self.convergence.began_on_contour;
         let least = if is_settled { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
@@ -190,10 +192,11 @@ impl DeformableModel {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
         }
-        let all: Vec<VertexId> = self.mesh.vertices().collect();
+        let all = self.followed_vertices();
         let mut changes = self.restore_bounds(&all, times);
         let sampling = self.sampling();
-        let guide = image_guide::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
+        let image = &self.pyramid.levels[self.level];
+        let guide = image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
         changes.vanished += self.resolver.remove_negligible(&mut self.mesh, sampling, &*guide);
         drop(guide);
         self.mark_checked();
@@ -268,15 +271,17 @@ impl DeformableModel {
     }
 
     fn descend_refined(&mut self) -> Result<(), MethodError> {
+        let before = self.model_delta();
         self.refine()?;
         self.level -= 1;
+        self.begin_sizes(before / self.model_delta());
         self.convergence.began = self.iteration;
         self.wake_all();
         self.prepare_level()
     }
 
     fn refine(&mut self) -> Result<(), MethodError> {
-        if self.params.topology == Topology::Adaptive {
+        for _ in 0..self.refinements() {
             let most = self.resolver.max_vertices();
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
                 return Err(MethodError::TooManyVertices { most });

@@ -27,7 +27,7 @@ const MIN_SAGITTA: f32 = 0.05;
 /// The smallest size of a vertex, a local factor on δ, if the parameter `adaptivity` is 1.
 const SMALLEST: f32 = 0.7;
 /// The largest size of a vertex, a local factor on δ, if the parameter `adaptivity` is 1.
-const LARGEST: f32 = 1.6;
+pub(super) const LARGEST: f32 = 1.6;
 
 /// The largest difference of size, a local factor on δ, between the ends of an edge of length [`MEAN_EDGE`] δ, and in
 /// proportion for shorter and longer edges; with this, sampling remains isotropic.
@@ -57,7 +57,7 @@ impl DeformableModel {
             return false;
         }
         self.convergence.sized = true;
-        let all: Vec<VertexId> = self.mesh.vertices().collect();
+        let all = self.followed_vertices();
         self.set_sizes_of(&all);
         true
     }

@@ -3,7 +3,7 @@
 use super::domain::Domain;
 use super::motion::SpeedSummary;
 use super::schedule::Convergence;
-use super::{Attractor, DeformableModel, DeformableParams, coarse, delta_at, image};
+use super::{Attractor, DeformableModel, DeformableParams, coarse, image};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, encode};
@@ -125,7 +125,7 @@ impl DeformableModel {
     }
 
     fn domain_for(&self, finest_delta: f64) -> Domain {
-        let coarsest = delta_at(finest_delta, self.pyramid.levels.len() - 1);
+        let coarsest = self.pyramid.delta_at(finest_delta, self.pyramid.levels.len() - 1);
         Domain::new(self.pyramid.dims(), coarsest)
     }
 
@@ -139,8 +139,8 @@ impl DeformableModel {
         next.domain = self.domain_for(state.finest_delta);
         next.mesh = state.mesh;
         next.mesh.advance_versions_past(&self.mesh);
-        next.resolver =
-            Resolver::with_max_vertices(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
+        let finest = next.pyramid.delta_at(state.finest_delta, 0);
+        next.resolver = Resolver::with_max_vertices(next.domain.most_vertices(finest));
         next.watch_output();
         next.resolver.set_pending(state.waiting);
         next.iteration = state.iteration;

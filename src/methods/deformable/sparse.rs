@@ -1,0 +1,390 @@
+//! The model on a volume that is larger than memory, of which only the bricks around the surface are loaded.
+//!
+//! A step asks for the bricks that it may read before it begins ([`MethodError::NeedsData`]). If it reads a missing one
+//! after all, it is undone and asks for that. So no missing voxel is ever replaced by a number, and the surface has the
+//! same bits in whatever order bricks arrive, as if all were there.
+//!
+//! What is computed over a whole level of other volumes comes from the coarsest level, which is loaded whole (the start,
+//! the range), or is sampled at the vertices (the steepness of the image). Parts that the coarsest level does not show
+//! are not found: finer levels are not searched.
+
+use super::awake::ITERATIONS_TO_SLEEP;
+use super::contour::ObjectIs;
+use super::image::{LevelImage, Pyramid, REDUCTION, SparseLevels};
+use super::motion::SpeedSummary;
+use super::schedule::Convergence;
+use super::sizes::LARGEST;
+use super::{DeformableModel, DeformableParams, Origin, Seeding, Start, Topology, coarse};
+use crate::math::order::{median, sort_ranks};
+use crate::math::{Bounds, DVec3, Vec3};
+use crate::mesh::{Mesh, VertexId};
+use crate::methods::{MethodError, StepReport};
+use crate::remesh::{Changes, Pending};
+use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
+
+/// The distance from a vertex, in δ, within which the bricks of a level are loaded before a step: the vertex moves by at
+/// most half a δ, and thin walls are searched for up to 2.3 δ away. A step that reads beyond it is undone and repeated,
+/// which costs time only.
+const REACH: f32 = 2.5;
+
+/// The distance beyond [`REACH`], in δ, up to which missing bricks are asked for when one within it is missing, so that
+/// asking is rare. With more, more bricks are loaded that the surface never reaches.
+const MARGIN: f32 = 1.0;
+
+/// The largest ratio of the loaded bricks of a level to those near the surface; above it the others are dropped.
+const MOST_SPARE: usize = 2;
+
+/// Options for creating a [`DeformableModel`] on a sparse volume.
+#[derive(Clone, Debug)]
+pub struct SparseOptions {
+    /// The surface from which the run starts, on the coarsest level.
+    pub start: Start,
+    /// The level of the volume at which the run ends; its voxel indices are the model's space.
+    pub finest: usize,
+    /// The mean edge length on level `finest`, as in [`super::DeformableOptions::edge`].
+    pub edge: Option<f64>,
+    /// The parameters of the model; by default [`DeformableParams::for_range`] of the volume's range.
+    pub params: Option<DeformableParams>,
+    /// The box in which finer levels are followed; outside of it the surface stays as it was on level
+    /// [`Self::whole`]. By default they are followed everywhere.
+    pub within: Option<WorldBox>,
+    /// The finest level that is followed everywhere if there is a box; by default the coarsest.
+    pub whole: Option<usize>,
+}
+
+impl Default for SparseOptions {
+    fn default() -> Self {
+        Self { start: Start::Contour, finest: 0, edge: None, params: None, within: None, whole: None }
+    }
+}
+
+/// A box in world space, along its axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldBox {
+    /// Corner with the smallest coordinates.
+    pub min: DVec3,
+    /// Corner with the largest coordinates.
+    pub max: DVec3,
+}
+
+/// The part of the surface that finer levels follow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Follow {
+    /// The box, in model space.
+    bounds: Bounds,
+    /// The finest level of the pyramid that is followed everywhere.
+    whole: usize,
+}
+
+/// The state before a step, to which it is undone if a brick was missing.
+struct Before {
+    mesh: Mesh,
+    waiting: Pending,
+    level: usize,
+    level_iso: f32,
+    image_force_factor: f32,
+    needs_factor: bool,
+    iteration: u32,
+    convergence: Convergence,
+    speed: SpeedSummary,
+    components: u32,
+    refreshed: Changes,
+}
+
+impl DeformableModel {
+    /// Creates the model of a sparse volume on its coarsest level. The model and the volume share bricks: insert those
+    /// that a step needs into the volume, and step again. Bricks that no vertex is near are dropped.
+    ///
+    /// # Errors
+    /// [`MethodError::NeedsData`] unless the coarsest level is loaded whole; [`MethodError::InvalidArgument`] for an
+    /// option or parameter that is not accepted, also for gradient forces and the parameter `seeding` on, which sparse
+    /// volumes do not have; otherwise as [`Self::new`].
+    pub fn on_sparse(volume: &SparseVolume, options: SparseOptions) -> Result<Self, MethodError> {
+        let params = options.params.clone().unwrap_or_else(|| DeformableParams::for_range(volume.range()));
+        params.validate()?;
+        check_params(&params)?;
+        let pyramid = Pyramid::of_sparse(volume, options.finest)?;
+        let to_world = volume.levels()[options.finest].affine;
+        let follow = follow(volume, &options)?;
+        let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
+        let mut model = Self::from_pyramid(pyramid, to_world, origin)?;
+        model.follow = follow;
+        Ok(model)
+    }
+
+    /// Makes one iteration if all bricks that it reads are loaded.
+    pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
+        self.exchange_bricks();
+        let result = self.try_to_iterate();
+        self.exchange_bricks();
+        result
+    }
+
+    /// Takes the bricks of all levels from the volume, or gives them back.
+    fn exchange_bricks(&mut self) {
+        let Some(SparseLevels { volume, finest }) = &self.pyramid.sparse else { return };
+        let levels = self.pyramid.levels.iter_mut().enumerate();
+        volume.exchange(levels.filter_map(|(k, level)| Some((finest + k, level.bricks.as_mut()?))));
+    }
+
+    fn try_to_iterate(&mut self) -> Result<StepReport, MethodError> {
+        self.check_loaded()?;
+        let before = self.before();
+        let result = self.iterate();
+        let missed = self.missed()?;
+        if !missed.is_empty() {
+            self.undo(before);
+            return Err(MethodError::NeedsData { needs: missed });
+        }
+        self.drop_levels_above();
+        result
+    }
+
+    /// Returns an error unless the bricks are loaded that the next iteration is expected to read.
+    fn check_loaded(&mut self) -> Result<(), MethodError> {
+        if self.is_done() {
+            return Ok(());
+        }
+        let may_end = self.convergence.quiet + 1 >= self.quiet_iterations();
+        let mut needs = Vec::new();
+        if self.pyramid.levels[self.level].bricks.is_some() {
+            let reads_all = may_end || self.needs_factor || self.convergence.examine_next;
+            let vertices = if reads_all { self.followed_vertices() } else { self.awake_vertices() };
+            needs.extend(self.needs_around(self.level, &vertices));
+        }
+        if may_end && self.convergence.was_examined && self.level > 0 {
+            let below = self.vertices_followed_on(self.level - 1);
+            needs.extend(self.needs_around(self.level - 1, &below));
+        }
+        if needs.is_empty() { Ok(()) } else { Err(MethodError::NeedsData { needs }) }
+    }
+
+    /// Returns the boxes of missing bricks around some vertices, with a margin, if any is missing without it. Drops bricks
+    /// that no vertex is near, if there are many.
+    fn needs_around(&mut self, level: usize, vertices: &[VertexId]) -> Vec<BrickBox> {
+        let Some(finest) = self.pyramid.sparse.as_ref().map(|sparse| sparse.finest) else {
+            return Vec::new();
+        };
+        let delta = self.pyramid.delta_at(self.finest_delta, level);
+        let image = &self.pyramid.levels[level];
+        let Some(bricks) = &image.bricks else { return Vec::new() };
+        let near = |reach: f32, vertices: &[VertexId]| {
+            ranks_around(image, bricks, &self.mesh, vertices, reach * delta)
+        };
+        let is_missing = |rank: &u64| !bricks.has(BrickId::ranked(*rank));
+        if !near(REACH, vertices).iter().any(is_missing) {
+            return Vec::new();
+        }
+        let all = near(REACH + MARGIN, &self.vertices_followed_on(level));
+        let needs: Vec<u64> = near(REACH + MARGIN, vertices).into_iter().filter(is_missing).collect();
+        let needs = merged(bricks, finest + level, &needs);
+        if bricks.len() > MOST_SPARE * all.len()
+            && let Some(bricks) = &mut self.pyramid.levels[level].bricks
+        {
+            bricks.retain(|brick| all.binary_search(&brick.rank()).is_ok());
+        }
+        needs
+    }
+
+    /// Returns the boxes of the bricks that were missing in the iteration just made.
+    fn missed(&self) -> Result<Vec<BrickBox>, MethodError> {
+        let mut missed = Vec::new();
+        let Some(SparseLevels { finest, .. }) = self.pyramid.sparse else { return Ok(missed) };
+        for (k, level) in self.pyramid.levels.iter().enumerate() {
+            if let Some(bricks) = &level.bricks {
+                missed.extend(merged(bricks, finest + k, &bricks.take_missed()));
+            }
+        }
+        Ok(missed)
+    }
+
+    /// Drops the bricks of levels that the run has left.
+    fn drop_levels_above(&mut self) {
+        let level = self.level;
+        let above = self.pyramid.levels.iter_mut().skip(level + 1).filter_map(|image| image.bricks.as_mut());
+        above.filter(|bricks| !bricks.is_empty()).for_each(|bricks| bricks.retain(|_| false));
+    }
+
+    fn before(&self) -> Before {
+        Before {
+            mesh: self.mesh.clone(),
+            waiting: self.resolver.pending(),
+            level: self.level,
+            level_iso: self.level_iso,
+            image_force_factor: self.image_force_factor,
+            needs_factor: self.needs_factor,
+            iteration: self.iteration,
+            convergence: self.convergence,
+            speed: self.speed,
+            components: self.components,
+            refreshed: self.refreshed,
+        }
+    }
+
+    fn undo(&mut self, before: Before) {
+        let failed = std::mem::replace(&mut self.mesh, before.mesh);
+        self.mesh.advance_versions_past(&failed);
+        self.resolver.set_pending(before.waiting);
+        self.resolver.take_overflow();
+        self.motion.forces.forget_image();
+        self.level = before.level;
+        self.level_iso = before.level_iso;
+        self.image_force_factor = before.image_force_factor;
+        self.needs_factor = before.needs_factor;
+        self.iteration = before.iteration;
+        self.convergence = before.convergence;
+        self.speed = before.speed;
+        self.components = before.components;
+        self.refreshed = before.refreshed;
+    }
+
+    /// Returns the factor on α_I, the strength of the image force, of a sparse level, by the steepness of the image at the
+    /// vertices.
+    pub(super) fn measured_factor(&self) -> f32 {
+        let (image, background) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params).background());
+        let half = 0.5 / image.voxels_per_unit();
+        let mut steepness = Vec::new();
+        for v in self.followed_vertices() {
+            let (p, offset) = (self.mesh.position(v), self.mesh.unit_normal(v) * half);
+            let at = |p: Vec3| image.intensity(p, background, &mut CellCache::default());
+            let [inside, outside] = [at(p - offset), at(p + offset)];
+            if (inside < self.level_iso) != (outside < self.level_iso) {
+                steepness.push((inside - outside).abs() / (2.0 * half));
+            }
+        }
+        coarse::factor(&self.params, self.level, self.model_delta(), &|| {
+            median(steepness.iter().copied()).unwrap_or(0.0)
+        })
+    }
+
+    /// Returns the box in model space that the current level follows; `None` if it follows the whole surface.
+    pub(super) fn followed_bounds(&self) -> Option<Bounds> {
+        self.bounds_on(self.level)
+    }
+
+    fn bounds_on(&self, level: usize) -> Option<Bounds> {
+        self.follow.filter(|follow| level < follow.whole).map(|follow| follow.bounds)
+    }
+
+    /// Returns whether the current level follows the surface at a vertex.
+    pub(super) fn follows(&self, v: VertexId) -> bool {
+        self.followed_bounds().is_none_or(|bounds| bounds.contains(self.mesh.position(v)))
+    }
+
+    /// Returns the vertices at which the current level follows the surface.
+    pub(super) fn followed_vertices(&self) -> Vec<VertexId> {
+        self.vertices_followed_on(self.level)
+    }
+
+    fn vertices_followed_on(&self, level: usize) -> Vec<VertexId> {
+        let bounds = self.bounds_on(level);
+        let is_in = |v: &VertexId| bounds.is_none_or(|bounds| bounds.contains(self.mesh.position(*v)));
+        self.mesh.vertices().filter(is_in).collect()
+    }
+
+    fn awake_vertices(&self) -> Vec<VertexId> {
+        let still = self.mesh.scalar(self.keys.still_iterations);
+        let mut vertices = self.followed_vertices();
+        vertices.retain(|v| still[v.index()] < ITERATIONS_TO_SLEEP);
+        vertices
+    }
+
+    /// Returns how often the mesh is refined by √3 for the next finer level: once per factor √3 by which edges become
+    /// shorter; not if only part of the surface is followed there, whose edges are split instead.
+    pub(super) fn refinements(&self) -> u32 {
+        if self.params.topology == Topology::Fixed || self.bounds_on(self.level - 1).is_some() {
+            return 0;
+        }
+        if self.pyramid.sparse.is_none() {
+            return 1;
+        }
+        let shortest = self.pyramid.delta_at(self.finest_delta, self.level - 1)
+            * (1.0 + self.first_size(self.level - 1));
+        let ratio = f64::from(self.model_delta() / shortest);
+        (libm::log(ratio) / libm::log(REDUCTION) + ROUNDING) as u32
+    }
+
+    /// Returns the size, less 1, of the vertices of a sparse level when it begins: the largest on the finest level if it
+    /// will be sized by curvature, so that vertices are not made only to be removed.
+    fn first_size(&self, level: usize) -> f32 {
+        let is_sized = level == 0 && self.params.adapts_to_image();
+        if is_sized { self.params.adaptivity as f32 * (LARGEST - 1.0) } else { 0.0 }
+    }
+
+    /// Sets the sizes of the vertices on a sparse level just begun. The part of the surface that it does not follow keeps
+    /// its edge lengths: δ was larger there by the factor `ratio`.
+    pub(super) fn begin_sizes(&mut self, ratio: f32) {
+        if self.pyramid.sparse.is_none() {
+            return;
+        }
+        let first = self.first_size(self.level);
+        let vertices: Vec<VertexId> = self.mesh.vertices().collect();
+        for v in vertices {
+            let is_followed = self.follows(v);
+            let size = &mut self.mesh.scalar_mut(self.keys.size)[v.index()];
+            *size = if is_followed { first } else { (1.0 + *size) * ratio - 1.0 };
+        }
+    }
+}
+
+/// The part of a refinement that counts as a whole one, since factors between levels are rounded.
+const ROUNDING: f64 = 0.1;
+
+/// Returns the ranks of the bricks within `reach` of some vertices, in model units, in ascending order.
+fn ranks_around(
+    image: &LevelImage,
+    bricks: &BrickGrid,
+    mesh: &Mesh,
+    vertices: &[VertexId],
+    reach: f32,
+) -> Vec<u64> {
+    let half = image.scale() * reach + Vec3::ONE;
+    let mut ranks = Vec::new();
+    for &v in vertices {
+        let at = image.index(mesh.position(v));
+        bricks.for_each_around(at - half, at + half, |rank| {
+            if ranks.last() != Some(&rank) {
+                ranks.push(rank);
+            }
+        });
+    }
+    sort_ranks(&mut ranks);
+    ranks.dedup();
+    ranks
+}
+
+/// Returns an error for parameters that a sparse volume does not support.
+pub(super) fn check_params(params: &DeformableParams) -> Result<(), MethodError> {
+    for (name, force) in
+        [("gradientNormal", params.gradient_normal), ("gradientTangent", params.gradient_tangent)]
+    {
+        if force != 0.0 {
+            return Err(MethodError::invalid(name, format!("must be 0 for a sparse volume, got {force}")));
+        }
+    }
+    if params.seeding == Seeding::On {
+        return Err(MethodError::invalid(
+            "seeding",
+            "a sparse volume cannot be searched: must be auto or off",
+        ));
+    }
+    Ok(())
+}
+
+fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follow>, MethodError> {
+    let last = volume.levels().len() - 1;
+    let whole = options.whole.unwrap_or(last);
+    if whole < options.finest || whole > last {
+        let problem = format!("must be from {} to {last}, got {whole}", options.finest);
+        return Err(MethodError::invalid("whole", problem));
+    }
+    let Some(WorldBox { min, max }) = options.within else { return Ok(None) };
+    if !(min.is_finite() && max.is_finite() && min.cmple(max).all()) {
+        let problem = format!("must be two finite corners, the lower one first, got {min} and {max}");
+        return Err(MethodError::invalid("box", problem));
+    }
+    let to_model = volume.levels()[options.finest].affine.inverse();
+    let corner = |k: usize| DVec3::from([0, 1, 2].map(|axis| [min, max][k >> axis & 1][axis]));
+    let corners: Vec<Vec3> = (0..8).map(|k| to_model.transform_point3(corner(k)).as_vec3()).collect();
+    Ok(Some(Follow { bounds: Bounds::from_points(&corners), whole: whole - options.finest }))
+}

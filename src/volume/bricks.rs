@@ -1,0 +1,348 @@
+//! Part of a large grid: the bricks of one level of a [`SparseVolume`](super::SparseVolume) that are loaded.
+//!
+//! A missing brick is a question, never a value: reads of it are recorded, and whoever reads has to discard the result.
+
+use super::error::{VolumeError, filled};
+use super::grid::{CellCache, share_of_values};
+use super::sampling::{blend, locate};
+use super::voxels::{VoxelNumber, Voxels, each, map_each};
+use super::{Grid, Normalisation, Region};
+use crate::math::Vec3;
+use crate::math::order::sort_ranks;
+use std::sync::Mutex;
+
+/// The number of voxels along each side of a brick. With 32 there are 1.6 times as many voxels around a surface; with 8,
+/// half of the reads between voxels cross from one brick to the next.
+pub const BRICK: usize = 16;
+
+/// The number of bricks along each side of a page of the table, of which those without bricks take no memory.
+const PAGE: usize = 8;
+
+/// The largest number of voxels of a grid along an axis. Beyond it, single precision places a vertex no better than
+/// within 1/128 of a voxel.
+pub(super) const MAX_SIDE: usize = 1 << 16;
+
+/// The largest number of pages of the table.
+const MAX_PAGES: usize = 1 << 24;
+
+/// No brick, in the table.
+const NONE: u32 = u32::MAX;
+
+/// A page of the table: for each of its bricks, the index in the list of loaded ones, or [`NONE`].
+type Page = Box<[u32; PAGE * PAGE * PAGE]>;
+
+/// A scalar field of which only some bricks are known, cubes of [`BRICK`] voxels. Positions are continuous voxel
+/// indices, voxel centres at integers.
+#[derive(Debug, Default)]
+pub struct BrickGrid {
+    dims: [usize; 3],
+    normalisation: Normalisation,
+    /// The numbers of pages along the axes.
+    pages: [usize; 3],
+    table: Vec<Option<Page>>,
+    loaded: Vec<Brick>,
+    /// The bricks that were missing when they were read, since [`Self::take_missed`].
+    missed: Mutex<Vec<u64>>,
+}
+
+/// A loaded brick. One at the border of the grid has as many voxels as all others.
+#[derive(Clone, Debug)]
+struct Brick {
+    at: BrickId,
+    voxels: Voxels,
+}
+
+/// The indices of a brick along the axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BrickId(pub [usize; 3]);
+
+impl Clone for BrickGrid {
+    fn clone(&self) -> Self {
+        Self {
+            dims: self.dims,
+            normalisation: self.normalisation,
+            pages: self.pages,
+            table: self.table.clone(),
+            loaded: self.loaded.clone(),
+            missed: Mutex::default(),
+        }
+    }
+}
+
+impl BrickId {
+    /// Returns the brick with the voxel at an index.
+    fn of_voxel(voxel: [usize; 3]) -> Self {
+        Self(voxel.map(|k| k / BRICK))
+    }
+
+    /// Returns the number by which bricks are sorted, by z, then y, then x.
+    pub fn rank(self) -> u64 {
+        let [x, y, z] = self.0.map(|k| k as u64);
+        x | y << 21 | z << 42
+    }
+
+    /// Returns the brick of a [`Self::rank`].
+    pub fn ranked(rank: u64) -> Self {
+        Self([0, 21, 42].map(|shift| (rank >> shift) as usize & ((1 << 21) - 1)))
+    }
+}
+
+impl BrickGrid {
+    /// Creates a grid of `dims` voxels without any brick.
+    ///
+    /// # Errors
+    /// A dimension of 0 or above [`MAX_SIDE`], or too many voxels for the table.
+    pub(super) fn new(dims: [usize; 3], normalisation: Normalisation) -> Result<Self, VolumeError> {
+        let pages = dims.map(|n| n.div_ceil(BRICK * PAGE));
+        let count = pages.iter().try_fold(1usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
+        if dims.iter().any(|n| !(1..=MAX_SIDE).contains(n)) || count > MAX_PAGES {
+            let problem = format!("must be from 1 to {MAX_SIDE} voxels along each axis, got {dims:?}");
+            return Err(VolumeError::invalid("dims", problem));
+        }
+        let table = filled(count, None)?;
+        Ok(Self { dims, normalisation, pages, table, ..Self::default() })
+    }
+
+    /// Returns the number of voxels along x, y and z.
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Returns the number of loaded bricks.
+    pub fn len(&self) -> usize {
+        self.loaded.len()
+    }
+
+    /// Returns whether no brick is loaded.
+    pub fn is_empty(&self) -> bool {
+        self.loaded.is_empty()
+    }
+
+    /// Returns the memory of the loaded bricks in bytes.
+    pub fn bytes(&self) -> usize {
+        let voxel =
+            self.loaded.first().map_or(0, |brick| each!(&brick.voxels, values => size_of_val(&values[0])));
+        self.loaded.len() * BRICK * BRICK * BRICK * voxel
+    }
+
+    /// Returns whether a brick is loaded.
+    pub fn has(&self, brick: BrickId) -> bool {
+        self.slot(brick) != NONE
+    }
+
+    /// Returns the voxels of the grid in a brick.
+    pub fn region(&self, brick: BrickId) -> Region {
+        let min = brick.0.map(|k| k * BRICK);
+        Region { min, dims: [0, 1, 2].map(|axis| BRICK.min(self.dims[axis] - min[axis])) }
+    }
+
+    /// Calls `visit` with the ranks of the bricks that contain the box from `low` to `high`, in voxel indices, within
+    /// the grid.
+    pub fn for_each_around(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(u64)) {
+        let [first, last] =
+            [low, high].map(|p| BrickId::of_voxel([0, 1, 2].map(|axis| locate(p[axis], self.dims[axis]).0)));
+        for z in first.0[2]..=last.0[2] {
+            for y in first.0[1]..=last.0[1] {
+                (first.0[0]..=last.0[0]).for_each(|x| visit(BrickId([x, y, z]).rank()));
+            }
+        }
+    }
+
+    /// Adds the bricks of a box of whole bricks, which ends at a brick or at the border of the grid; `data` are its
+    /// voxels, x fastest. Bricks that are loaded stay as they are.
+    ///
+    /// # Errors
+    /// [`VolumeError::InvalidArgument`] if the box is not of whole bricks or not within the grid, or `data` has another
+    /// length; [`VolumeError::TooLarge`]; nothing has changed then.
+    pub(super) fn insert(&mut self, region: Region, data: &Voxels) -> Result<(), VolumeError> {
+        self.check_whole_bricks(region)?;
+        if data.len() != region.len() {
+            let problem =
+                format!("must have {} voxels for dims {:?}, got {}", region.len(), region.dims, data.len());
+            return Err(VolumeError::invalid("data", problem));
+        }
+        let mut new = Vec::new();
+        let [first, end] = [region.min, [0, 1, 2].map(|axis| region.min[axis] + region.dims[axis] - 1)]
+            .map(|voxel| BrickId::of_voxel(voxel).0);
+        for z in first[2]..=end[2] {
+            for y in first[1]..=end[1] {
+                for at in (first[0]..=end[0]).map(|x| BrickId([x, y, z])).filter(|&at| !self.has(at)) {
+                    new.push(Brick { at, voxels: self.brick_of(region, data, at)? });
+                }
+            }
+        }
+        new.into_iter().for_each(|brick| self.add(brick));
+        Ok(())
+    }
+
+    fn check_whole_bricks(&self, region: Region) -> Result<(), VolumeError> {
+        region.check("dims", self.dims)?;
+        let is_whole = |axis: usize| {
+            let end = region.min[axis] + region.dims[axis];
+            region.min[axis].is_multiple_of(BRICK) && (end.is_multiple_of(BRICK) || end == self.dims[axis])
+        };
+        if (0..3).all(is_whole) {
+            return Ok(());
+        }
+        let problem = format!(
+            "must be a box of whole bricks of {BRICK} voxels, or end at the border, got {:?} voxels from {:?}",
+            region.dims, region.min
+        );
+        Err(VolumeError::invalid("min", problem))
+    }
+
+    /// Returns the voxels of a brick in a box.
+    fn brick_of(&self, region: Region, data: &Voxels, at: BrickId) -> Result<Voxels, VolumeError> {
+        let part = self.region(at);
+        let inner = Region { min: [0, 1, 2].map(|axis| part.min[axis] - region.min[axis]), ..part };
+        Ok(map_each!(data, values => padded(values, inner, region.dims)?))
+    }
+
+    fn add(&mut self, brick: Brick) {
+        let (page, entry) = self.location(brick.at);
+        let slot = self.loaded.len() as u32;
+        let page = self.table[page].get_or_insert_with(|| Box::new([NONE; PAGE * PAGE * PAGE]));
+        page[entry] = slot;
+        self.loaded.push(brick);
+    }
+
+    /// Drops all bricks but those for which `keeps` returns true.
+    pub fn retain(&mut self, keeps: impl Fn(BrickId) -> bool) {
+        let all = std::mem::take(&mut self.loaded);
+        self.table.fill(None);
+        all.into_iter().filter(|brick| keeps(brick.at)).for_each(|brick| self.add(brick));
+    }
+
+    /// Returns the page of a brick in the table, and its entry there.
+    #[inline]
+    fn location(&self, BrickId([x, y, z]): BrickId) -> (usize, usize) {
+        let page = x / PAGE + self.pages[0] * (y / PAGE + self.pages[1] * (z / PAGE));
+        (page, x % PAGE + PAGE * (y % PAGE + PAGE * (z % PAGE)))
+    }
+
+    #[inline]
+    fn slot(&self, brick: BrickId) -> u32 {
+        let (page, entry) = self.location(brick);
+        self.table[page].as_ref().map_or(NONE, |page| page[entry])
+    }
+
+    /// Returns the loaded brick with a voxel; if it is missing, that is recorded.
+    #[inline]
+    fn brick_with(&self, voxel: [usize; 3]) -> Option<&Brick> {
+        let at = BrickId::of_voxel(voxel);
+        let found = self.loaded.get(self.slot(at) as usize);
+        if found.is_none() {
+            self.miss(at);
+        }
+        found
+    }
+
+    #[cold]
+    fn miss(&self, at: BrickId) {
+        if let Ok(mut missed) = self.missed.lock() {
+            missed.push(at.rank());
+        }
+    }
+
+    /// Returns the ranks of the bricks that were missing when they were read since the last call, in ascending order.
+    pub fn take_missed(&self) -> Vec<u64> {
+        let mut missed =
+            self.missed.lock().map_or_else(|_| Vec::new(), |mut missed| std::mem::take(&mut *missed));
+        sort_ranks(&mut missed);
+        missed.dedup();
+        missed
+    }
+
+    /// Returns the trilinearly interpolated value at `p` as [`Grid::sample_padded`] does, with the same bits; `padding`
+    /// if a brick that it needs is missing, which is recorded.
+    #[inline]
+    pub fn sample_padded(&self, p: Vec3, padding: f32, cache: &mut CellCache) -> f32 {
+        let share = share_of_values(self.dims, p);
+        if share > 0.0 {
+            let located = [0, 1, 2].map(|axis| locate(p[axis], self.dims[axis]));
+            let voxel = located.map(|(index, _)| index);
+            if !cache.is_at(voxel_key(voxel)) {
+                match self.corners(voxel) {
+                    Some(corners) => *cache = CellCache::new(voxel_key(voxel), corners),
+                    None => return padding,
+                }
+            }
+            padding + share * (blend(located.map(|(_, fraction)| fraction), cache.corners()) - padding)
+        } else {
+            padding
+        }
+    }
+
+    /// Returns the values of the cell whose lowest voxel is given, x fastest; `None` if one is missing.
+    fn corners(&self, voxel: [usize; 3]) -> Option<[f32; 8]> {
+        let next = [0, 1, 2].map(|axis| usize::from(voxel[axis] + 1 < self.dims[axis]));
+        let local = voxel.map(|k| k % BRICK);
+        if (0..3).all(|axis| local[axis] + next[axis] < BRICK) {
+            let brick = self.brick_with(voxel)?;
+            let base = index_in_brick(local);
+            let step = [next[0], next[1] * BRICK, next[2] * BRICK * BRICK];
+            let corners =
+                CORNERS.map(|corner| base + corner[0] * step[0] + corner[1] * step[1] + corner[2] * step[2]);
+            return Some(each!(&brick.voxels, values => {
+                corners.map(|index| self.normalisation.of(values[index].into()) as f32)
+            }));
+        }
+        // All eight are read even if one is missing, so that all missing bricks are recorded.
+        let values =
+            CORNERS.map(|corner| self.value([0, 1, 2].map(|axis| voxel[axis] + corner[axis] * next[axis])));
+        let mut corners = [0.0; 8];
+        for (corner, value) in corners.iter_mut().zip(values) {
+            *corner = value?;
+        }
+        Some(corners)
+    }
+
+    /// Returns the value of a voxel; `None` if it is missing.
+    fn value(&self, voxel: [usize; 3]) -> Option<f32> {
+        let brick = self.brick_with(voxel)?;
+        let stored = each!(&brick.voxels, values => values[index_in_brick(voxel.map(|k| k % BRICK))].into());
+        Some(self.normalisation.of(stored) as f32)
+    }
+
+    /// Returns the values of a region within the grid; `None` if some are missing.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn part(&self, region: Region) -> Result<Option<Grid>, VolumeError> {
+        let mut values = filled(region.len(), 0.0)?;
+        let mut is_whole = true;
+        for (k, value) in values.iter_mut().enumerate() {
+            let [nx, ny, _] = region.dims;
+            let offset = [k % nx, k / nx % ny, k / nx / ny];
+            match self.value([0, 1, 2].map(|axis| region.min[axis] + offset[axis])) {
+                Some(found) => *value = found,
+                None => is_whole = false,
+            }
+        }
+        Ok(is_whole.then_some(Grid { dims: region.dims, values }))
+    }
+}
+
+/// The offsets of the eight voxels of a cell, x fastest.
+const CORNERS: [[usize; 3]; 8] =
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
+
+fn index_in_brick([x, y, z]: [usize; 3]) -> usize {
+    x + BRICK * (y + BRICK * z)
+}
+
+/// Returns a number that no other voxel has, by which a cell is cached.
+fn voxel_key([x, y, z]: [usize; 3]) -> u64 {
+    x as u64 | (y as u64) << 21 | (z as u64) << 42
+}
+
+/// Returns the values of a region of a box of `dims` voxels as those of a brick, which has zeros after them.
+fn padded<T: VoxelNumber>(values: &[T], region: Region, dims: [usize; 3]) -> Result<Vec<T>, VolumeError> {
+    let mut brick = filled(BRICK * BRICK * BRICK, T::nearest(0.0))?;
+    for (k, row) in region.rows(dims, 0).enumerate() {
+        let [y, z] = [k % region.dims[1], k / region.dims[1]];
+        let start = index_in_brick([0, y, z]);
+        brick[start..start + row.len()].copy_from_slice(&values[row]);
+    }
+    Ok(brick)
+}
