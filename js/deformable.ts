@@ -302,7 +302,7 @@ export class DeformableModel implements Stepper {
     checkListener('onData', checked.onData);
     const { source, volume } = this.#sparse as SparseParts;
     const insert = ({ level, min, dims }: SparseBox, voxels: VoxelArray) =>
-      // Freeing the model must end this.
+      // Names the model if that was freed.
       this.#handle.use(() =>
         volume.use((raw) => raw.insert(level, Uint32Array.from(min), Uint32Array.from(dims), voxels)),
       );

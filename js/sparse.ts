@@ -69,8 +69,6 @@ export async function supply(
     // All take from the same iterator.
     for (const box of left) {
       const voxels = await source.read(box, stop.signal);
-      // The source may have had them already when it was aborted.
-      stop.signal.throwIfAborted();
       insert(box, voxels);
       waiting -= 1;
       onData?.({ ...source.loaded(), waiting });

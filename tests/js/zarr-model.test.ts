@@ -285,7 +285,11 @@ test('a model that is freed while it waits rejects, and so does one whose image 
     await expect.poll(() => store.open).toBeGreaterThan(0);
     if (what === 'model') model.free();
     else image.free();
-    expect((await run).code).toBe('freed');
+    const error = await run;
+    expect([error.code, error.message]).toEqual([
+      'freed',
+      expect.stringContaining(what === 'model' ? 'DeformableModel' : 'ZarrVolume'),
+    ]);
     await expect.poll(() => store.open).toBe(0);
   }
 });
