@@ -3,6 +3,9 @@ import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
 export type {
+  DataOptions,
+  DataReport,
+  LargeVolume,
   LengthUnit,
   MeshExtra,
   MeshTexture,
@@ -12,7 +15,7 @@ export type {
   VolumeInit,
   VoxelArray,
 } from './data.js';
-export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+export { type ErrorCode, NeedsDataError, VesicleCrash, VesicleError } from './error.js';
 export {
   type CurvatureKind,
   Mesh,

@@ -52,6 +52,9 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
+/** Packages that an entry point imports when it is used. */
+const OPTIONAL_PEERS = ['zarrita', '@zarrita/storage'];
+
 async function compile({ target, features, env }) {
   const args = [
     'rustc',
@@ -153,7 +156,9 @@ const entry = (part) => [
 ];
 
 async function manifest() {
-  const { description, license, version, engines } = JSON.parse(await readFile(at('package.json'), 'utf8'));
+  const { description, license, version, engines, devDependencies } = JSON.parse(
+    await readFile(at('package.json'), 'utf8'),
+  );
   return {
     name: 'vesicle',
     version,
@@ -163,6 +168,9 @@ async function manifest() {
     type: 'module',
     sideEffects: ['./worker-host.js', './element.js'],
     engines,
+    // For `vesicle/zarr` only.
+    peerDependencies: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, `^${devDependencies[name]}`])),
+    peerDependenciesMeta: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, { optional: true }])),
     main: './index.js',
     types: './index.d.ts',
     exports: {
@@ -172,6 +180,7 @@ async function manifest() {
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
+      './zarr': { types: './zarr/index.d.ts', default: './zarr/index.js' },
       './element': { types: './element/index.d.ts', default: './element.js' },
       './vesicle_bg.wasm': './vesicle_bg.wasm',
       './vesicle_plain_bg.wasm': './vesicle_plain_bg.wasm',

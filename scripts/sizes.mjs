@@ -18,6 +18,7 @@ const ENTRIES = {
   'vesicle/niivue': 'adapters/niivue.js',
   'vesicle/vtk': 'adapters/vtk.js',
   'vesicle/cornerstone': 'adapters/cornerstone.js',
+  'vesicle/zarr': 'zarr/index.js',
   'vesicle/element': 'element.js',
 };
 
@@ -26,8 +27,8 @@ async function bundled(file) {
   const { outputFiles } = await build({
     entryPoints: [at('pkg', file)],
     ...{ bundle: true, minify: true, format: 'esm', target: 'es2022', write: false, logLevel: 'error' },
-    // Imported in Node only.
-    external: ['node:*'],
+    // Imported in Node only, or brought by the page.
+    external: ['node:*', 'zarrita', '@zarrita/*'],
   });
   return outputFiles[0].contents;
 }

@@ -1,0 +1,243 @@
+// The levels of an image: arrays of Zarr that were checked against the metadata and against each other.
+import type { Array as ZarrArray } from 'zarrita';
+import { integer, invalid } from '../check.js';
+import type { Vec3, VoxelArray } from '../data.js';
+import { VesicleError } from '../error.js';
+import { Abandoned, type Brick } from './cache.js';
+import { badZarr, shown, translated, type Zarrita } from './error.js';
+import type { AxisName, LevelTransform, Multiscale } from './multiscales.js';
+import type { ZarrLevel, ZarrVoxelType } from './types.js';
+
+/** The channel and the time that are read. */
+export interface Selection {
+  channel: number;
+  time: number;
+}
+
+type VoxelArrays = new (length: number) => VoxelArray;
+
+const TYPES: Record<string, [ZarrVoxelType, VoxelArrays]> = {
+  ...{ uint8: ['u8', Uint8Array], int8: ['i8', Int8Array] },
+  ...{ uint16: ['u16', Uint16Array], int16: ['i16', Int16Array] },
+  ...{ uint32: ['u32', Uint32Array], int32: ['i32', Int32Array] },
+  ...{ float32: ['f32', Float32Array], float64: ['f32', Float32Array] },
+};
+
+/** Largest number of voxels along an axis. */
+const MOST_VOXELS = 0xffffffff;
+
+/** Largest number of voxels of a chunk, with all channels and times. */
+const LARGEST_CHUNK = 2 ** 29;
+
+/**
+ * How far apart the fields of view of two levels may be, in voxels of the coarser one: those that fit only in part may
+ * be dropped or padded, and half of one lies between the conventions of where the first voxel is.
+ */
+const TOLERANCE = 2;
+
+/** An array of voxels, with its place in world space. */
+export class Level {
+  readonly info: ZarrLevel;
+  /** Value of voxels in chunks that are not stored. */
+  readonly fill: number;
+  /** Constructor of arrays of this level's voxels. */
+  readonly VoxelArrays: VoxelArrays;
+  readonly #zarrita: Zarrita;
+  readonly #array: ZarrArray<'uint8'>;
+  readonly #part: string;
+  /** Axis of the array for each of x, y and z; -1 for none. */
+  readonly #spatial: Vec3;
+  /** Index along each axis of the array; along spatial ones, 0. */
+  readonly #selected: number[];
+
+  /** Validates an array; `bad-file` if it does not fit the metadata, `invalid-argument` for no such channel or time. */
+  constructor(
+    zarrita: Zarrita,
+    array: ZarrArray<'uint8'>,
+    { axes }: Multiscale,
+    transform: LevelTransform,
+    selection: Selection,
+  ) {
+    [this.#zarrita, this.#array, this.#part] = [zarrita, array, `array "${transform.path}"`];
+    checkSizes(array, axes, this.#part);
+    const type = TYPES[array.dtype as string];
+    if (!type) {
+      const known = Object.keys(TYPES).join(', ');
+      throw badZarr(`${this.#part}.data_type`, `must be one of ${known}, got ${shown(array.dtype)}`);
+    }
+    this.#spatial = spatialAxes(axes);
+    this.#selected = axes.map((axis, index) => selected(axis, array.shape[index] as number, selection));
+    this.VoxelArrays = type[1];
+    this.fill = Number(array.fillValue ?? 0);
+    this.info = Object.freeze({
+      dims: this.#along(array.shape, 1),
+      ...placement(transform, this.#spatial),
+      chunks: this.#along(array.chunks, 1),
+      voxelType: type[0],
+    });
+  }
+
+  #along(values: number[], missing: number): Vec3 {
+    return this.#spatial.map((axis) => (axis < 0 ? missing : (values[axis] as number))) as Vec3;
+  }
+
+  /** Number of chunks with voxels of the selected channel and time; it may be inexact above 2^53. */
+  get chunkCount(): number {
+    const { dims, chunks } = this.info;
+    return dims.reduce((count, size, axis) => count * Math.ceil(size / (chunks[axis] as number)), 1);
+  }
+
+  /** Size of the voxels of the selected channel and time, bytes. */
+  get bytes(): number {
+    return volumeOf(this.info.dims) * new this.VoxelArrays(0).BYTES_PER_ELEMENT;
+  }
+
+  /** Fetches the voxels of a chunk, by its position along x, y and z in the grid of chunks. */
+  async fetch(chunk: Vec3, signal: AbortSignal): Promise<Brick> {
+    const position = this.#selected.map((index, axis) => Math.floor(index / (this.#array.chunks[axis] as number)));
+    for (const [k, axis] of this.#spatial.entries()) if (axis >= 0) position[axis] = chunk[k] as number;
+    const stored = await this.#chunk(position, signal);
+    const { dims, chunks } = this.info;
+    const min = chunk.map((index, axis) => index * (chunks[axis] as number)) as Vec3;
+    const size = chunks.map((most, axis) => Math.min(most, (dims[axis] as number) - (min[axis] as number))) as Vec3;
+    return { min, dims: size, data: this.#voxels(stored, size) };
+  }
+
+  async #chunk(position: number[], signal: AbortSignal): Promise<Stored> {
+    const part = `${this.#part}, chunk ${position.join()}`;
+    for (;;) {
+      try {
+        const chunk = (await this.#array.getChunk(position, { signal })) as unknown as Stored;
+        const wanted = this.#array.chunks.reduce((product, size) => product * size, 1);
+        if (chunk.data.length === wanted) return chunk;
+        throw badZarr(part, `must have ${wanted} voxels, got ${chunk.data.length}`);
+      } catch (error) {
+        signal.throwIfAborted();
+        // Chunks of a shard wait for the same index: whoever asked for it first may have lost interest.
+        if (!(error instanceof Abandoned)) throw translated(this.#zarrita, part, error);
+      }
+    }
+  }
+
+  /** Returns the first voxels of the selected channel and time of a chunk, x fastest. */
+  #voxels({ data, stride }: Stored, [nx, ny, nz]: Vec3): VoxelArray {
+    const first = this.#selected.reduce(
+      (sum, index, axis) => sum + (index % (this.#array.chunks[axis] as number)) * (stride[axis] as number),
+      0,
+    );
+    const [sx, sy, sz] = this.#along(stride, 0);
+    if (isDense(data, this.VoxelArrays, [nx, ny, nz], [sx, sy, sz])) return data;
+    const voxels = new this.VoxelArrays(nx * ny * nz);
+    for (let z = 0, to = 0; z < nz; z++) {
+      for (let y = 0; y < ny; y++, to += nx) copyRow(data, first + z * sz + y * sy, sx, voxels, to, nx);
+    }
+    return voxels;
+  }
+}
+
+/** A chunk as zarrita decodes it. */
+interface Stored {
+  data: VoxelArray;
+  stride: number[];
+}
+
+/** Returns whether the voxels of a chunk are stored as they are needed. */
+function isDense(data: VoxelArray, kind: VoxelArrays, [nx, ny, nz]: Vec3, [sx, sy, sz]: Vec3): boolean {
+  const isWhole = data.length === nx * ny * nz && data.buffer.byteLength === data.byteLength;
+  return isWhole && data instanceof kind && sx === 1 && (ny === 1 || sy === nx) && (nz === 1 || sz === nx * ny);
+}
+
+function copyRow(from: VoxelArray, start: number, step: number, to: VoxelArray, at: number, count: number): void {
+  if (step === 1 && count > 1) {
+    to.set(from.subarray(start, start + count), at);
+    return;
+  }
+  for (let i = 0; i < count; i++) to[at + i] = from[start + i * step] as number;
+}
+
+/** Throws `bad-file` unless all arrays have the same numbers of channels and times. */
+export function checkSeries(arrays: readonly ZarrArray<'uint8'>[], { axes, levels }: Multiscale): void {
+  const sizes = ({ shape }: ZarrArray<'uint8'>) =>
+    axes.flatMap((axis, index) => (axis === 'c' || axis === 't' ? [`${axis} ${shape[index]}`] : [])).join(', ');
+  const [first] = arrays.map(sizes);
+  const wrong = arrays.findIndex((array) => sizes(array) !== first);
+  const [path, found] = [levels[wrong]?.path, arrays[wrong]];
+  if (found) throw badZarr(`array "${path}".shape`, `must have the ${first} of level 0, got ${sizes(found)}`);
+}
+
+function checkSizes({ shape, chunks }: ZarrArray<'uint8'>, axes: AxisName[], part: string): void {
+  const isCounts = (values: unknown, most: number) =>
+    Array.isArray(values) &&
+    values.length === axes.length &&
+    values.every((size) => Number.isInteger(size) && size >= 1 && size <= most);
+  const wanted = `must be ${axes.length} whole numbers above 0, one for each axis`;
+  if (!isCounts(shape, MOST_VOXELS)) throw badZarr(`${part}.shape`, `${wanted}, got ${shown(shape)}`);
+  if (!isCounts(chunks, MOST_VOXELS)) throw badZarr(`${part}.chunk_shape`, `${wanted}, got ${shown(chunks)}`);
+  const voxels = chunks.reduce((product, size) => product * size, 1);
+  if (voxels <= LARGEST_CHUNK) return;
+  throw new VesicleError(
+    'too-large',
+    `OME-Zarr: ${part}: chunks of ${shown(chunks)} voxels; at most ${LARGEST_CHUNK} can be read`,
+  );
+}
+
+function spatialAxes(axes: AxisName[]): Vec3 {
+  return [axes.indexOf('x'), axes.indexOf('y'), axes.indexOf('z')];
+}
+
+function selected(axis: AxisName, size: number, { channel, time }: Selection): number {
+  if (axis === 'c') return integer('channel', channel, { max: size - 1 });
+  return axis === 't' ? integer('time', time, { max: size - 1 }) : 0;
+}
+
+/** Returns voxel size and matrix; a slice without z is as thick as a pixel is wide. */
+function placement({ scale, translation }: LevelTransform, spatial: Vec3): Pick<ZarrLevel, 'spacing' | 'affine'> {
+  const [dx, dy, dz] = spatial.map((axis) => scale[axis] ?? (scale[spatial[0]] as number)) as Vec3;
+  const [x, y, z] = spatial.map((axis) => translation[axis] ?? 0) as Vec3;
+  return { spacing: [dx, dy, dz], affine: Float64Array.of(dx, 0, 0, 0, 0, dy, 0, 0, 0, 0, dz, 0, x, y, z, 1) };
+}
+
+/** Throws `bad-file` unless the levels show the same part of the world, from fine to coarse, with one type of voxels. */
+export function checkPyramid(levels: readonly Level[], paths: readonly string[]): void {
+  const [finest] = levels;
+  for (const [index, level] of levels.entries()) {
+    const part = `array "${paths[index]}"`;
+    const before = levels[Math.max(0, index - 1)] as Level;
+    if (finest?.info.voxelType !== level.info.voxelType) {
+      throw badZarr(
+        part,
+        `must have the voxel type of level 0, ${finest?.info.voxelType}, got ${level.info.voxelType}`,
+      );
+    }
+    for (const axis of [0, 1, 2] as const) checkAxis(finest.info, before.info, level.info, axis, part);
+  }
+}
+
+function checkAxis(finest: ZarrLevel, before: ZarrLevel, level: ZarrLevel, axis: 0 | 1 | 2, part: string): void {
+  const name = `${'xyz'[axis]}`;
+  const spacing = level.spacing[axis];
+  if (spacing < before.spacing[axis]) {
+    throw badZarr(part, `must not be finer along ${name} than the level before; levels go from fine to coarse`);
+  }
+  const extent = ({ dims, spacing }: ZarrLevel) => dims[axis] * spacing[axis];
+  const start = ({ affine }: ZarrLevel) => affine[12 + axis] as number;
+  const isNear = (one: number, other: number) => Math.abs(one - other) <= TOLERANCE * spacing;
+  if (isNear(extent(finest), extent(level)) && isNear(start(finest), start(level))) return;
+  throw badZarr(
+    part,
+    `must show the same part of the world as level 0, which is ${extent(finest)} wide along ${name} from ${start(finest)}` +
+      `, got ${extent(level)} from ${start(level)}: shape, scale or translation is wrong`,
+  );
+}
+
+/** Returns the product of three sizes. */
+export function volumeOf([x, y, z]: Vec3): number {
+  return x * y * z;
+}
+
+/** Returns the level of an index; throws `invalid-argument` for another. */
+export function levelAt(levels: readonly Level[], index: unknown): Level {
+  const found = levels[integer('level', index, { max: levels.length - 1 })];
+  if (found) return found;
+  throw invalid('level', 'no such level');
+}

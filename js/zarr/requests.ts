@@ -1,0 +1,187 @@
+// Requests to a store: a bounded number at a time, with a time limit, repeated where that can help.
+import type { AsyncReadable, GetOptions, RangeQuery, Readable } from '@zarrita/storage';
+import { VesicleError } from '../error.js';
+import { badZarr, RefusedError } from './error.js';
+
+/** Duration of the pause before the first repetition, milliseconds; each later one is twice as long. */
+const FIRST_PAUSE_MS = 250;
+
+/** Statuses of HTTP that ask for a repetition, unlike all others from 400 to 499. */
+const TEMPORARY = [408, 429];
+
+/** How requests are made. */
+export interface RequestOptions {
+  /** Largest number of requests at the same time. */
+  concurrency: number;
+  /** Number of repetitions of a failed request. */
+  retries: number;
+  /** Milliseconds after which a request without an answer has failed. */
+  timeoutMs: number;
+}
+
+/** An answer that a server gave instead of the data. */
+export class HttpError extends Error {
+  readonly status: number;
+
+  constructor(status: number, message: string) {
+    super(message);
+    this.status = status;
+  }
+}
+
+type Key = `/${string}`;
+
+/** A store that makes its requests to another one. */
+export class Requests implements AsyncReadable {
+  /** Present if the other store has it: zarrita asks for it before it reads parts of files. */
+  readonly getRange?: NonNullable<AsyncReadable['getRange']>;
+  readonly #store: Readable;
+  readonly #options: RequestOptions;
+  readonly #slots: Slots;
+
+  constructor(store: Readable, options: RequestOptions) {
+    this.#store = store;
+    this.#options = options;
+    this.#slots = new Slots(options.concurrency);
+    if (store.getRange) this.getRange = (key, range, given) => this.#getRange(key, range, given?.signal);
+  }
+
+  get(key: Key, given?: GetOptions): Promise<Uint8Array | undefined> {
+    return this.#run(key, async (signal) => this.#store.get(key, { signal }), given?.signal);
+  }
+
+  async #getRange(key: Key, range: RangeQuery, signal?: AbortSignal): Promise<Uint8Array | undefined> {
+    checkRange(key, range);
+    const send = async (signal: AbortSignal) => this.#store.getRange?.(key, range, { signal });
+    const bytes = await this.#run(key, send, signal);
+    const length = 'length' in range ? range.length : range.suffixLength;
+    if (bytes === undefined || bytes.length === length) return bytes;
+    throw badZarr(key, `truncated: ${bytes.length} of ${length} bytes`);
+  }
+
+  async #run<T>(key: Key, send: (signal: AbortSignal) => Promise<T>, signal?: AbortSignal): Promise<T> {
+    await this.#slots.take(signal);
+    try {
+      return await this.#repeated(key, send, signal);
+    } finally {
+      this.#slots.release();
+    }
+  }
+
+  async #repeated<T>(key: Key, send: (signal: AbortSignal) => Promise<T>, signal?: AbortSignal): Promise<T> {
+    for (let attempt = 0; ; attempt++) {
+      try {
+        return await limited(send, this.#options.timeoutMs, signal);
+      } catch (error) {
+        signal?.throwIfAborted();
+        if (error instanceof VesicleError) throw error;
+        if (isPermanent(error)) throw new RefusedError('unavailable', `${key}: ${messageOf(error)}`);
+        if (attempt >= this.#options.retries) {
+          const attempts = attempt > 0 ? `; ${attempt + 1} attempts` : '';
+          throw new VesicleError('unavailable', `${key}: ${messageOf(error)}${attempts}`);
+        }
+      }
+      await pause(FIRST_PAUSE_MS * 2 ** attempt, signal);
+    }
+  }
+}
+
+/** Throws `bad-file` for a range from a damaged index of a shard. */
+function checkRange(key: Key, range: RangeQuery): void {
+  const numbers = Object.values(range);
+  if (numbers.every((value) => Number.isSafeInteger(value) && value >= 0)) return;
+  throw badZarr(key, 'the index of the shard is damaged, or not encoded as the metadata says');
+}
+
+function messageOf(error: unknown): string {
+  if (!(error instanceof Error)) return String(error);
+  // `fetch` of Node says only that it failed.
+  return error.cause instanceof Error ? `${error.message} (${error.cause.message})` : error.message;
+}
+
+/** Returns whether a repetition of the request would fail, too. */
+function isPermanent(error: unknown): boolean {
+  const { status, name, message } = Object(error) as { status?: unknown; name?: unknown; message?: unknown };
+  if (name === 'NotAllowedError' || name === 'SecurityError') return true;
+  // Stores of zarrita tell the status in their message only.
+  const code = Number(status ?? /\bstatus:? (\d{3})\b/.exec(String(message))?.[1]);
+  return code >= 400 && code < 500 && !TEMPORARY.includes(code);
+}
+
+/** Calls `send` with a signal that aborts after `timeoutMs` milliseconds, or with the given one. */
+async function limited<T>(
+  send: (signal: AbortSignal) => Promise<T>,
+  timeoutMs: number,
+  signal: AbortSignal | undefined,
+): Promise<T> {
+  const stop = new AbortController();
+  const abort = () => stop.abort(signal?.reason);
+  const stalled = () => stop.abort(new Error(`no answer within ${timeoutMs / 1000} s`));
+  signal?.addEventListener('abort', abort);
+  const timer = Number.isFinite(timeoutMs) ? setTimeout(stalled, timeoutMs) : undefined;
+  try {
+    signal?.throwIfAborted();
+    // Not all stores heed signals.
+    return await untilAborted(send(stop.signal), stop.signal);
+  } finally {
+    clearTimeout(timer);
+    signal?.removeEventListener('abort', abort);
+  }
+}
+
+/** Returns a promise that also rejects when the signal aborts, with its reason. */
+export function untilAborted<T>(promise: Promise<T>, signal: AbortSignal | undefined): Promise<T> {
+  if (!signal) return promise;
+  return new Promise((resolve, reject) => {
+    const abort = () => reject(signal.reason);
+    if (signal.aborted) abort();
+    signal.addEventListener('abort', abort);
+    promise.then(resolve, reject).finally(() => signal.removeEventListener('abort', abort));
+  });
+}
+
+async function pause(duration: number, signal: AbortSignal | undefined): Promise<void> {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const over = new Promise<void>((resolve) => {
+    timer = setTimeout(resolve, duration);
+  });
+  await untilAborted(over, signal).finally(() => clearTimeout(timer));
+}
+
+/** A number of slots, given to those who ask in their order. */
+class Slots {
+  #free: number;
+  readonly #waiting = new Set<() => void>();
+
+  constructor(count: number) {
+    this.#free = count;
+  }
+
+  async take(signal: AbortSignal | undefined): Promise<void> {
+    signal?.throwIfAborted();
+    if (this.#free > 0) {
+      this.#free -= 1;
+      return;
+    }
+    let enter = () => {};
+    const turn = new Promise<void>((resolve) => {
+      enter = resolve;
+      this.#waiting.add(enter);
+    });
+    await untilAborted(turn, signal).catch((reason: unknown) => {
+      // The slot may have been given in the same moment.
+      if (!this.#waiting.delete(enter)) this.release();
+      throw reason;
+    });
+  }
+
+  release(): void {
+    const [next] = this.#waiting;
+    if (next === undefined) {
+      this.#free += 1;
+      return;
+    }
+    this.#waiting.delete(next);
+    next();
+  }
+}

@@ -1,0 +1,285 @@
+import { checkProperties, invalid, numbers, shallowCopy } from '../check.js';
+import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
+import { VesicleError } from '../error.js';
+import { Handle } from '../runtime.js';
+import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
+import { checkSignal } from '../stepper.js';
+import { RawSparseVolume } from '../vesicle.js';
+import { Volume } from '../volume.js';
+import { type Brick, BrickCache } from './cache.js';
+import { type Level, levelAt, volumeOf } from './levels.js';
+import type { ZarrBox, ZarrLevel, ZarrLoaded } from './types.js';
+
+/** Largest number of bytes of a region: what fits into the memory of a WebAssembly module. */
+const LARGEST_REGION = 2 ** 32;
+
+/** Largest number of bytes of a coarsest level that is read when the image is opened. */
+const LARGEST_COARSEST = 256e6;
+
+/**
+ * Constituents of a {@link ZarrVolume}.
+ *
+ * @internal
+ */
+export interface ZarrParts {
+  levels: Level[];
+  unit: 'mm' | undefined;
+  /** Number of bytes of chunks to keep. */
+  cache: number;
+  concurrency: number;
+}
+
+/**
+ * An OME-Zarr image, one channel and one time of it, of which only the chunks are read that are asked for.
+ *
+ * @throws All methods: `VesicleError` `freed` after {@link ZarrVolume.free}.
+ */
+export class ZarrVolume {
+  /** The levels of the image, finest first. */
+  readonly levels: readonly ZarrLevel[];
+  /** Unit of world coordinates: millimetres, into which lengths were converted; undefined if the image states none. */
+  readonly unit: 'mm' | undefined;
+  readonly #levels: Level[];
+  readonly #cache: BrickCache;
+  readonly #concurrency: number;
+  // Positions of the chunks of each level that have been read.
+  readonly #seen: Set<string>[];
+  readonly #bytes: number[];
+  #coarsest: VoxelArray | undefined;
+  #range: [number, number] | undefined;
+  #freed = false;
+
+  /** @internal */
+  constructor({ levels, unit, cache, concurrency }: ZarrParts) {
+    this.levels = Object.freeze(levels.map(({ info }) => info));
+    this.unit = unit;
+    this.#levels = levels;
+    this.#cache = new BrickCache(cache);
+    this.#concurrency = concurrency;
+    this.#seen = levels.map(() => new Set());
+    this.#bytes = levels.map(() => 0);
+  }
+
+  /** Returns how much of each level has been read, finest first. */
+  loaded(): ZarrLoaded[] {
+    this.#check();
+    return this.#levels.map(({ chunkCount, bytes }, index) => ({
+      chunks: this.#seen[index]?.size ?? 0,
+      bytes: this.#bytes[index] ?? 0,
+      of: { chunks: chunkCount, bytes },
+    }));
+  }
+
+  /**
+   * Reads a box of a level as a volume of its own, at its place in the world. Chunks that are not stored have the fill
+   * value of the array.
+   *
+   * @param level - Index of the level; 0 is the finest.
+   * @param box - Voxel indices of that level.
+   * @param options - `signal`: aborts the requests.
+   * @throws `VesicleError` `invalid-argument`: no such level, a box that is empty or extends beyond the level, or
+   *   has no finite voxel; `unavailable`: a chunk that could not be fetched; `bad-file`: one that is damaged;
+   *   `too-large`. `signal.reason` when aborted. No request is left open, and what was read stays in the cache.
+   */
+  async region(level: number, box: ZarrBox, options?: { signal?: AbortSignal }): Promise<Volume> {
+    return new Volume(await this.voxels(level, box, options));
+  }
+
+  /**
+   * Reads a box of a level like {@link ZarrVolume.region}, as options of a `Volume`, for workers and for entry points
+   * with one method, whose volumes are another type.
+   *
+   * @throws As {@link ZarrVolume.region}.
+   */
+  async voxels(level: number, box: ZarrBox, options?: { signal?: AbortSignal }): Promise<VolumeInit> {
+    this.#check();
+    const from = levelAt(this.#levels, level);
+    const { signal } = checkProperties('options', options, ['signal']);
+    checkSignal(signal);
+    const { min, dims } = checkedBox(box, from.info.dims);
+    const target: Brick = { min, dims, data: allocate(from, dims) };
+    await this.#fill(target, level, from, signal);
+    const affine = from.info.affine.slice();
+    for (const axis of [0, 1, 2] as const) affine[12 + axis] = world(from.info, min, axis);
+    return { data: target.data, dims, affine, ...(this.unit && { unit: this.unit }) };
+  }
+
+  /**
+   * Smallest and largest finite intensity of the coarsest level; undefined if it has no finite voxel, or is larger than
+   * 256 MB and so was not read when the image was opened.
+   */
+  get range(): [number, number] | undefined {
+    this.#check();
+    return this.#range && [...this.#range];
+  }
+
+  /**
+   * Reads the coarsest level, unless it is very large.
+   *
+   * @internal
+   */
+  async readCoarsest(signal: AbortSignal | undefined): Promise<void> {
+    const index = this.#levels.length - 1;
+    const level = levelAt(this.#levels, index);
+    if (level.bytes > LARGEST_COARSEST) return;
+    const { data } = await this.voxels(index, { min: [0, 0, 0], max: level.info.dims }, signal && { signal });
+    this.#coarsest = data;
+    this.#range = rangeOf(data);
+  }
+
+  /** @internal */
+  [SPARSE_SOURCE](): SparseSource {
+    this.#check();
+    const [finest] = this.#levels as [Level];
+    const [coarsest, range] = [this.#coarsest, this.#range];
+    if (!coarsest) throw new VesicleError('too-large', 'volume: the coarsest level must not be larger than 256 MB');
+    if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
+    return {
+      ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
+      ...{ range, coarsest, concurrency: this.#concurrency, create: () => sparseVolume(this[SPARSE_SOURCE]()) },
+      read: async ({ level, min, dims }, signal) => {
+        const max = min.map((first, axis) => first + (dims[axis] as number)) as Vec3;
+        return (await this.voxels(level, { min, max }, signal && { signal })).data;
+      },
+      loaded: () => ({
+        chunks: this.#seen.reduce((sum, { size }) => sum + size, 0),
+        bytes: this.#bytes.reduce((sum, size) => sum + size, 0),
+      }),
+    };
+  }
+
+  async #fill(target: Brick, index: number, level: Level, signal: AbortSignal | undefined): Promise<void> {
+    const stop = new AbortController();
+    const abort = () => stop.abort(signal?.reason);
+    signal?.throwIfAborted();
+    signal?.addEventListener('abort', abort);
+    const chunks = chunksOf(target, level.info.chunks);
+    const take = async () => {
+      // All take from the same iterator.
+      for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, stop.signal), target);
+    };
+    try {
+      await Promise.all(Array.from({ length: this.#concurrency }, take));
+    } catch (error) {
+      stop.abort(error);
+      throw error;
+    } finally {
+      signal?.removeEventListener('abort', abort);
+    }
+  }
+
+  #brick(index: number, level: Level, chunk: Vec3, signal: AbortSignal): Promise<Brick> {
+    const position = chunk.join();
+    const fetch = async (signal: AbortSignal) => {
+      const brick = await level.fetch(chunk, signal);
+      this.#count(index, position, brick);
+      return brick;
+    };
+    return this.#cache.get(`${index}:${position}`, fetch, signal);
+  }
+
+  #count(index: number, position: string, { data }: Brick): void {
+    const seen = this.#seen[index] as Set<string>;
+    if (seen.has(position)) return;
+    seen.add(position);
+    this.#bytes[index] = (this.#bytes[index] as number) + data.byteLength;
+  }
+
+  #check(): void {
+    if (this.#freed) throw freed();
+  }
+
+  /** Aborts all requests, which then reject with `freed`, and forgets all chunks; the image cannot be used afterwards. */
+  free(): void {
+    this.#freed = true;
+    this.#coarsest = undefined;
+    this.#cache.clear(freed());
+  }
+
+  /** The same as {@link ZarrVolume.free}, for `using`. */
+  [Symbol.dispose](): void {
+    this.free();
+  }
+}
+
+/** Creates the object of the core that holds the voxels of one model, with the coarsest level. */
+function sparseVolume({ levels, type, range, fill, coarsest }: SparseSource): Handle<RawSparseVolume> {
+  const described = levels.map(({ dims, affine }) => ({ dims, matrix: affine }));
+  const volume = new Handle('volume', () => new RawSparseVolume({ levels: described, type, range, fill }));
+  const { dims } = levels.at(-1) as (typeof levels)[0];
+  const insert = (raw: RawSparseVolume) =>
+    raw.insert(levels.length - 1, new Uint32Array(3), Uint32Array.from(dims), coarsest);
+  try {
+    volume.use(insert);
+  } catch (error) {
+    volume.free();
+    throw error;
+  }
+  return volume;
+}
+
+function freed(): VesicleError {
+  return new VesicleError('freed', 'this ZarrVolume was freed and can no longer be used');
+}
+
+/** Returns the first index and the numbers of voxels of a box inside a level. */
+function checkedBox(box: ZarrBox, size: Vec3): { min: Vec3; dims: Vec3 } {
+  const { min, max } = checkProperties('box', shallowCopy('box', box), ['min', 'max']);
+  const [from, to] = [numbers('box.min', min, 3), numbers('box.max', max, 3)];
+  const fits = size.every((most, axis) => {
+    const [low, high] = [from[axis] as number, to[axis] as number];
+    return Number.isInteger(low) && Number.isInteger(high) && 0 <= low && low < high && high <= most;
+  });
+  if (!fits) throw invalid('box', `must be within 0,0,0 to ${size} and not empty, got ${from} to ${to}`);
+  return { min: [...from] as Vec3, dims: [...to].map((end, axis) => end - (from[axis] as number)) as Vec3 };
+}
+
+function allocate({ VoxelArrays }: Level, dims: Vec3): VoxelArray {
+  const bytes = volumeOf(dims) * new VoxelArrays(0).BYTES_PER_ELEMENT;
+  const tooLarge = () =>
+    new VesicleError('too-large', `a region of ${dims.join(' × ')} voxels needs ${Math.ceil(bytes / 1e6)} MB`);
+  if (bytes > LARGEST_REGION) throw tooLarge();
+  try {
+    return new VoxelArrays(volumeOf(dims));
+  } catch {
+    throw tooLarge();
+  }
+}
+
+function world({ affine, spacing }: ZarrLevel, index: Vec3, axis: 0 | 1 | 2): number {
+  return (affine[12 + axis] as number) + index[axis] * spacing[axis];
+}
+
+/** Positions of the chunks that a box touches, in order. */
+function* chunksOf({ min, dims }: Brick, chunks: Vec3): Generator<Vec3> {
+  const first = (axis: 0 | 1 | 2) => Math.floor(min[axis] / chunks[axis]);
+  const last = (axis: 0 | 1 | 2) => Math.floor((min[axis] + dims[axis] - 1) / chunks[axis]);
+  for (let z = first(2); z <= last(2); z++) {
+    for (let y = first(1); y <= last(1); y++) for (let x = first(0); x <= last(0); x++) yield [x, y, z];
+  }
+}
+
+/** Copies the voxels that two bricks share. */
+function copyOverlap(from: Brick, to: Brick): void {
+  const start = (axis: 0 | 1 | 2) => Math.max(from.min[axis], to.min[axis]);
+  const end = (axis: 0 | 1 | 2) => Math.min(from.min[axis] + from.dims[axis], to.min[axis] + to.dims[axis]);
+  const offset = ({ min, dims }: Brick, x: number, y: number, z: number) =>
+    x - min[0] + dims[0] * (y - min[1] + dims[1] * (z - min[2]));
+  const [x, width] = [start(0), end(0) - start(0)];
+  for (let z = start(2); z < end(2); z++) {
+    for (let y = start(1); y < end(1); y++) {
+      const at = offset(from, x, y, z);
+      to.data.set(from.data.subarray(at, at + width), offset(to, x, y, z));
+    }
+  }
+}
+
+function rangeOf(data: VoxelArray): [number, number] | undefined {
+  let [low, high] = [Infinity, -Infinity];
+  for (const value of data) {
+    if (!Number.isFinite(value)) continue;
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return low <= high ? [low, high] : undefined;
+}
