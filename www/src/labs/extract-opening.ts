@@ -1,7 +1,7 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
-import type { Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
+import type { LargeSource, Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -15,7 +15,7 @@ import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
 import { Opening, type Source } from './opening';
 
-export type ExtractSource = Source<Example, Linked, VolumeSource>;
+export type ExtractSource = Source<Example, Linked, VolumeSource | LargeSource>;
 
 /** A volume opened in the Extract lab, and the settings of its model, which has done no step yet. */
 interface OpenedVolume extends Loaded {
@@ -24,7 +24,7 @@ interface OpenedVolume extends Loaded {
 }
 
 /** Opens volumes in the Extract lab, and builds models of them. */
-export class ExtractOpening extends Opening<Example, Linked, VolumeSource, OpenedVolume> {
+export class ExtractOpening extends Opening<Example, Linked, VolumeSource | LargeSource, OpenedVolume> {
   protected readonly first = EXAMPLES[0];
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -86,11 +86,23 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     return { name: file, load, example };
   }
 
+  /** Opens an image larger than memory. */
+  large(name: string, source: LargeSource): Promise<void> {
+    return this.open({ name, load: async () => source });
+  }
+
   protected fromFiles(files: File[]): ExtractSource {
+    const [archive] = files;
+    if (files.length === 1 && archive && /\.zip$/i.test(archive.name))
+      return { name: archive.name, load: async () => ({ zarr: archive }) };
     return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load(source: ExtractSource, volume: VolumeSource, reopening: boolean): Promise<OpenedVolume> {
+  protected async load(
+    source: ExtractSource,
+    volume: VolumeSource | LargeSource,
+    reopening: boolean,
+  ): Promise<OpenedVolume> {
     const choice = reopening ? this.#ui.start.inForce : this.#startFor(source);
     const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, choice);
     const body = { name: source.name, source: volume, setup };
@@ -171,6 +183,6 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 }
 
-function transferable(source: VolumeSource): Transferable[] {
+function transferable(source: VolumeSource | LargeSource): Transferable[] {
   return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
 }
