@@ -178,6 +178,7 @@ class Session {
     return this.#model;
   }
 
+  /** Returns the open volume, for what needs all of it. */
   #image(): Volume {
     if (!this.#volume)
       throw new Refusal('invalid-argument', text(this.#large ? 'extract.tooLargeForThis' : 'extract.noVolume'));
@@ -348,6 +349,7 @@ class Session {
   }
 
   async #coverage(): Promise<MeasuredCoverage | undefined> {
+    this.#image();
     await stop(this.#coverageRun);
     const iteration = this.#iteration;
     const abort = new AbortController();
