@@ -6,8 +6,8 @@ import { mayReach, SERVERS } from '../../www/src/ui/large-source';
 import { filesOf } from '../js/zarr-stores';
 import { type App, drop, measures, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
 
-/** A box of a stack of plant cells in two levels, of 26 × 22 × 14 and 13 × 11 × 7 voxels. */
-const IMAGE = 'v3-zstd-zyx';
+/** A box of a stack of plant cells in two levels, of 26 × 22 × 14 and 13 × 11 × 14 voxels. */
+const IMAGE = 'v3-scaled-zyx';
 
 let app: App;
 
@@ -42,7 +42,7 @@ test('a ZIP is opened, its coarsest level displayed, and the surface refined dow
   await expectExtracted(async () =>
     drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
   );
-  expect(await app.page.textContent('.facts')).toMatch(/Levels26 × 22 × 14, 13 × 11 × 7/);
+  expect(await app.page.textContent('.facts')).toMatch(/Levels26 × 22 × 14, 13 × 11 × 14/);
   expect(await amount()).toMatch(/^[\d.]+ kB of [\d.]+ kB read, in \d+ chunks$/);
 });
 
@@ -61,7 +61,7 @@ test('an address on the own server is read chunk by chunk; one that is missing g
   expect(await app.page.textContent('.facts')).toContain('cells.zarr');
   const { triangles } = await measures(app.page);
   await address.fill(`${app.address}images/none.zarr`);
-  await app.page.getByRole('button', { name: 'Open', exact: true }).click();
+  await app.page.getByRole('button', { name: 'Open image' }).click();
   await reach(app.page, 'error');
   expect(await app.page.textContent('.banner')).toMatch(/none\.zarr/);
   expect((await measures(app.page)).triangles).toBe(triangles);

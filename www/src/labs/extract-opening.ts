@@ -103,8 +103,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
     volume: VolumeSource | LargeSource,
     reopening: boolean,
   ): Promise<OpenedVolume> {
-    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source);
-    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, choice);
+    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
+    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const body = { name: source.name, source: volume, setup };
     return { ...(await this.#client.request('load', body, transferable(volume))), choice, setup };
   }
@@ -158,12 +158,13 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
 
   /**
    * Returns the settings for a model of an example or of the user's file: an example's own parameters; for a file,
-   * those in force except the iso value, which is specific to a volume; without attractors. A link's settings take
-   * precedence.
+   * those in force except the iso value, which is specific to a volume; for a volume larger than memory the defaults;
+   * without attractors. A link's settings take precedence.
    */
-  #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
+  #setupFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
-    const wanted: ParamValues = { ...(example?.params ?? params), ...linked?.params };
+    const own = 'zarr' in volume ? {} : params;
+    const wanted: ParamValues = { ...(example?.params ?? own), ...linked?.params };
     const setup = this.#settings.setup(choice, wanted, linked?.attractors ?? []);
     if (linked?.sphere && choice.kind === 'sphere') setup.start = { kind: 'sphere', ...linked.sphere };
     return setup;
@@ -172,13 +173,18 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
   /**
    * Returns the choice of the initial surface: an example's own; for a file the one in force, but with the contour
    * (kind 'contour') in place of a sphere, and with an edge length that the model chooses, since positions and lengths
-   * are specific to a volume. A link's settings take precedence.
+   * are specific to a volume; for a volume larger than memory always the contour, and one finer level. A link's settings
+   * take precedence.
    */
-  #startFor({ example, linked }: ExtractSource): StartChoice {
+  #startFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource): StartChoice {
     const choice = this.#ui.start.value;
+    const own: StartChoice =
+      'zarr' in volume
+        ? { ...choice, kind: 'contour', levels: 1, edge: undefined }
+        : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
     const suits: StartChoice = example
       ? { ...choice, ...defaultStart(example), levels: example.levels, edge: example.edge }
-      : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
+      : own;
     return linked ? withLink(suits, linked) : suits;
   }
 }

@@ -45,10 +45,11 @@ export class LargeSourceControls {
     this.#address.setAttribute('aria-describedby', `${id}-help ${id}-error`);
     const form = h(
       'form',
-      { class: 'row' },
+      { class: 'large-address' },
       h('label', { for: id }, text('extractPanels.largeAddress')),
-      h('span', { class: 'value' }, this.#address),
-      h('button', {}, text('extractPanels.largeOpen')),
+      this.#address,
+      this.#error,
+      h('button', { class: 'wide' }, text('extractPanels.largeOpen')),
     );
     form.addEventListener('submit', (event) => {
       event.preventDefault();
@@ -60,7 +61,6 @@ export class LargeSourceControls {
       { class: 'large' },
       h('summary', {}, text('extractPanels.largeTitle')),
       form,
-      this.#error,
       ...this.#folderButton(),
       h('p', { class: 'help', id: `${id}-help` }, text('extractPanels.largeHelp', { servers })),
       this.#progress,
