@@ -4,6 +4,9 @@ import { version as rawVersion } from './vesicle.js';
 
 export { animationGlb } from './animation.js';
 export type {
+  DataOptions,
+  DataReport,
+  LargeVolume,
   LengthUnit,
   MeshExtra,
   MeshTexture,
@@ -13,7 +16,7 @@ export type {
   VolumeInit,
   VoxelArray,
 } from './data.js';
-export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+export { type ErrorCode, NeedsDataError, VesicleCrash, VesicleError } from './error.js';
 export {
   type CurvatureKind,
   Mesh,

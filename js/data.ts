@@ -44,6 +44,35 @@ export interface VolumeInit {
   unit?: LengthUnit;
 }
 
+/**
+ * A volume larger than memory, in several resolutions, of which a model reads only what it needs: that of `openZarr` of
+ * `vesicle/zarr`.
+ */
+export interface LargeVolume {
+  /** Number and size of the voxels of each level along x, y and z, finest first. */
+  readonly levels: readonly { readonly dims: Vec3; readonly spacing: Vec3 }[];
+  /** Aborts all requests and frees the memory. */
+  free(): void;
+}
+
+/** How much of a {@link LargeVolume} has been read, while a model waits for more. */
+export interface DataReport {
+  /** Size of all chunks that have been read from all levels, decoded, bytes. */
+  bytes: number;
+  /** Number of these chunks. */
+  chunks: number;
+  /** Number of boxes that the model still waits for; 0 when it goes on. */
+  waiting: number;
+}
+
+/** Options of reading what a model waits for. */
+export interface DataOptions {
+  /** Aborts all requests; the promise then rejects with `signal.reason`. */
+  signal?: AbortSignal;
+  /** Called whenever something that the model waits for has been read. */
+  onData?: (report: DataReport) => void;
+}
+
 /** Image formats of a {@link MeshTexture}, as media types. */
 export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
 

@@ -11,11 +11,21 @@ import {
   vec3,
 } from './check.js';
 import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
-import type { Vec3 } from './data.js';
+import type { DataOptions, LargeVolume, Vec3, VoxelArray } from './data.js';
+import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, runInSlices, type Stepper, type StepReport } from './stepper.js';
-import { RawDeformable, RawStart } from './vesicle.js';
+import { type SparseBox, type SparseSource, sparseSource, supply } from './sparse.js';
+import {
+  checkListener,
+  checkSignal,
+  Runner,
+  type RunOptions,
+  runInSlices,
+  type Stepper,
+  type StepReport,
+} from './stepper.js';
+import { RawDeformable, RawStart, type RawVolume } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
@@ -135,9 +145,10 @@ export type DeformableStart =
 export interface DeformableOptions {
   /**
    * The volume that the model is fitted to; it may be freed once the model is made, unless
-   * {@link DeformableModel.refresh} is called later.
+   * {@link DeformableModel.refresh} is called later. Of a {@link LargeVolume}, such as that of `openZarr`, the coarsest
+   * level is read whole, and of each finer one what is around the surface; it must not be freed before the model is done.
    */
-  volume: Volume;
+  volume: Volume | LargeVolume;
   /** Index of the frame of a 4D volume that the model is fitted to; default 0. */
   frame?: number;
   /** Initial surface; default 'contour'. */
@@ -148,10 +159,23 @@ export interface DeformableOptions {
    * surface starts on the coarsest level and is refined on each finer one.
    */
   levels?: number;
+  /** Level of a {@link LargeVolume} at which the run ends; default 0. */
+  finest?: number;
+  /**
+   * Box in which the levels of a {@link LargeVolume} are followed down to the finest, world space; default everywhere.
+   * Outside of it the surface is that of level `outside`, by default the coarsest.
+   */
+  box?: { min: Vec3; max: Vec3; outside?: number };
   /** Target edge length at the finest level, world units; default from the voxel size. */
   edge?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
+}
+
+/** Options of {@link DeformableModel.run}. */
+export interface DeformableRunOptions extends RunOptions {
+  /** Called whenever something of a {@link LargeVolume} that the model waits for has been read. */
+  onData?: DataOptions['onData'];
 }
 
 /**
@@ -159,7 +183,8 @@ export interface DeformableOptions {
  */
 const TRIANGLES_AT_ONCE = 512;
 
-const OPTIONS = ['volume', 'frame', 'start', 'levels', 'edge', 'params'];
+const OPTIONS = ['volume', 'frame', 'start', 'levels', 'finest', 'box', 'edge', 'params'];
+const RUN_OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep', 'onData'];
 
 /**
  * A deformable model: a closed surface that moves onto the object in a volume under image forces and internal forces,
@@ -174,7 +199,8 @@ export class DeformableModel implements Stepper {
   readonly #handle: Handle<RawDeformable>;
   readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
   readonly #mesh: Mesh;
-  readonly #volume: Handle<import('./vesicle.js').RawVolume>;
+  readonly #volume: Handle<RawVolume> | undefined;
+  readonly #sparse: SparseParts | undefined;
   readonly #runner = new Runner();
 
   /**
@@ -184,12 +210,16 @@ export class DeformableModel implements Stepper {
    *   for a start mesh that is; `too-large`.
    */
   constructor(given: DeformableOptions) {
-    const { volume, frame = 0, start = 'contour', levels = 0, edge, params: some = {} } = checked(given);
-    const params = shallowCopy('params', some);
-    this.#volume = volumeHandle('volume', volume as Volume);
-    this.#handle = new Handle('DeformableModel', () =>
-      this.#volume.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
-    );
+    const options = checked(given);
+    const params = shallowCopy('params', options.params ?? {});
+    const source = sparseSource(options.volume);
+    if (source) {
+      this.#sparse = { source, volume: source.create() };
+      this.#handle = onSparse(this.#sparse, options, params);
+    } else {
+      this.#volume = volumeHandle('volume', options.volume as Volume);
+      this.#handle = onDense(this.#volume, options, params);
+    }
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
@@ -234,7 +264,9 @@ export class DeformableModel implements Stepper {
    * Runs up to `iterations` iterations, synchronous and deterministic; fewer if the model finishes earlier.
    *
    * @returns The last report, with the events of all iterations.
-   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress;
+   *   {@link NeedsDataError} if the first iteration needs parts of a {@link LargeVolume} that have not been read: await
+   *   its `load()`, and step again. If a later one does, it and those after it are not made.
    */
   step(iterations = 1): StepReport {
     integer('iterations', iterations, { min: 1 });
@@ -247,16 +279,34 @@ export class DeformableModel implements Stepper {
    * meanwhile.
    *
    * @returns The last report.
-   * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep`;
+   * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep` or `onData`;
    *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when the model is freed
-   *   meanwhile.
+   *   meanwhile; those of reading a {@link LargeVolume}, such as `unavailable`: the model stays usable, and another run
+   *   continues.
    */
-  run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(() => this.#step(1), given);
+  async run(given?: DeformableRunOptions): Promise<StepReport> {
+    const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
+    checkListener('onData', onData);
+    return this.#runner.run(() => this.#step(1), run, onData);
   }
 
   #step(iterations: number): StepReport {
-    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+    const report = this.#handle.use((raw) => raw.step(iterations) as StepReport | { needs: SparseBox[] });
+    if (!('needs' in report)) return report;
+    throw new NeedsDataError((options) => this.#load(report.needs, options));
+  }
+
+  async #load(needs: SparseBox[], options: DataOptions | undefined): Promise<void> {
+    const checked = checkProperties<DataOptions>('options', options, ['signal', 'onData']);
+    checkSignal(checked.signal);
+    checkListener('onData', checked.onData);
+    const { source, volume } = this.#sparse as SparseParts;
+    const insert = ({ level, min, dims }: SparseBox, voxels: VoxelArray) =>
+      // Names the model if that was freed.
+      this.#handle.use(() =>
+        volume.use((raw) => raw.insert(level, Uint32Array.from(min), Uint32Array.from(dims), voxels)),
+      );
+    await supply(source, needs, insert, checked);
   }
 
   /**
@@ -285,7 +335,9 @@ export class DeformableModel implements Stepper {
    */
   refresh(region: { min: Vec3; dims: Vec3 }): void {
     const [first, sizes] = checkedRegion(region);
-    this.#handle.use((raw) => this.#volume.use((volume) => raw.refresh(volume, first, sizes)));
+    const volume = this.#volume;
+    if (!volume) throw invalid('refresh', 'not possible with a volume larger than memory');
+    this.#handle.use((raw) => volume.use((voxels) => raw.refresh(voxels, first, sizes)));
   }
 
   /**
@@ -356,6 +408,7 @@ export class DeformableModel implements Stepper {
   free(): void {
     this.#meshHandle.free();
     this.#handle.free();
+    this.#sparse?.volume.free();
   }
 
   /** The same as {@link DeformableModel.free}, for `using`. */
@@ -364,11 +417,53 @@ export class DeformableModel implements Stepper {
   }
 }
 
-function checked(given: DeformableOptions): Partial<DeformableOptions> {
+/** A volume larger than memory, and what a model has of it in memory. */
+interface SparseParts {
+  source: SparseSource;
+  volume: ReturnType<SparseSource['create']>;
+}
+
+type Options = Partial<DeformableOptions>;
+
+function onDense(volume: Handle<RawVolume>, options: Options, params: DeformableParams): Handle<RawDeformable> {
+  const { frame = 0, start = 'contour', levels = 0, edge } = options;
+  for (const name of ['finest', 'box'] as const) {
+    if (options[name] !== undefined) throw invalid(name, 'only for volumes larger than memory');
+  }
+  return new Handle('DeformableModel', () =>
+    volume.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
+  );
+}
+
+function onSparse({ volume }: SparseParts, options: Options, params: DeformableParams): Handle<RawDeformable> {
+  const { start = 'contour', finest = 0, edge, box } = options;
+  try {
+    for (const name of ['frame', 'levels'] as const) {
+      if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
+    }
+    const [corners, outside] = box ? checkedBox(box) : [];
+    return new Handle('DeformableModel', () =>
+      volume.use((raw) => RawDeformable.newSparse(raw, rawStart(start), finest, edge, outside, corners, params)),
+    );
+  } catch (error) {
+    volume.free();
+    throw error;
+  }
+}
+
+/** Returns the two corners of a box, and the level outside of it. */
+function checkedBox(box: NonNullable<Options['box']>): [Float64Array, number | undefined] {
+  const { min, max, outside } = checkProperties('box', shallowCopy('box', box), ['min', 'max', 'outside']);
+  if (outside !== undefined) integer('box.outside', outside);
+  return [Float64Array.of(...vec3('box.min', min), ...vec3('box.max', max)), outside];
+}
+
+function checked(given: DeformableOptions): Options {
   const known = checkProperties('options', given, OPTIONS);
-  const { frame, levels, edge } = known;
+  const { frame, levels, finest, edge } = known;
   if (frame !== undefined) integer('frame', frame);
   if (levels !== undefined) integer('levels', levels);
+  if (finest !== undefined) integer('finest', finest);
   if (edge !== undefined) positive('edge', edge);
   return known;
 }

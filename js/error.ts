@@ -1,3 +1,5 @@
+import type { DataOptions } from './data.js';
+
 /** The kinds of failure that a {@link VesicleError} reports. */
 export type ErrorCode =
   /**
@@ -21,6 +23,11 @@ export type ErrorCode =
    * within the time limit, after retries where these can help. The same call may be made again.
    */
   | 'unavailable'
+  /**
+   * A step of a model that needs parts of a `LargeVolume` that have not been read; the error is a
+   * {@link NeedsDataError}, which reads them.
+   */
+  | 'needs-data'
   /** More memory needed than there is, or more vertices than are allowed; the message says how much. */
   | 'too-large'
   /**
@@ -42,6 +49,21 @@ export class VesicleError extends Error {
     super(message);
     this.name = 'VesicleError';
     this.code = code;
+  }
+}
+
+/** A step that needs data which have not been read; the model has not changed. */
+export class NeedsDataError extends VesicleError {
+  /**
+   * Reads the data, after which the step can be made.
+   *
+   * @throws `signal.reason` when aborted; the errors of the volume, such as `unavailable`. What was read stays.
+   */
+  readonly load: (options?: DataOptions) => Promise<void>;
+
+  constructor(load: (options?: DataOptions) => Promise<void>) {
+    super('needs-data', 'the step needs data which have not been read: await load() of this error, or use run()');
+    this.load = load;
   }
 }
 

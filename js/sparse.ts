@@ -1,8 +1,13 @@
 // Volumes of which only parts are in memory, as the models see them.
-import type { Vec3, VoxelArray } from './data.js';
+import type { DataOptions, Vec3, VoxelArray } from './data.js';
+import type { Handle } from './runtime.js';
+import type { RawSparseVolume } from './vesicle.js';
 
-/** Key of the method by which a volume offers its {@link SparseSource}; the same in all entry points of the package. */
-export const SPARSE_SOURCE: unique symbol = Symbol.for('vesicle.sparse-source') as never;
+/**
+ * Key of the method by which a volume offers its {@link SparseSource}. Each module of the package has its own, so that a
+ * model never gets a volume of another module.
+ */
+export const SPARSE_SOURCE: unique symbol = Symbol('sparse source');
 
 /** A box of voxels of a level. */
 export interface SparseBox {
@@ -26,6 +31,8 @@ export interface SparseSource {
   coarsest: VoxelArray;
   /** Intensity of voxels that are not stored. */
   fill: number;
+  /** Creates the WebAssembly object that holds the voxels of one model, with the coarsest level, which is freed with it. */
+  create(): Handle<RawSparseVolume>;
   /** Reads a box. */
   read(box: SparseBox, signal: AbortSignal | undefined): Promise<VoxelArray>;
   /** Number of chunks that are read at the same time. */
@@ -34,29 +41,23 @@ export interface SparseSource {
   loaded(): { chunks: number; bytes: number };
 }
 
-/** How much of a volume has been read, for {@link supply}. */
-export interface DataReport {
-  /** Size of all chunks that have been read from all levels, decoded, bytes. */
-  bytes: number;
-  /** Number of these chunks. */
-  chunks: number;
-  /** Number of boxes that the model still waits for; 0 when it goes on. */
-  waiting: number;
+/** Returns what a volume offers to models, or undefined if it is not larger than memory. */
+export function sparseSource(volume: unknown): SparseSource | undefined {
+  const offer = (Object(volume) as { [SPARSE_SOURCE]?: () => SparseSource })[SPARSE_SOURCE];
+  return offer?.call(volume);
 }
 
 /**
  * Reads boxes and passes each to `insert` as it arrives, in any order. Neighbours are read together, so that a chunk that
  * several of them touch is read once.
  *
- * @param onData - Called after each box.
  * @throws Errors of the source, of `insert` and of `onData`; `signal.reason` when aborted. Boxes inserted before stay.
  */
 export async function supply(
   source: SparseSource,
   boxes: readonly SparseBox[],
   insert: (box: SparseBox, voxels: VoxelArray) => void,
-  signal?: AbortSignal,
-  onData?: (report: DataReport) => void,
+  { signal, onData }: DataOptions = {},
 ): Promise<void> {
   signal?.throwIfAborted();
   const stop = new AbortController();
@@ -68,8 +69,6 @@ export async function supply(
     // All take from the same iterator.
     for (const box of left) {
       const voxels = await source.read(box, stop.signal);
-      // The source may have had them already when it was aborted.
-      stop.signal.throwIfAborted();
       insert(box, voxels);
       waiting -= 1;
       onData?.({ ...source.loaded(), waiting });

@@ -1,4 +1,6 @@
 import { checkProperties, integer, invalid, positive } from './check.js';
+import type { DataOptions } from './data.js';
+import { NeedsDataError } from './error.js';
 import type { Mesh } from './mesh.js';
 
 /** State of a model after one step, or several together, and the events during them. */
@@ -131,6 +133,26 @@ export async function runInSlices<T extends object>(
   }
 }
 
+/** Calls `work`, and again after reading the data that it needs, until it does not reject with {@link NeedsDataError}. */
+async function withData<T>(work: () => Promise<T>, options: DataOptions): Promise<T> {
+  const pause = new EventLoopYield();
+  try {
+    for (;;) {
+      try {
+        return await work();
+      } catch (error) {
+        if (!(error instanceof NeedsDataError)) throw error;
+        await error.load(options);
+        // All of it may have been in memory.
+        await pause.wait();
+        options.signal?.throwIfAborted();
+      }
+    }
+  } finally {
+    pause.close();
+  }
+}
+
 /** Runs a model to its end in slices of work, and allows one run of the model at a time. */
 export class Runner {
   #running = false;
@@ -144,9 +166,14 @@ export class Runner {
 
   /**
    * Calls `step` until the model is done, the run is aborted, or `maxIterations` is reached; returns the last report.
-   * See {@link RunOptions}.
+   * See {@link RunOptions}. When `step` throws a {@link NeedsDataError}, the data are read, with `onData`, and the run
+   * goes on.
    */
-  async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
+  async run(
+    step: () => StepReport,
+    given: RunOptions | undefined,
+    onData?: DataOptions['onData'],
+  ): Promise<StepReport> {
     const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
     signal?.throwIfAborted();
     this.refuseWhileRunning('run');
@@ -159,7 +186,10 @@ export class Runner {
       return report.done || left === 0 ? report : undefined;
     };
     try {
-      return await runInSlices(next, signal, budgetMs);
+      return await withData(() => runInSlices(next, signal, budgetMs), {
+        ...(signal && { signal }),
+        ...(onData && { onData }),
+      });
     } finally {
       this.#running = false;
     }

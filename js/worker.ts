@@ -53,7 +53,7 @@ import type * as vesicle from './index.js';
 import { remoteClasses, remoteFunction } from './worker-remote.js';
 import type * as there from './worker-types.js';
 
-export { VesicleCrash, VesicleError } from './error.js';
+export { NeedsDataError, VesicleCrash, VesicleError } from './error.js';
 export type {
   Attractor,
   Camera,

@@ -1,8 +1,10 @@
 import { checkProperties, invalid, numbers, shallowCopy } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
+import { Handle } from '../runtime.js';
 import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
+import { RawSparseVolume } from '../vesicle.js';
 import { Volume } from '../volume.js';
 import { type Brick, BrickCache } from './cache.js';
 import { type Level, levelAt, volumeOf } from './levels.js';
@@ -134,7 +136,7 @@ export class ZarrVolume {
     if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
     return {
       ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
-      ...{ range, coarsest, concurrency: this.#concurrency },
+      ...{ range, coarsest, concurrency: this.#concurrency, create: () => sparseVolume(this[SPARSE_SOURCE]()) },
       read: async ({ level, min, dims }, signal) => {
         const max = min.map((first, axis) => first + (dims[axis] as number)) as Vec3;
         return (await this.voxels(level, { min, max }, signal && { signal })).data;
@@ -198,6 +200,22 @@ export class ZarrVolume {
   [Symbol.dispose](): void {
     this.free();
   }
+}
+
+/** Creates the object of the core that holds the voxels of one model, with the coarsest level. */
+function sparseVolume({ levels, type, range, fill, coarsest }: SparseSource): Handle<RawSparseVolume> {
+  const described = levels.map(({ dims, affine }) => ({ dims, matrix: affine }));
+  const volume = new Handle('volume', () => new RawSparseVolume({ levels: described, type, range, fill }));
+  const { dims } = levels.at(-1) as (typeof levels)[0];
+  const insert = (raw: RawSparseVolume) =>
+    raw.insert(levels.length - 1, new Uint32Array(3), Uint32Array.from(dims), coarsest);
+  try {
+    volume.use(insert);
+  } catch (error) {
+    volume.free();
+    throw error;
+  }
+  return volume;
 }
 
 function freed(): VesicleError {

@@ -3,6 +3,8 @@ import { copyFile, mkdir, writeFile } from 'node:fs/promises';
 import { build } from 'esbuild';
 import type { Browser, Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
+import * as vesicle from '../../pkg/index.js';
+import * as zarr from '../../pkg/zarr/index.js';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { filesOf, serveImage, sourceVoxels } from '../js/zarr-stores';
@@ -11,9 +13,9 @@ import { launch } from './browser';
 const FOLDER = 'target/zarr-page';
 
 const PAGE = `
-  import init, { Volume } from './pkg/index.js';
+  import init, { DeformableModel } from './pkg/index.js';
   import { openZarr } from './pkg/zarr/index.js';
-  Object.assign(window, { init, openZarr, Volume });`;
+  Object.assign(window, { init, openZarr, DeformableModel });`;
 
 let browser: Browser;
 let server: Awaited<ReturnType<typeof serve>>;
@@ -43,6 +45,8 @@ afterAll(async () => {
 
 // biome-ignore lint/suspicious/noExplicitAny: functions that the page has
 declare const openZarr: any;
+// biome-ignore lint/suspicious/noExplicitAny: the same
+declare const DeformableModel: any;
 
 const SOURCE = [...sourceVoxels()];
 const IMAGES = ['v2-blosc-tczyx', 'v3-zstd-zyx', 'v3-sharded-gzip'];
@@ -83,6 +87,26 @@ test.each(IMAGES)('%s is read from a folder', async (image) => {
     return [...region.intensities()];
   };
   expect(await page.evaluate(read, files)).toEqual(SOURCE);
+});
+
+test('a surface has the same bits as in Node', async () => {
+  const images = await serveImage('v3-zstd-zyx');
+  try {
+    const fit = async (url: string) => {
+      const model = new DeformableModel({ volume: await openZarr(url), params: { iso: 100 } });
+      const { done } = await model.run();
+      const { positions, indices } = model.mesh.arrays();
+      return { done, positions: [...positions], indices: [...indices] };
+    };
+    const there = await page.evaluate(fit, images.url);
+    const model = new vesicle.DeformableModel({ volume: await zarr.openZarr(images.url), params: { iso: 100 } });
+    await model.run();
+    const { positions, indices } = model.mesh.arrays();
+    expect(there).toEqual({ done: true, positions: [...positions], indices: [...indices] });
+    expect(positions.length).toBeGreaterThan(1000);
+  } finally {
+    await images.close();
+  }
 });
 
 test('a server that does not allow the page, or is not there, is unavailable', async () => {

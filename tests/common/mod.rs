@@ -9,6 +9,7 @@ pub mod random;
 pub mod scenes;
 pub mod shapes;
 pub mod skins;
+pub mod stores;
 pub mod strokes;
 
 pub use random::Random;

@@ -23,6 +23,7 @@ mod implicit;
 #[cfg(not(target_arch = "wasm32"))]
 mod implicit_accuracy;
 mod implicit_fuzz;
+mod large_volumes;
 mod merge_and_split;
 mod mesh_edits;
 mod mesh_files;

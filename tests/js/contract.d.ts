@@ -18,6 +18,7 @@ export class VesicleError extends Error {
     | 'not-closed' // a mesh with boundary or non-manifold edges where a closed one is needed
     | 'self-intersecting' // a start mesh that intersects itself where an embedded one is needed
     | 'singular-system' // the linear system has no usable solution; names the likely cause
+    | 'needs-data' // a step that needs parts of a large volume that have not been read
     | 'unavailable' // data of a store that could not be fetched; the call may be made again
     | 'too-large' // needs more memory than wasm32 has; says how much
     | 'aborted'

@@ -1,6 +1,7 @@
 // Voxels of an OME-Zarr image as a model gets them: box by box, in any order.
 import { describe, expect, test } from 'vitest';
-import { type DataReport, SPARSE_SOURCE, type SparseBox, type SparseSource, supply } from '../../pkg/sparse.js';
+import type { DataReport } from '../../pkg/index.js';
+import { type SparseBox, type SparseSource, sparseSource, supply } from '../../pkg/sparse.js';
 import { openZarr, type ZarrVolume } from '../../pkg/zarr/index.js';
 import { failure } from './helpers.js';
 import { changed, DIMS, IMAGES, sourceVoxels, storeOf, zipOf } from './zarr-stores.js';
@@ -9,8 +10,7 @@ type Triple = [number, number, number];
 
 const SOURCE = sourceVoxels();
 
-const sourceOf = (image: ZarrVolume): SparseSource =>
-  (image as unknown as Record<symbol, () => SparseSource>)[SPARSE_SOURCE]?.() as SparseSource;
+const sourceOf = (image: ZarrVolume): SparseSource => sparseSource(image) as SparseSource;
 
 /** Returns all bricks of level 0, clipped to it. */
 function bricks(size: number): SparseBox[] {
@@ -52,13 +52,8 @@ describe.each(IMAGES)('%s', (name) => {
       const core = new Core();
       const reports: DataReport[] = [];
       const boxes = bricks(size);
-      await supply(
-        sourceOf(image),
-        boxes,
-        (box, voxels) => core.insert(box, voxels),
-        undefined,
-        (report) => reports.push(report),
-      );
+      const onData = (report: DataReport) => void reports.push(report);
+      await supply(sourceOf(image), boxes, (box, voxels) => core.insert(box, voxels), { onData });
       expect([...core.voxels]).toEqual([...data]);
       expect(reports.map(({ waiting }) => waiting)).toEqual([...boxes.keys()].reverse());
       expect(new Set(core.order).size).toBe(boxes.length);
@@ -113,14 +108,14 @@ test('errors and aborts end all reads, and a later call goes on', async () => {
 
   const stop = new AbortController();
   store.fault = () => new Promise(() => {});
-  const aborted = reasonOf(supply(sourceOf(image), bricks(8), insert, stop.signal));
+  const aborted = reasonOf(supply(sourceOf(image), bricks(8), insert, { signal: stop.signal }));
   await expect.poll(() => store.open).toBeGreaterThan(0);
   const inserted = core.order.length;
   stop.abort('enough');
   expect(await aborted).toBe('enough');
   expect(store.open).toBe(0);
   expect(core.order.length).toBeLessThan(inserted + 12);
-  expect(await reasonOf(supply(sourceOf(image), bricks(8), insert, AbortSignal.abort('no')))).toBe('no');
+  expect(await reasonOf(supply(sourceOf(image), bricks(8), insert, { signal: AbortSignal.abort('no') }))).toBe('no');
 
   store.fault = async (_, bytes) => bytes;
   const wrong = () => {

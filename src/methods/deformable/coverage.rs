@@ -79,8 +79,9 @@ impl DeformableModel {
     /// Begins to measure [`Coverage`]; [`CoverageSurvey::advance`] does the work in slices.
     ///
     /// # Errors
-    /// If the iso-surface or its search tree does not fit into memory.
+    /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
+        self.check_is_whole()?;
         let iso = self.pyramid.normalised(self.params.iso);
         let object = ObjectIs::by(&self.params);
         let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.params.smallest_part)?;
@@ -100,7 +101,7 @@ impl DeformableModel {
     /// Measures [`Coverage`] in one call.
     ///
     /// # Errors
-    /// If the iso-surface or its search tree does not fit into memory.
+    /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
     pub fn coverage(&self) -> Result<Coverage, MethodError> {
         let mut survey = self.survey_coverage()?;
         survey.advance(usize::MAX);

@@ -195,6 +195,8 @@ pub struct DeformableModel {
     image_force_factor: f32,
     /// Whether [`Self::image_force_factor`] is still to be measured at the vertices, on a sparse level that has just begun.
     needs_factor: bool,
+    /// Whether bricks of a sparse volume were asked for since the last iteration.
+    has_asked: bool,
     /// The part of the surface that finer levels of a sparse volume follow; all of it if `None`.
     follow: Option<Follow>,
     mesh: Mesh,
@@ -294,6 +296,7 @@ impl DeformableModel {
             level_iso: 0.0,
             image_force_factor: 1.0,
             needs_factor: false,
+            has_asked: false,
             mesh,
             keys,
             resolver: Resolver::with_max_vertices(domain.most_vertices(pyramid.delta_at(finest_delta, 0))),

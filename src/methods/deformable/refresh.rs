@@ -31,10 +31,12 @@ impl DeformableModel {
     /// voxels in `region` and their effect on [`Volume::range`].
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if the volume has other dimensions or another affine transform;
+    /// [`MethodError::InvalidArgument`] if the volume has other dimensions or another affine transform, or the model's
+    /// volume is sparse;
     /// [`MethodError::Volume`] if the region is empty or not within the volume, in which cases nothing has changed, or if
     /// memory does not suffice; [`MethodError::TooManyVertices`].
     pub fn refresh(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
+        self.check_is_whole()?;
         if volume.dims() != self.pyramid.dims() || volume.affine() != self.to_world {
             let problem = "must have the dimensions and the affine transform of the model's volume";
             return Err(MethodError::invalid("volume", problem));

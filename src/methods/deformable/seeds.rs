@@ -36,8 +36,10 @@ impl DeformableModel {
     /// added if the topology is fixed or the image force is zero.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
+    /// [`MethodError::InvalidArgument`] on a sparse volume; [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and
+    /// [`MethodError::Volume`] if memory does not suffice.
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
+        self.check_is_whole()?;
         let mut times = Times::default();
         let changes = self.seed_missing(&mut times)?;
         if changes.seeds > 0 {

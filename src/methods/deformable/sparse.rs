@@ -112,6 +112,14 @@ impl DeformableModel {
         Ok(model)
     }
 
+    /// Returns an error if the volume is sparse, so that no level but the coarsest can be read whole.
+    pub(super) fn check_is_whole(&self) -> Result<(), MethodError> {
+        if self.pyramid.sparse.is_none() {
+            return Ok(());
+        }
+        Err(MethodError::invalid("volume", "must not be sparse: this needs all voxels of a level"))
+    }
+
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
         self.exchange_bricks();
@@ -128,15 +136,24 @@ impl DeformableModel {
     }
 
     fn try_to_iterate(&mut self) -> Result<StepReport, MethodError> {
-        self.check_loaded()?;
-        let before = self.before();
+        if let Err(needs) = self.check_loaded() {
+            self.has_asked = true;
+            return Err(needs);
+        }
+        let (before, level) = (self.before(), self.level);
         let result = self.iterate();
         let missed = self.missed()?;
         if !missed.is_empty() {
             self.undo(before);
             return Err(MethodError::NeedsData { needs: missed });
         }
-        self.drop_levels_above();
+        // Only a model that goes on drops bricks, so that of two models of one volume one always does.
+        if self.level < level {
+            self.drop_level(level);
+        }
+        if std::mem::take(&mut self.has_asked) {
+            self.drop_spare();
+        }
         result
     }
 
@@ -159,9 +176,8 @@ impl DeformableModel {
         if needs.is_empty() { Ok(()) } else { Err(MethodError::NeedsData { needs }) }
     }
 
-    /// Returns the boxes of missing bricks around some vertices, with a margin, if any is missing without it. Drops bricks
-    /// that no vertex is near, if there are many.
-    fn needs_around(&mut self, level: usize, vertices: &[VertexId]) -> Vec<BrickBox> {
+    /// Returns the boxes of missing bricks around some vertices, with a margin, if any is missing without it.
+    fn needs_around(&self, level: usize, vertices: &[VertexId]) -> Vec<BrickBox> {
         let Some(finest) = self.pyramid.sparse.as_ref().map(|sparse| sparse.finest) else {
             return Vec::new();
         };
@@ -175,15 +191,8 @@ impl DeformableModel {
         if !near(REACH, vertices).iter().any(is_missing) {
             return Vec::new();
         }
-        let all = near(REACH + MARGIN, &self.vertices_followed_on(level));
         let needs: Vec<u64> = near(REACH + MARGIN, vertices).into_iter().filter(is_missing).collect();
-        let needs = merged(bricks, finest + level, &needs);
-        if bricks.len() > MOST_SPARE * all.len()
-            && let Some(bricks) = &mut self.pyramid.levels[level].bricks
-        {
-            bricks.retain(|brick| all.binary_search(&brick.rank()).is_ok());
-        }
-        needs
+        merged(bricks, finest + level, &needs)
     }
 
     /// Returns the boxes of the bricks that were missing in the iteration just made.
@@ -198,11 +207,24 @@ impl DeformableModel {
         Ok(missed)
     }
 
-    /// Drops the bricks of levels that the run has left.
-    fn drop_levels_above(&mut self) {
-        let level = self.level;
-        let above = self.pyramid.levels.iter_mut().skip(level + 1).filter_map(|image| image.bricks.as_mut());
-        above.filter(|bricks| !bricks.is_empty()).for_each(|bricks| bricks.retain(|_| false));
+    /// Drops the bricks of a level that the run has left.
+    fn drop_level(&mut self, level: usize) {
+        if let Some(bricks) = &mut self.pyramid.levels[level].bricks {
+            bricks.retain(|_| false);
+        }
+    }
+
+    /// Drops the bricks of the current level that no vertex is near, if there are many.
+    fn drop_spare(&mut self) {
+        let image = &self.pyramid.levels[self.level];
+        let Some(bricks) = &image.bricks else { return };
+        let reach = (REACH + MARGIN) * self.model_delta();
+        let near = ranks_around(image, bricks, &self.mesh, &self.followed_vertices(), reach);
+        if bricks.len() > MOST_SPARE * near.len()
+            && let Some(bricks) = &mut self.pyramid.levels[self.level].bricks
+        {
+            bricks.retain(|brick| near.binary_search(&brick.rank()).is_ok());
+        }
     }
 
     fn before(&self) -> Before {

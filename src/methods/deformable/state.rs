@@ -64,10 +64,14 @@ impl DeformableModel {
     /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] if the bytes are not such a state, [`MethodError::InvalidArgument`] if a parameter or
+    /// [`MethodError::BadState`] if the bytes are not such a state or the volume is sparse, [`MethodError::InvalidArgument`] if a parameter or
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
+        if self.pyramid.sparse.is_some() {
+            let problem = "runs on sparse volumes cannot be restored".into();
+            return Err(MethodError::BadState { field: "volume", problem });
+        }
         let state: State = decode(&MAGIC, bytes)?;
         if state.fingerprint != self.fingerprint() {
             let problem = "the state belongs to another volume, frame or number of levels".into();
