@@ -152,7 +152,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
-      { find: /^vesicle\/import$/, replacement: here('../pkg/import/index.js') },
+      { find: /^vesicle\/(import|zarr)$/, replacement: `${here('../pkg')}/$1/index.js` },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],

@@ -39,6 +39,11 @@ export type StartShape =
 /** Source of a volume: its files (one, a header and its data, or a DICOM or TIFF series), or a computed shape. */
 export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 
+/** An OME-Zarr image, larger than memory: its address, its folder, or a ZIP. */
+export interface LargeSource {
+  zarr: string | Blob | FileSystemDirectoryHandle;
+}
+
 /** All that the worker builds a deformable model from, besides the volume. */
 export interface Setup {
   start: StartShape;
@@ -93,6 +98,11 @@ export interface VolumeView {
    * requested, else only the first.
    */
   voxels: Uint8Array;
+  /**
+   * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
+   * and the bytes of all.
+   */
+  large?: { levels: readonly Vec3[]; bytes: number };
 }
 
 export interface Plane {
@@ -166,7 +176,7 @@ export interface Loaded extends Ready {
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: VolumeSource; setup: Setup }; reply: Loaded };
+  load: { body: { name: string; source: VolumeSource | LargeSource; setup: Setup }; reply: Loaded };
   /** Builds a new model of the open volume. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
@@ -277,7 +287,17 @@ export interface CoverageProgressEvent {
   event: 'covering';
   share: number;
 }
+/** Event while a model waits for parts of a volume larger than memory. */
+export interface DataEvent {
+  event: 'data';
+  /** Bytes and chunks that have been read since the volume was opened. */
+  bytes: number;
+  chunks: number;
+  /** Number of parts that the model waits for. */
+  waiting: number;
+}
 export type WorkerEvent =
+  | DataEvent
   | SnapshotEvent
   | ProgressEvent
   | SectionsEvent

@@ -4,6 +4,8 @@ import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, typ
 import type {
   Attractor,
   Coverage,
+  DataEvent,
+  LargeSource,
   LevelView,
   Loaded,
   MeasuredCoverage,
@@ -24,6 +26,7 @@ import type {
 } from './protocol';
 import { text } from './texts';
 import { compare } from './worker/compare';
+import type { LargeVolume } from './worker/large';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
 import { buffersOf, reply, stop, type Task, withTransfer } from './worker/serving';
@@ -41,7 +44,7 @@ const BUFFER_SETS = 2;
  */
 const MEASURE_EVERY = 400;
 
-/** Least milliseconds between two progress messages of a coverage measurement. */
+/** Least milliseconds between two progress messages of a coverage measurement, or of reading. */
 const TELL_EVERY = 100;
 
 /**
@@ -61,7 +64,9 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
 }
 
 class Session {
+  /** The open volume; of one larger than memory, `#large`, only parts are read. */
   #volume: Volume | undefined;
+  #large: LargeVolume | undefined;
   #model: DeformableModel | undefined;
   /** Intensities of the volume that are displayed as black and as white. */
   #window: [number, number] = [0, 1];
@@ -74,6 +79,7 @@ class Session {
   /** Number of coarser pyramid levels the model was built with, besides the volume itself. */
   #levels = 0;
   #measuredAt = 0;
+  #receivedAt = 0;
   #run: Task | undefined;
   #comparison: Task | undefined;
   #coverageRun: Task | undefined;
@@ -107,15 +113,15 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load(name: string, source: VolumeSource, setup: Setup): Promise<Loaded> {
+  async #load(name: string, source: VolumeSource | LargeSource, setup: Setup): Promise<Loaded> {
     await this.#pause();
+    if ('zarr' in source) return this.#loadLarge(name, source, setup);
     const volume = await volumeFrom(source);
     try {
       const view = viewOf(volume, name);
       // No checks: the page starts the run at once, and would not show their result.
       const ready = this.#replaceModel(buildModel(volume, setup), 'measured');
-      this.#volume?.free();
-      this.#volume = volume;
+      this.#keep({ volume });
       this.#window = view.window;
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
@@ -124,9 +130,35 @@ class Session {
     }
   }
 
+  async #loadLarge(name: string, source: LargeSource, setup: Setup): Promise<Loaded> {
+    const { LargeVolume } = await import('./worker/large');
+    const large = await LargeVolume.open(source);
+    try {
+      const view = large.view(name);
+      const ready = this.#replaceModel(large.model(setup), 'measured');
+      this.#keep({ large });
+      return withTransfer({ ...ready, volume: view }, [view.voxels]);
+    } catch (error) {
+      large.free();
+      throw error;
+    }
+  }
+
+  /** Makes a volume the open one, and frees the one before. */
+  #keep({ volume, large }: { volume?: Volume; large?: LargeVolume }): void {
+    this.#volume?.free();
+    this.#large?.free();
+    this.#volume = volume;
+    this.#large = large;
+  }
+
+  #build(setup: Setup): DeformableModel {
+    return this.#large ? this.#large.model(setup) : buildModel(this.#image(), setup);
+  }
+
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
-    return this.#replaceModel(buildModel(this.#image(), setup));
+    return this.#replaceModel(this.#build(setup));
   }
 
   #replaceModel(model: DeformableModel, detail: Detail = 'checked'): Ready {
@@ -146,8 +178,10 @@ class Session {
     return this.#model;
   }
 
+  /** Returns the open volume, for what needs all of it. */
   #image(): Volume {
-    if (!this.#volume) throw new Refusal('invalid-argument', text('extract.noVolume'));
+    if (!this.#volume)
+      throw new Refusal('invalid-argument', text(this.#large ? 'extract.tooLargeForThis' : 'extract.noVolume'));
     return this.#volume;
   }
 
@@ -160,14 +194,26 @@ class Session {
     send({ event: 'state', state: 'running' });
   }
 
-  async #runToEnd(model: DeformableModel, signal: AbortSignal): Promise<void> {
+  async #runToEnd(model: DeformableModel, signal: AbortSignal, maxIterations = Number.MAX_SAFE_INTEGER): Promise<void> {
     try {
-      await model.run({ signal, onStep: (report) => this.#stepped(report) });
+      await model.run({
+        signal,
+        maxIterations,
+        onStep: (report) => this.#stepped(report),
+        onData: (data) => this.#received(data),
+      });
     } catch (error) {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
     this.#run = undefined;
     this.#reportStopped();
+  }
+
+  #received(data: Omit<DataEvent, 'event'>): void {
+    const now = performance.now();
+    if (data.waiting > 0 && now - this.#receivedAt < TELL_EVERY) return;
+    this.#receivedAt = now;
+    send({ event: 'data', ...data });
   }
 
   #stepped(report: StepReport): void {
@@ -200,6 +246,13 @@ class Session {
   async #step(count: number): Promise<undefined> {
     await this.#pause();
     const model = this.#current();
+    if (this.#large) {
+      // A step may have to wait for data.
+      const abort = new AbortController();
+      this.#run = { abort, ended: this.#runToEnd(model, abort.signal, count) };
+      await this.#run.ended;
+      return;
+    }
     for (let i = 0; i < count && !this.#done; i++) this.#stepped(model.step(1));
     this.#reportStopped();
   }
@@ -227,6 +280,7 @@ class Session {
   }
 
   #pyramid(levels: number): LevelView[] {
+    if (this.#large) return [];
     const views = levelsOf(this.#image(), levels, this.#window);
     return withTransfer(
       views,
@@ -264,7 +318,7 @@ class Session {
 
   #replaceBy(state: Uint8Array, levels: number): void {
     const start = { kind: 'enclosing' } as const;
-    const model = buildModel(this.#image(), { start, levels, edge: undefined, params: {}, attractors: [] });
+    const model = this.#build({ start, levels, edge: undefined, params: {}, attractors: [] });
     try {
       model.restore(state);
     } catch (error) {
@@ -295,6 +349,7 @@ class Session {
   }
 
   async #coverage(): Promise<MeasuredCoverage | undefined> {
+    this.#image();
     await stop(this.#coverageRun);
     const iteration = this.#iteration;
     const abort = new AbortController();

@@ -1,7 +1,7 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
-import type { Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
+import type { LargeSource, Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -15,7 +15,7 @@ import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
 import { Opening, type Source } from './opening';
 
-export type ExtractSource = Source<Example, Linked, VolumeSource>;
+export type ExtractSource = Source<Example, Linked, VolumeSource | LargeSource>;
 
 /** A volume opened in the Extract lab, and the settings of its model, which has done no step yet. */
 interface OpenedVolume extends Loaded {
@@ -24,7 +24,7 @@ interface OpenedVolume extends Loaded {
 }
 
 /** Opens volumes in the Extract lab, and builds models of them. */
-export class ExtractOpening extends Opening<Example, Linked, VolumeSource, OpenedVolume> {
+export class ExtractOpening extends Opening<Example, Linked, VolumeSource | LargeSource, OpenedVolume> {
   protected readonly first = EXAMPLES[0];
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -86,13 +86,25 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     return { name: file, load, example };
   }
 
+  /** Opens an image larger than memory. */
+  large(name: string, source: LargeSource): Promise<void> {
+    return this.open({ name, load: async () => source });
+  }
+
   protected fromFiles(files: File[]): ExtractSource {
+    const [archive] = files;
+    if (files.length === 1 && archive && /\.zip$/i.test(archive.name))
+      return { name: archive.name, load: async () => ({ zarr: archive }) };
     return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load(source: ExtractSource, volume: VolumeSource, reopening: boolean): Promise<OpenedVolume> {
-    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source);
-    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, choice);
+  protected async load(
+    source: ExtractSource,
+    volume: VolumeSource | LargeSource,
+    reopening: boolean,
+  ): Promise<OpenedVolume> {
+    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
+    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const body = { name: source.name, source: volume, setup };
     return { ...(await this.#client.request('load', body, transferable(volume))), choice, setup };
   }
@@ -146,12 +158,13 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
 
   /**
    * Returns the settings for a model of an example or of the user's file: an example's own parameters; for a file,
-   * those in force except the iso value, which is specific to a volume; without attractors. A link's settings take
-   * precedence.
+   * those in force except the iso value, which is specific to a volume; for a volume larger than memory the defaults;
+   * without attractors. A link's settings take precedence.
    */
-  #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
+  #setupFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
-    const wanted: ParamValues = { ...(example?.params ?? params), ...linked?.params };
+    const own = 'zarr' in volume ? {} : params;
+    const wanted: ParamValues = { ...(example?.params ?? own), ...linked?.params };
     const setup = this.#settings.setup(choice, wanted, linked?.attractors ?? []);
     if (linked?.sphere && choice.kind === 'sphere') setup.start = { kind: 'sphere', ...linked.sphere };
     return setup;
@@ -160,17 +173,22 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   /**
    * Returns the choice of the initial surface: an example's own; for a file the one in force, but with the contour
    * (kind 'contour') in place of a sphere, and with an edge length that the model chooses, since positions and lengths
-   * are specific to a volume. A link's settings take precedence.
+   * are specific to a volume; for a volume larger than memory always the contour, and one finer level. A link's settings
+   * take precedence.
    */
-  #startFor({ example, linked }: ExtractSource): StartChoice {
+  #startFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource): StartChoice {
     const choice = this.#ui.start.value;
+    const own: StartChoice =
+      'zarr' in volume
+        ? { ...choice, kind: 'contour', levels: 1, edge: undefined }
+        : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
     const suits: StartChoice = example
       ? { ...choice, ...defaultStart(example), levels: example.levels, edge: example.edge }
-      : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
+      : own;
     return linked ? withLink(suits, linked) : suits;
   }
 }
 
-function transferable(source: VolumeSource): Transferable[] {
+function transferable(source: VolumeSource | LargeSource): Transferable[] {
   return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
 }

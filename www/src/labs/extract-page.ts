@@ -101,9 +101,15 @@ export class DataPanel {
 
   /**
    * `figures`, the examples from the paper, are listed apart from the other examples; `chooser` is the control that
-   * opens files.
+   * opens files, `large` those of volumes larger than memory.
    */
-  constructor(examples: Example[], figures: Example[], chooser: HTMLElement, onExample: (example: Example) => void) {
+  constructor(
+    examples: Example[],
+    figures: Example[],
+    chooser: HTMLElement,
+    large: HTMLElement,
+    onExample: (example: Example) => void,
+  ) {
     const id = uniqueId('example');
     const group = (label: string, list: Example[]) =>
       h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
@@ -126,6 +132,7 @@ export class DataPanel {
       ),
       h('div', { class: 'row' }, chooser),
       h('p', { class: 'help' }, text('extract.dropHelp')),
+      large,
       this.#facts,
       this.#credit,
     );
@@ -153,6 +160,8 @@ export class DataPanel {
         text('extract.range', { low: figure(volume.range[0]), high: figure(volume.range[1]) }),
       ],
     ];
+    if (volume.large)
+      facts.push([text('extract.factLevels'), volume.large.levels.map((dims) => dims.join(' × ')).join(', ')]);
     if (volume.frames > 1)
       facts.push([text('labs.frames'), text('extract.framesFirstShown', { count: volume.frames })]);
     this.#showFacts(facts);

@@ -1,7 +1,7 @@
 import { EXAMPLES, type Example } from '../examples';
 import { COVERAGE_GUIDE } from '../guides';
 import { isPreset, PRESETS, type Preset, type Variant, variantInForce } from '../presets';
-import type { Attractor, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
+import type { Attractor, LargeSource, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { AttractorControls } from '../ui/attractors';
@@ -11,9 +11,10 @@ import { h } from '../ui/dom';
 import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
 import { FigurePanel } from '../ui/figure';
-import { acceptDrops, fileChooser } from '../ui/files';
+import { acceptDrops, fileChooser, VOLUME_FILES } from '../ui/files';
 import { Histogram } from '../ui/histogram';
 import type { History } from '../ui/history';
+import { LargeSourceControls } from '../ui/large-source';
 import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
@@ -33,6 +34,7 @@ const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain',
 
 export interface PartEvents extends TransportEvents {
   onFiles: (files: File[]) => void;
+  onLarge: (name: string, source: LargeSource) => void;
   onExample: (example: Example) => void;
   onExampleId: (id: string) => void;
   onVariant: (preset: Preset, variant: Variant) => void;
@@ -69,6 +71,7 @@ export class ExtractParts {
   readonly measures = new MeasurePanel();
   readonly banner: ErrorBanner;
   readonly data: DataPanel;
+  readonly large: LargeSourceControls;
   readonly histogram: Histogram;
   readonly start: StartControls;
   readonly pyramid: PyramidPanel;
@@ -105,7 +108,9 @@ export class ExtractParts {
     this.#events = events;
     this.stage = new Stage(this.#canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
     this.banner = new ErrorBanner(events.onDismiss);
-    this.data = new DataPanel(EXAMPLES, PRESETS, fileChooser(events.onFiles), events.onExample);
+    const chooser = fileChooser(events.onFiles, `${VOLUME_FILES},.zip`);
+    this.large = new LargeSourceControls(events.onLarge);
+    this.data = new DataPanel(EXAMPLES, PRESETS, chooser, this.large.element, events.onExample);
     this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
     this.start = new StartControls(events.onStart);
@@ -159,7 +164,7 @@ export class ExtractParts {
 
   #layOut(signal: AbortSignal): void {
     const drop = h('div', { class: 'drop', hidden: true }, text('extract.drop'));
-    acceptDrops(drop, this.#events.onFiles, signal);
+    acceptDrops(drop, this.#events.onFiles, signal, (folder) => this.#events.onLarge(folder.name, { zarr: folder }));
     layOut(this.#root, {
       data: this.data.element,
       figure: this.#figure.element,
@@ -204,6 +209,7 @@ export class ExtractParts {
     this.stage.unit = example?.unit ?? unit;
     this.histogram.setVolume(volume);
     this.data.show(volume, example);
+    this.large.showTotal(volume.large?.bytes);
     this.stage.setVolume(volume);
     this.compare.clear();
     this.coverage.unit = this.stage.unit;

@@ -79,6 +79,7 @@ export class ExtractLab implements Lab {
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
+      onLarge: (name, source) => void this.#opening.large(name, source),
       onExample: (example) => void this.#opening.example(example),
       onExampleId: (id) => this.#opening.byId(id),
       onVariant: (preset, variant) => void this.#settings.changeTo(preset, variant),
@@ -183,6 +184,7 @@ export class ExtractLab implements Lab {
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'comparing') this.#ui.compare.showProgress(event);
+    else if (event.event === 'data') this.#ui.large.showProgress(event);
     else if (event.event === 'covering') this.#ui.coverage.showProgress(event);
     else if (event.event !== 'state') this.#results.take(event);
     else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);

@@ -2,7 +2,8 @@ import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
-const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
+/** Endings of files of volumes. */
+export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
 
 /**
  * Creates a button with the given label that chooses one file, or several that belong together; by default files of
@@ -10,7 +11,7 @@ const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
  */
 export function fileChooser(
   onFiles: (files: File[]) => void,
-  accept = ACCEPT,
+  accept = VOLUME_FILES,
   label = text('controls.openFile'),
 ): HTMLElement {
   const id = uniqueId('file');
@@ -26,9 +27,15 @@ export function fileChooser(
 
 /**
  * Accepts files dropped anywhere on the page, until `signal` is aborted, and shows `overlay` while files are dragged
- * over the page.
+ * over the page. A folder is passed to `onFolder`, if given, in browsers that have handles of folders; otherwise it
+ * counts as a file.
  */
-export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void, signal: AbortSignal): void {
+export function acceptDrops(
+  overlay: HTMLElement,
+  onFiles: (files: File[]) => void,
+  signal: AbortSignal,
+  onFolder?: (folder: FileSystemDirectoryHandle) => void,
+): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   window.addEventListener(
     'dragover',
@@ -52,10 +59,24 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
       overlay.hidden = true;
       if (!hasFiles(event)) return;
       event.preventDefault();
-      onFiles([...(event.dataTransfer?.files ?? [])]);
+      const files = [...(event.dataTransfer?.files ?? [])];
+      const folder = onFolder && folderIn(event.dataTransfer);
+      if (!folder) return onFiles(files);
+      // One that cannot be read is reported as a file that is no volume.
+      folder.then(onFolder, () => onFiles(files));
     },
     { signal },
   );
+}
+
+/** An item that was dropped, in browsers that have handles of folders. */
+type DroppedItem = DataTransferItem & { getAsFileSystemHandle?: () => Promise<FileSystemDirectoryHandle> };
+
+/** Returns the handle of a folder that was dropped, undefined if none was; may be called during the event only. */
+function folderIn(data: DataTransfer | null): Promise<FileSystemDirectoryHandle> | undefined {
+  const items: DroppedItem[] = [...(data?.items ?? [])];
+  const folder = items.find((item) => item.webkitGetAsEntry()?.isDirectory);
+  return folder?.getAsFileSystemHandle?.();
 }
 
 /** Returns a name for one or several files that were opened together, for display. */

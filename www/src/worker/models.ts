@@ -23,16 +23,21 @@ function startOf({ start }: Setup, iso: number): Options['start'] {
   }
 }
 
-export function buildModel(volume: Volume, setup: Setup): DeformableModel {
+/** Returns the options of the model of a set-up; if that has no iso value, one is chosen from the histogram of `volume`. */
+export function modelOptions(volume: Volume, setup: Setup) {
   const chosen = setup.params.iso;
   const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
-  const model = new DeformableModel({
-    volume,
+  return {
     start: startOf(setup, iso),
     levels: setup.levels,
     ...(setup.edge === undefined ? {} : { edge: setup.edge }),
     params: { ...setup.params, iso },
-  });
+  };
+}
+
+/** Builds the model of a set-up with the attractors in it; `make` is called without them. */
+export function withAttractors(setup: Setup, make: () => DeformableModel): DeformableModel {
+  const model = make();
   try {
     model.setAttractors(setup.attractors);
   } catch (error) {
@@ -40,6 +45,10 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
     throw error;
   }
   return model;
+}
+
+export function buildModel(volume: Volume, setup: Setup): DeformableModel {
+  return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup), volume }));
 }
 
 /**

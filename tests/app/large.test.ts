@@ -1,0 +1,111 @@
+/** Volumes larger than memory in the Extract lab: OME-Zarr images as ZIP, folder and address. */
+import { readFile } from 'node:fs/promises';
+import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
+import { at } from '../../scripts/shell.mjs';
+import { mayReach, SERVERS } from '../../www/src/ui/large-source';
+import { filesOf } from '../js/zarr-stores';
+import { type App, drop, measures, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
+
+/** A box of a stack of plant cells in two levels, of 26 × 22 × 14 and 13 × 11 × 14 voxels. */
+const IMAGE = 'v3-scaled-zyx';
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp();
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+const amount = () => app.page.textContent('.large-progress .amount');
+
+/** Opens the lab with its fast example, done. */
+async function openLab(): Promise<void> {
+  await open(app, QUICK.extract);
+  await reach(app.page, 'done');
+  await unfold(app.page);
+}
+
+/** Waits until an image that `opening` opens has been extracted, and checks the surface. */
+async function expectExtracted(opening: () => Promise<unknown>): Promise<void> {
+  const states = await recordStates(app.page);
+  await opening();
+  await expect.poll(async () => (await states()).join(' ')).toMatch(/loading.* running.* done$/);
+  await expect.poll(() => measures(app.page)).toMatchObject({ closed: true, oriented: true, crossings: 0 });
+  expect((await measures(app.page)).triangles).toBeGreaterThan(100);
+}
+
+test('a ZIP is opened, its coarsest level displayed, and the surface refined down to the finest', async () => {
+  await openLab();
+  await expectExtracted(async () =>
+    drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
+  );
+  expect(await app.page.textContent('.facts')).toMatch(/Levels26 × 22 × 14, 13 × 11 × 14/);
+  expect(await amount()).toMatch(/^[\d.]+ kB of [\d.]+ kB read, in \d+ chunks$/);
+});
+
+test('an address on the own server is read chunk by chunk; one that is missing gives a message, and nothing is lost', async () => {
+  await openLab();
+  const files = await filesOf(IMAGE);
+  await app.page.context().route('**/images/cells.zarr/**', (route) => {
+    const body = files.get(new URL(route.request().url()).pathname.replace('/images/cells.zarr', ''));
+    return body ? route.fulfill({ body: Buffer.from(body) }) : route.fulfill({ status: 404 });
+  });
+  const address = app.page.getByLabel('Address');
+  await expectExtracted(async () => {
+    await address.fill(`${app.address}images/cells.zarr`);
+    await address.press('Enter');
+  });
+  expect(await app.page.textContent('.facts')).toContain('cells.zarr');
+  const { triangles } = await measures(app.page);
+  await address.fill(`${app.address}images/none.zarr`);
+  await app.page.getByRole('button', { name: 'Open image' }).click();
+  await reach(app.page, 'error');
+  expect(await app.page.textContent('.banner')).toMatch(/none\.zarr/);
+  expect((await measures(app.page)).triangles).toBe(triangles);
+  app.complaints.splice(0);
+});
+
+test('a folder is opened', async () => {
+  await openLab();
+  const files = [...(await filesOf(IMAGE))].map(([path, bytes]) => [path.slice(1), [...bytes]] as const);
+  // The dialogue of the browser cannot be used here; the origin's private folder has the same handles.
+  await app.page.evaluate(async (list) => {
+    const root = await (await navigator.storage.getDirectory()).getDirectoryHandle('cells.zarr', { create: true });
+    for (const [path, bytes] of list) {
+      let folder = root;
+      const names = path.split('/');
+      for (const name of names.slice(0, -1)) folder = await folder.getDirectoryHandle(name, { create: true });
+      const file = await (await folder.getFileHandle(names.at(-1) ?? '', { create: true })).createWritable();
+      await file.write(Uint8Array.from(bytes));
+      await file.close();
+    }
+  }, files);
+  await app.page.addInitScript(() => {
+    const pick = async () => (await navigator.storage.getDirectory()).getDirectoryHandle('cells.zarr');
+    Object.assign(window, { showDirectoryPicker: pick });
+  });
+  await openLab();
+  await expectExtracted(() => app.page.getByRole('button', { name: 'Open a folder…' }).click());
+});
+
+test('measurements that need the whole volume say that they do not', async () => {
+  await app.page.getByRole('button', { name: 'Measure coverage' }).click();
+  await expect.poll(() => app.page.textContent('.coverage')).toMatch(/larger than memory/);
+});
+
+test('the page names the servers that it may reach, and its policy has the same', async () => {
+  const html = await readFile(at('www/index.html'), 'utf8');
+  expect(/connect-src 'self' ([^;]*);/.exec(html)?.[1]?.split(' ')).toEqual(SERVERS);
+  expect(await app.page.textContent('.large .help')).toContain('livingobjects.ebi.ac.uk');
+  const own = 'https://here.org';
+  const reachable = ['https://here.org/a.zarr', `${SERVERS[0]}/a`, 'https://bucket.s3.amazonaws.com/a.zarr'];
+  const others = ['https://there.org/a', 'http://bucket.s3.amazonaws.com/a', 'https://evils3.amazonaws.com/a'];
+  expect(reachable.map((url) => mayReach(new URL(url), own))).toEqual([true, true, true]);
+  expect(others.map((url) => mayReach(new URL(url), own))).toEqual([false, false, false]);
+  await app.page.getByLabel('Address').fill('https://example.org/image.zarr');
+  await app.page.getByLabel('Address').press('Enter');
+  expect(await app.page.textContent('.large [role=alert]')).toMatch(/^example\.org is not among/);
+});

@@ -1,0 +1,59 @@
+/**
+ * Opens volumes larger than memory in the Extract lab's worker. They need the whole library, whose models can read
+ * parts of a volume: this file is loaded when the first one is opened.
+ */
+import init, { DeformableModel, type Volume } from 'vesicle/index';
+import { openZarr, type ZarrVolume } from 'vesicle/zarr';
+import type { LargeSource, Setup, VolumeView } from '../protocol';
+import { text } from '../texts';
+import { modelOptions, withAttractors } from './models';
+import { Refusal } from './refusal';
+import { viewOf } from './volumes';
+
+/** An OME-Zarr image, and its coarsest level as a volume, which the page displays. */
+export class LargeVolume {
+  readonly #image: ZarrVolume;
+  readonly #coarsest: Volume;
+  /** Number of bytes of all levels. */
+  readonly bytes: number;
+
+  private constructor(image: ZarrVolume, coarsest: Volume) {
+    this.#image = image;
+    this.#coarsest = coarsest;
+    this.bytes = image.loaded().reduce((sum, level) => sum + level.of.bytes, 0);
+  }
+
+  /** Opens an image, and reads its coarsest level. */
+  static async open({ zarr }: LargeSource): Promise<LargeVolume> {
+    await init();
+    const image = await openZarr(zarr);
+    try {
+      const last = image.levels.length - 1;
+      const max = image.levels[last]?.dims ?? [0, 0, 0];
+      return new LargeVolume(image, await image.region(last, { min: [0, 0, 0], max }));
+    } catch (error) {
+      image.free();
+      throw error;
+    }
+  }
+
+  /** Describes the image, with the voxels of its coarsest level. */
+  view(name: string): VolumeView {
+    const levels = this.#image.levels.map(({ dims }) => dims);
+    return { ...viewOf(this.#coarsest, name), large: { levels, bytes: this.bytes } };
+  }
+
+  /** Builds a model that starts on the coarsest level, and ends as many levels below as the set-up says. */
+  model(setup: Setup): DeformableModel {
+    const coarser = this.#image.levels.length - 1;
+    if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
+    const { levels, ...options } = modelOptions(this.#coarsest, setup);
+    const finest = coarser - levels;
+    return withAttractors(setup, () => new DeformableModel({ ...options, volume: this.#image, finest }));
+  }
+
+  free(): void {
+    this.#image.free();
+    this.#coarsest.free();
+  }
+}
