@@ -28,7 +28,7 @@ export interface EditedLab {
   onLabels: () => void;
   /** Called when voxels have changed, before the surfaces follow. */
   onVoxels: () => void;
-  /** Called with surfaces that have followed a change, at first along the faces of voxels; later `smooth`. */
+  /** Called with surfaces that have followed a change; after a large one they are not `smooth` at first. */
   onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
@@ -279,15 +279,15 @@ export class SegmentEditing {
   }
 
   /**
-   * Sends the worker what has changed, as often as it is ready for more, and has it smooth the surfaces in between, step
-   * by step, so that the next change never waits for long.
+   * Sends the worker what has changed, as often as it is ready for more, and has it smooth the surfaces step by step, so
+   * that the next change never waits for long.
    */
   async #followChanges(map: number): Promise<void> {
     while (this.#map && (this.#unsent || this.#isRough)) {
       const box = this.#unsent;
       this.#unsent = undefined;
       const update = box
-        ? { ...(await this.#client.request('edit', { map, block: this.#map.block(box) })), done: false }
+        ? await this.#client.request('edit', { map, block: this.#map.block(box) })
         : await this.#client.request('step', { map });
       if (map !== this.#id) return;
       this.#isRough = !update.done || this.#unsent !== undefined;

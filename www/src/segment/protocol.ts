@@ -49,6 +49,11 @@ export interface SurfaceUpdate {
   milliseconds: number;
 }
 
+/** The surfaces that have changed, after a step; `done` says whether they are smooth. */
+export interface StepUpdate extends SurfaceUpdate {
+  done: boolean;
+}
+
 /** The open label map, with the surfaces of all its labels, which are not smooth yet. */
 export interface OpenedLabels extends SurfaceUpdate {
   /** Number of the map, which requests that concern it name; another one opened meanwhile has another number. */
@@ -77,15 +82,15 @@ export interface Requests {
   /** Replaces the label map of the open volume by that of a file, which must have the grid of the volume. */
   openLabels: { body: { files: NamedBytes[] }; reply: OpenedLabels };
   /**
-   * Changes voxels of the label map; the surfaces follow at once, along the faces of the voxels. Does nothing if another
-   * map is open.
+   * Changes voxels of the label map and makes a step, after which the surfaces are smooth unless the change was large; the
+   * reply has the surfaces in either case. Does nothing if another map is open.
    */
-  edit: { body: { map: number; block: LabelBlock }; reply: SurfaceUpdate };
+  edit: { body: { map: number; block: LabelBlock }; reply: StepUpdate };
   /**
    * Makes a step that smooths what has changed; the reply to the last one has the surfaces. Does nothing if another map
    * is open.
    */
-  step: { body: { map: number }; reply: SurfaceUpdate & { done: boolean } };
+  step: { body: { map: number }; reply: StepUpdate };
   /** Changes parameters of the surfaces, which the next steps adopt; replies with all parameters. */
   setParams: { body: ParamValues; reply: ParamValues };
   /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */
