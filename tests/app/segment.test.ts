@@ -5,6 +5,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } fr
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { labelTooth } from '../../www/src/segment/labelling';
 import { type App, anotherPage, drop, openApp, overflow, reach, unnamedControls } from './browser';
+import { dicomSeries } from './pictures';
 import { changes } from './pixels';
 import { ball } from './volumes';
 
@@ -383,6 +384,125 @@ describe('files', () => {
       expect((await measured()).labels).toEqual(before.labels);
     }
     expect(await voxels()).toEqual([...boxes()]);
+  });
+});
+
+describe('DICOM segmentations', () => {
+  const [WIDE, HIGH, DEEP] = [20, 16, 12];
+  const GRID = {
+    dims: [WIDE, HIGH, DEEP] as [number, number, number],
+    spacing: [1.2, 0.8, 2] as [number, number, number],
+    origin: [-12.5, 31.25, 7.75] as [number, number, number],
+    along: [0.8, 0.6, 0, -0.36, 0.48, 0.8] as [number, number, number, number, number, number],
+  };
+
+  /** Returns the labels of the files, computed as by the script that made them. */
+  const expected = () =>
+    Array.from({ length: WIDE * HIGH * DEEP }, (_, i) => {
+      const [x, y, z] = [i % WIDE, Math.floor(i / WIDE) % HIGH, Math.floor(i / (WIDE * HIGH))];
+      const squared = (x - 9) ** 2 + (y - 8) ** 2 + 2 * (z - 6) ** 2;
+      if (squared < 36) return squared < 9 ? 2 : 1;
+      return x >= 15 && x < 19 && y >= 2 && y < 13 && z >= 2 && z < 10 ? 3 : 0;
+    });
+
+  /** Returns the slices of the volume that the segmentations belong to. */
+  const series = (more: Partial<typeof GRID> = {}) =>
+    dicomSeries({ ...GRID, ...more, data: Uint16Array.from(expected(), (label) => 1000 + 100 * label) });
+
+  const segmentation = async (name: string) =>
+    new Uint8Array(await readFile(`tests/data/volumes/segmentation/${name}`));
+
+  /** Takes back what ITK says on the console of files that it reads, or refuses. */
+  const hushed = () =>
+    app.complaints
+      .splice(0)
+      .filter((one) => !/^console: .*(stderr|Debug mode|W: |E: |scalar image|Wrong SOP)/.test(one));
+
+  const names = async () => (await measured()).labels.map(({ name }) => name);
+
+  async function openTogether(file: string, slices = series()): Promise<void> {
+    const bytes = await segmentation(file);
+    const dropped = slices.map(({ name, buffer }) => ({ name, bytes: new Uint8Array(buffer) }));
+    await drop(app.page, [...dropped, { name: file, bytes }]);
+  }
+
+  test.each(['binary.dcm', 'overlap.dcm', 'fractional.dcm'])(
+    '%s opens with its series: its labels are at their voxels, with names and colours',
+    async (file) => {
+      await openTogether(file);
+      await app.page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), file);
+      await reach(app.page, 'done');
+      expect(await names()).toEqual(['Liver', 'Left kidney', 'Spleen']);
+      const colors = await app.page.$$eval('[data-control=color]', (all) =>
+        all.map((one) => (one as HTMLInputElement).value),
+      );
+      expect(colors).toEqual(['#dc8264', '#b96653', '#9d6ca2']);
+      expect(await voxels()).toEqual(expected());
+      expect((await of(3)).volume).toBeCloseTo(count(expected(), 3) * 1.2 * 0.8 * 2, 3);
+      const shared = count(expected(), 2);
+      if (file === 'overlap.dcm') expect(await text('.facts')).toContain(`${shared} voxels are in several segments`);
+      expect(hushed()).toEqual([]);
+    },
+  );
+
+  test('opens in the place of a label map, also for a volume whose axes have other directions', async () => {
+    // The same grid in RAS, with x backwards: as after a conversion to NIfTI.
+    const [x, y] = [GRID.along.slice(0, 3), GRID.along.slice(3)] as [number[], number[]];
+    const normal = [0.48, -0.64, 0.6];
+    const column = (way: number[], step: number) => [
+      -step * (way[0] ?? 0),
+      -step * (way[1] ?? 0),
+      step * (way[2] ?? 0),
+      0,
+    ];
+    const far = GRID.origin.map((from, axis) => from + (WIDE - 1) * 1.2 * (x[axis] ?? 0));
+    const volume = new Volume({
+      data: new Uint8Array(WIDE * HIGH * DEEP).map((_, i) => i % WIDE),
+      dims: GRID.dims,
+      affine: [
+        ...column(x, -1.2),
+        ...column(y, 0.8),
+        ...column(normal, 2),
+        -(far[0] ?? 0),
+        -(far[1] ?? 0),
+        far[2] ?? 0,
+        1,
+      ],
+      space: 'RAS',
+    });
+    await drop(app.page, [{ name: 'converted.nii', bytes: volume.toBytes('nifti') }]);
+    volume.free();
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('converted.nii'));
+    await reach(app.page, 'done');
+    await openMap('binary.dcm', await segmentation('binary.dcm'));
+    await expect.poll(names).toEqual(['Liver', 'Left kidney', 'Spleen']);
+    await reach(app.page, 'done');
+    const mirrored = expected().map((_, i, all) => all[i - (i % WIDE) + WIDE - 1 - (i % WIDE)]);
+    expect(await voxels()).toEqual(mirrored);
+    expect(hushed()).toEqual([]);
+  });
+
+  test('of another grid, beyond the volume, or of a class that cannot be read is refused, and nothing changes', async () => {
+    await openTogether('binary.dcm');
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('binary.dcm'));
+    await reach(app.page, 'done');
+    const refused: [Partial<typeof GRID>, string, RegExp][] = [
+      [{ spacing: [1.2, 0.9, 2] }, 'binary.dcm', /not voxels of the volume/],
+      [{ origin: [-12, 31.25, 7.75] }, 'binary.dcm', /not voxels of the volume/],
+      // Shifted by four slices.
+      [{ origin: [-12.5 + 8 * 0.48, 31.25 - 8 * 0.64, 7.75 + 8 * 0.6] }, 'binary.dcm', /outside the volume/],
+      [{}, 'labelmap.dcm', /Label Map Segmentation/],
+    ];
+    for (const [more, file, reason] of refused) {
+      await openTogether(file, series(more));
+      await app.page.waitForSelector('[data-state=error]');
+      expect(await text('.banner')).toMatch(reason);
+      await app.page.click('.banner button');
+      await reach(app.page, 'done');
+      expect(await names()).toEqual(['Liver', 'Left kidney', 'Spleen']);
+    }
+    expect(await voxels()).toEqual(expected());
+    expect(hushed()).toEqual([]);
   });
 });
 

@@ -1,7 +1,7 @@
 import { flood, sweep } from '../segment/brush';
 import type { SegmentClient } from '../segment/client';
 import { LabelMap, type Patch, rangeOf } from '../segment/label-map';
-import { freeValue, type Label, newLabel } from '../segment/labels';
+import { freeValue, type KnownLabel, type Label, newLabel } from '../segment/labels';
 import type { LabelArray, OpenedLabels, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
 import { union } from '../segment/region';
 import { text } from '../texts';
@@ -87,15 +87,18 @@ export class SegmentEditing {
   }
 
   /**
-   * Takes over a newly opened label map, and clears the undo history. `names` are those of an example's labels; without
-   * any label there is one to begin with.
+   * Takes over a newly opened label map, and clears the undo history. `names` are those of an example's labels, from the
+   * value 1 on; without any label there is one to begin with.
    */
   adopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, opened: OpenedLabels, names: string[]): void {
     this.#start(grid, opened);
     const present = opened.surfaces.map(({ value }) => value);
-    const named = new Map(names.map((name, i) => [i + 1, name]));
-    const values = [...new Set([...present, ...named.keys()])].sort((a, b) => a - b);
-    this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, named.get(value)));
+    const [low, high] = rangeOf(opened.voxels);
+    const described = [...names.map((name, i): KnownLabel => ({ value: i + 1, name })), ...opened.known];
+    const known = new Map(described.map((label) => [label.value, label]));
+    const possible = [...known.keys()].filter((value) => value !== 0 && value >= low && value <= high);
+    const values = [...new Set([...present, ...possible])].sort((a, b) => a - b);
+    this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, known.get(value)));
     this.#active = this.#labels[0]?.value ?? 1;
     this.#hidden.clear();
     this.#lab.onLabels();

@@ -184,7 +184,7 @@ export class SegmentLab implements Lab {
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
       this.#applyTool(this.#ui.tools.value);
-      this.#ui.data.showMap(name);
+      this.#ui.data.showMap(opened.labelFile ?? name);
       this.#showAll(opened);
     } catch (error) {
       this.#states.fail(text('labs.openFailed', { name }), error);

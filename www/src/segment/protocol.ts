@@ -4,6 +4,7 @@
  */
 import type { MeshFormat, VolumeFormat } from 'vesicle';
 import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
+import type { KnownLabel } from './labels';
 
 export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
 
@@ -59,13 +60,15 @@ export interface OpenedLabels extends SurfaceUpdate {
   /** Number of the map, which requests that concern it name; another one opened meanwhile has another number. */
   map: number;
   voxels: LabelArray;
+  /** Names and colours of labels that the file of the label map has, also of labels without voxels. */
+  known: KnownLabel[];
+  /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
+  labelFile: string | undefined;
 }
 
 export interface OpenedImage extends OpenedLabels {
   volume: VolumeView;
   params: ParamValues;
-  /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
-  labelFile: string | undefined;
 }
 
 /** Requests of the page to the Segment lab's worker: the body of each and its reply. */

@@ -22,7 +22,7 @@ import type {
   ToWorker,
 } from './protocol';
 import { forEachRow } from './region';
-import { mapLike, type OpenVolume, openImage, openLabels } from './source';
+import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -135,14 +135,13 @@ class Session {
     const began = performance.now();
     const opened = await openImage(source);
     try {
-      const live = new LiveMap(opened, labels ?? opened.labels, params);
+      const live = new LiveMap(opened, labels ?? opened.map.voxels, params);
       this.#adopt(live);
       this.#open?.volume.free();
       this.#open = opened;
-      const all = this.#all(live, began);
+      const all = this.#all(live, opened.map, began);
       const volume = viewOf(opened.volume, name);
-      const { labelFile } = opened;
-      return withTransfer({ ...all, volume, params: { ...live.surfaces.params }, labelFile }, [
+      return withTransfer({ ...all, volume, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
         all.voxels,
         volume.voxels,
@@ -156,9 +155,10 @@ class Session {
   async #openLabels(files: Requests['openLabels']['body']['files']): Promise<OpenedLabels> {
     const began = performance.now();
     const image = this.#image();
-    const live = new LiveMap(image, await openLabels(files, image.volume), { ...this.#current().surfaces.params });
+    const opened = await openLabels(files, image.volume);
+    const live = new LiveMap(image, opened.voxels, { ...this.#current().surfaces.params });
     this.#adopt(live);
-    const all = this.#all(live, began);
+    const all = this.#all(live, opened, began);
     return withTransfer(all, [...arraysOf(all), all.voxels]);
   }
 
@@ -178,8 +178,9 @@ class Session {
     this.#live = live;
   }
 
-  #all(live: LiveMap, began: number): OpenedLabels {
-    return { ...this.#update(live.surfaces.labels, began), map: live.id, voxels: live.voxels.slice() };
+  #all(live: LiveMap, { known, file }: OpenMap, began: number): OpenedLabels {
+    const update = this.#update(live.surfaces.labels, began);
+    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {
