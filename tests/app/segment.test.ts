@@ -328,7 +328,7 @@ describe('files', () => {
     async (format) => {
       const before = await measured();
       const { name, bytes } = await saved(`[data-map=${format}]`);
-      expect(name).toMatch(/^image-labels\.(nii\.gz|nrrd|mha)$/);
+      expect(name).toMatch(/^image-labels\.(nii\.gz|seg\.nrrd|mha)$/);
       // Compressed: as a whole, or inside.
       expect([...bytes.subarray(0, 2)].join() === '31,139').toBe(format === 'nifti');
       expect(bytes.length).toBeLessThan(SIZE ** 3 / 8);
@@ -347,6 +347,49 @@ describe('files', () => {
       expect(await voxels()).toEqual([...boxes()]);
     },
   );
+
+  test('names and colours are kept in NRRD files', async () => {
+    const list = () =>
+      app.page.$$eval('.labels li', (items) =>
+        items.map((item) =>
+          ['name', 'color'].map((control) => item.querySelector<HTMLInputElement>(`[data-control=${control}]`)?.value),
+        ),
+      );
+    for (const [value, name, color] of [
+      [3, 'Größe \\ 1', '#336699'],
+      [7, 'Right: part', '#c0ffee'],
+    ] as const) {
+      await app.page.fill(`[data-control=name][data-value="${value}"]`, name);
+      await app.page.locator(`[data-control=name][data-value="${value}"]`).press('Enter');
+      await app.page.fill(`[data-control=color][data-value="${value}"]`, color);
+    }
+    const named = await list();
+    expect(named).toEqual([
+      ['Größe \\ 1', '#336699'],
+      ['Right: part', '#c0ffee'],
+    ]);
+    const { name, bytes } = await saved('[data-map=nrrd]');
+    await openMap('plain.nii', ballFile(boxes()));
+    await expect.poll(async () => (await list())[0]?.[0]).toBe('Label 3');
+    await reach(app.page, 'done');
+    await openMap(name, bytes);
+    await expect.poll(list).toEqual(named);
+    await reach(app.page, 'done');
+    // Both at once, the label map first: it is recognised by the names in it.
+    await drop(app.page, [
+      { name: 'a.nrrd', bytes },
+      { name: 'b.nii', bytes: ballFile() },
+    ]);
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('a.nrrd'));
+    await reach(app.page, 'done');
+    expect(await list()).toEqual(named);
+    await drop(app.page, [
+      { name: 'image.nii', bytes: ballFile() },
+      { name: 'image-labels.nii', bytes: ballFile(boxes()) },
+    ]);
+    await expect.poll(async () => (await list())[0]?.[0]).toBe('Label 3');
+    await reach(app.page, 'done');
+  });
 
   test('surfaces are saved as one GLB with named nodes, and as a file for each label', async () => {
     await app.page.fill('[data-control=name][data-value="7"]', 'Left part');

@@ -4,7 +4,7 @@
  */
 import type { MeshFormat, VolumeFormat } from 'vesicle';
 import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
-import type { KnownLabel } from './labels';
+import type { KnownLabel, Label } from './labels';
 
 export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
 
@@ -98,8 +98,8 @@ export interface Requests {
   setParams: { body: ParamValues; reply: ParamValues };
   /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */
   mask: { body: { low: number; high: number }; reply: Uint8Array };
-  /** Replies with the label map as a file, in the geometry of the volume. */
-  exportMap: { body: { format: VolumeFormat }; reply: Uint8Array };
+  /** Replies with the label map as a file, in the geometry of the volume; NRRD has names and colours of the labels, too. */
+  exportMap: { body: { format: VolumeFormat; labels: readonly Label[] }; reply: Uint8Array };
   /** Replies with the surface of a label as a file. */
   exportMesh: { body: { value: number; format: MeshFormat }; reply: Uint8Array };
 }

@@ -10,6 +10,7 @@ import { readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { KnownLabel } from './labels';
 import type { ImageSource, LabelArray, Labelling, NamedBytes, Vec3 } from './protocol';
+import { labelsIn } from './slicer';
 
 /** Number of different values beyond which a volume is no label map. */
 const MOST_LABELS = 65_536;
@@ -104,7 +105,8 @@ async function readMap(group: NamedBytes[]): Promise<NamedVolume> {
     const name = shared > 0 ? text('segment.sharedVoxels', { file: first.name, count: count(shared) }) : first.name;
     return { name, init, known: labels, isCropped: true };
   }
-  return { name: first?.name ?? '', init: await readFiles(group), known: [], isCropped: false };
+  const known = group.flatMap(({ bytes }) => labelsIn(bytes));
+  return { name: first?.name ?? '', init: await readFiles(group), known, isCropped: known.length > 0 };
 }
 
 /**

@@ -22,6 +22,7 @@ import type {
   ToWorker,
 } from './protocol';
 import { forEachRow } from './region';
+import { withLabels } from './slicer';
 import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
 
 type Handlers = {
@@ -127,7 +128,11 @@ class Session {
       return { ...surfaces.params };
     },
     mask: ({ low, high }) => this.#mask(low, high),
-    exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: true }),
+    exportMap: ({ format, labels }) => {
+      const { map } = this.#current();
+      const file = map.toBytes(format, { gzip: true });
+      return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
+    },
     exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
   };
 
