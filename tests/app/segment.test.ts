@@ -190,6 +190,56 @@ describe('a volume without a label map', () => {
     await changes(app.page, before, () => slice.screenshot(), 0.02, 'the coronal slice');
   });
 
+  test('draws the outline of each visible surface on the slices, in the colour of its label', async () => {
+    /** Returns the box of the pixels of a slice that have a colour, in voxels, and their number. */
+    const colored = (slice: string, rgb: [number, number, number]) =>
+      app.page.locator(`.slice canvas[aria-label^="${slice}"]`).evaluate(
+        (canvas, [size, ...rgb]) => {
+          const { width, height } = canvas as HTMLCanvasElement;
+          const pixels = (canvas as HTMLCanvasElement).getContext('2d')?.getImageData(0, 0, width, height).data ?? [];
+          const found: [number, number][] = [];
+          for (let i = 0; i < width * height; i++)
+            if (rgb.every((value, k) => Math.abs((pixels[4 * i + k] ?? 0) - value) < 12))
+              found.push([i % width, Math.floor(i / width)]);
+          const span = [0, 1].map((k) => {
+            const all = found.map((at) => at[k] ?? 0);
+            return (Math.max(...all) - Math.min(...all)) / (Math.min(width, height) / size);
+          });
+          return { count: found.length, span };
+        },
+        [SIZE, ...rgb] as [number, number, number, number],
+      );
+    const orange = () => colored('Axial', [230, 159, 0]);
+    await app.page.fill('[data-view=opacity]', '0');
+    await tool('brush', 5);
+    await followed(() => drag('Axial', [-6, 0], [6, 0]));
+    // The outline of the brush would cover that of the surface.
+    await app.page.mouse.move(0, 0);
+    const { count: pixels, span } = await orange();
+    expect(pixels).toBeGreaterThan(100);
+    // A ball of radius 5.5 voxels along 12 voxels; the line has a width.
+    expect(span[0]).toBeGreaterThan(21);
+    expect(span[0]).toBeLessThan(25);
+    expect(span[1]).toBeGreaterThan(9.5);
+    expect(span[1]).toBeLessThan(13);
+    await app.page.uncheck('[data-view=outlines]');
+    expect((await orange()).count).toBe(0);
+    expect(await app.page.evaluate(() => location.hash)).toContain('outlines=false');
+    await app.page.check('[data-view=outlines]');
+    expect((await orange()).count).toBe(pixels);
+    for (let i = 0; i < 8; i++) await app.page.keyboard.press('.');
+    expect((await orange()).count).toBe(0);
+    for (let i = 0; i < 8; i++) await app.page.keyboard.press(',');
+    expect((await orange()).count).toBe(pixels);
+    await app.page.click('[data-control=visible][data-value="1"]');
+    expect((await orange()).count).toBe(0);
+    await app.page.click('[data-control=visible][data-value="1"]');
+    await tool('eraser', 3);
+    await followed(() => drag('Axial', [0, 0]));
+    expect((await orange()).count).toBeGreaterThan(pixels);
+    await app.page.fill('[data-view=opacity]', '0.5');
+  });
+
   test('undo and redo restore the voxels of each stroke, and the surfaces follow', async () => {
     await tool('brush', 2);
     await followed(() => drag('Axial', [-6, -4], [6, -4]));

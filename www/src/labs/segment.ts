@@ -221,8 +221,8 @@ export class SegmentLab implements Lab {
 
   #show({ surfaces }: SurfaceUpdate): void {
     if (surfaces.length > 0) this.#updates += 1;
+    this.#ui.view.showSurfaces(surfaces);
     for (const { value, voxels, volume, area, surface } of surfaces) {
-      this.#ui.view.showSurface(value, surface);
       const { vertices = 0, triangles = 0 } = surface ?? {};
       const version = (this.#measures.get(value)?.version ?? 0) + 1;
       this.#measures.set(value, { value, voxels, volume, area, vertices, triangles, version });
