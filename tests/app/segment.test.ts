@@ -295,6 +295,60 @@ describe('a volume without a label map', () => {
     expect(count(await voxels(), 1)).toBeLessThan(count(filled, 1) - 20);
   });
 
+  test('fill in the volume reaches the inside of a label, or intensities in the range, and not beyond its distance', async () => {
+    const [intensities, middle] = [ball(), 15 * (1 + SIZE + SIZE ** 2)];
+    await tool('fill');
+    await app.page.selectOption('[data-tool-setting=extent]', 'box');
+    await app.page.check('[data-tool-setting=in-range]');
+    await app.page.fill('[data-tool-setting=low]', '128');
+    await app.page.fill('[data-tool-setting=high]', '300');
+    await app.page.locator('[data-tool-setting=high]').blur();
+    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
+    const before = await slice.screenshot();
+    await changes(app.page, before, () => slice.screenshot(), 0.02, 'the mask');
+    await followed(() => app.page.keyboard.press('p'));
+    const whole = await voxels();
+    expect(whole).toEqual(Array.from(intensities, (value) => Number(value >= 128)));
+    await followed(() => app.page.keyboard.press('u'));
+    expect(count(await voxels(), 1)).toBe(0);
+    await app.page.fill('[data-tool-setting=reach]', '3');
+    await app.page.locator('[data-tool-setting=reach]').blur();
+    await followed(() => app.page.keyboard.press('p'));
+    expect(count(await voxels(), 1)).toBe(7 ** 3);
+    await app.page.fill('[data-tool-setting=reach]', '100');
+    await app.page.locator('[data-tool-setting=reach]').blur();
+    await followed(() => app.page.keyboard.press('u'));
+    await app.page.fill('[data-tool-setting=low]', '299');
+    await app.page.locator('[data-tool-setting=low]').blur();
+    await expect
+      .poll(async () => {
+        await app.page.keyboard.press('p');
+        return text('.status');
+      })
+      .toMatch(/^Nothing to fill/);
+    expect(count(await voxels(), 1)).toBe(0);
+    const untinted = await slice.screenshot();
+    await app.page.fill('[data-tool-setting=low]', '128');
+    await app.page.locator('[data-tool-setting=low]').blur();
+    await changes(app.page, untinted, () => slice.screenshot(), 0.02, 'the mask');
+    // A cavity of another label, in a ball: the background around is not reached.
+    await followed(() => app.page.keyboard.press('p'));
+    await tool('eraser', 4);
+    await app.page.selectOption('[data-tool-setting=shape]', 'ball');
+    await followed(() => app.page.keyboard.press('p'));
+    expect((await voxels())[middle]).toBe(0);
+    await app.page.click('[data-label=add]');
+    await tool('fill');
+    await app.page.uncheck('[data-tool-setting=in-range]');
+    await followed(() => app.page.keyboard.press('p'));
+    const filled = await voxels();
+    expect(filled.map((label) => Number(label > 0))).toEqual(whole);
+    expect(filled[middle]).toBe(2);
+    expect(count(filled, 2)).toBe((await of(2)).voxels);
+    expect(count(filled, 2)).toBeGreaterThan(150);
+    await app.page.selectOption('[data-tool-setting=extent]', 'slice');
+  });
+
   test('labels are added, named, coloured, hidden and removed, and other labels can be kept', async () => {
     await tool('brush', 4);
     await followed(() => drag('Axial', [-3, 0]));
@@ -505,7 +559,7 @@ describe('DICOM segmentations', () => {
   const segmentation = async (name: string) =>
     new Uint8Array(await readFile(`tests/data/volumes/segmentation/${name}`));
 
-  /** Takes back what ITK says on the console of files that it reads, or refuses. */
+  /** Returns the complaints but for messages of ITK about files that it reads or refuses. */
   const hushed = () =>
     app.complaints
       .splice(0)

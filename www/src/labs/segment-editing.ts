@@ -1,11 +1,11 @@
-import { flood, sweep } from '../segment/brush';
+import { flood, floodBox, sweep } from '../segment/brush';
 import type { SegmentClient } from '../segment/client';
 import { LabelMap, type Patch, rangeOf } from '../segment/label-map';
 import { freeValue, type KnownLabel, type Label, newLabel } from '../segment/labels';
 import type { LabelArray, OpenedLabels, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
-import { union } from '../segment/region';
+import { grown, union } from '../segment/region';
 import { text } from '../texts';
-import type { ToolSettings } from '../ui/segment-tools';
+import { type ToolSettings, usesRange } from '../ui/segment-tools';
 import type { Axis } from '../view/anatomy';
 import type { Grip } from '../view/panel';
 import { UndoStack } from './undo';
@@ -32,6 +32,8 @@ export interface EditedLab {
   onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
+  /** Called when a fill has reached no voxel, since the one pressed is not in the range of intensities. */
+  onNothing: () => void;
   onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
   onError: (title: string, error: unknown) => void;
 }
@@ -127,7 +129,7 @@ export class SegmentEditing {
     // Nobody wants to paint what cannot be seen.
     if (settings.tool !== 'eraser' && this.#hidden.has(this.#active)) this.setVisible(this.#active, true);
     if (settings.tool === 'fill') {
-      this.#fill(at, axis);
+      if (!this.#fill(at, axis, settings)) this.#lab.onNothing();
       return { move: () => undefined, drop: () => undefined };
     }
     let last = at;
@@ -229,13 +231,22 @@ export class SegmentEditing {
     if (box && changed) this.#changed(box);
   }
 
-  #fill(at: Vec3, axis: Axis): void {
+  /** Fills a region around a position in voxels; returns false if the voxel there is not in the range of intensities. */
+  #fill(at: Vec3, axis: Axis, settings: ToolSettings): boolean {
     const map = this.#map;
-    if (!map) return;
+    const mask = usesRange(settings) ? this.mask : undefined;
+    // Until the worker has said which voxels are in the range, none is.
+    if (!map || (usesRange(settings) && !mask)) return true;
     const seed = at.map((x, one) => Math.min((map.dims[one] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3;
-    const box = flood(map.voxels, map, axis, seed, (index) => map.set(index, this.#active));
+    const visit = (index: number) => map.set(index, this.#active);
+    const reachable = grown({ min: seed, dims: [1, 1, 1] }, settings.reach, map.dims);
+    const box =
+      settings.extent === 'slice'
+        ? flood(map.voxels, map, axis, seed, visit)
+        : floodBox(map.voxels, map, { box: reachable, ...(mask && { mask }) }, seed, visit);
     if (box) this.#changed(box);
     this.#endStroke(text('segment.fillStroke'));
+    return box !== undefined;
   }
 
   #endStroke(name: string): void {

@@ -9,7 +9,7 @@ export interface Label {
   color: string;
 }
 
-/** What a file, or an example, says of a label. */
+/** A label of a file or an example, as far as that describes it. */
 export interface KnownLabel {
   value: number;
   name?: string;
