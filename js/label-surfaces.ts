@@ -70,7 +70,8 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
 
   /**
    * Returns the surface of a label in world space: the same live {@link Mesh} at every call. It shows the current state,
-   * is empty while the label has no voxels, and is freed with the surfaces.
+   * is empty while the label has no voxels, and is freed with the surfaces. Its versions increase only when this surface
+   * changes.
    *
    * @throws {@link VesicleError} `invalid-argument`: a label that never had a surface.
    */

@@ -28,10 +28,13 @@ function relaxPolicyWhileDeveloping(): Plugin {
   };
 }
 
-/** Lays the program that reads DICOM beside the page, under the names that its loader asks for. */
+/** Programs that read DICOM: series of slices, and segmentations, whose segments overlap or not. */
+const DICOM_READERS = ['read-image-dicom-file-series', 'read-segmentation', 'read-overlapping-segmentation'];
+
+/** Lays the programs that read DICOM beside the page, under the names that their loader asks for. */
 function dicomBeside(): Plugin {
   const folder = here('../node_modules/@itk-wasm/dicom/dist/pipelines/');
-  const names = ['js', 'wasm.zst'].map((kind) => `read-image-dicom-file-series.${kind}`);
+  const names = DICOM_READERS.flatMap((name) => [`${name}.js`, `${name}.wasm.zst`]);
   return {
     name: 'dicom-beside',
     generateBundle() {

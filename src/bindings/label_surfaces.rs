@@ -66,11 +66,12 @@ impl LiveSurface for LabelMesh {
     }
 
     fn counts(&self) -> [usize; 2] {
-        let mesh = self.surface();
-        [mesh.positions.len(), mesh.triangles.len()]
+        self.surfaces.borrow().mesh_counts(self.label).unwrap_or_default()
     }
 
     fn versions(&self) -> [u32; 2] {
-        self.surfaces.borrow().versions()
+        let surfaces = self.surfaces.borrow();
+        // A restored state may not know labels that had lost all voxels.
+        surfaces.mesh_versions(self.label).unwrap_or_else(|_| surfaces.versions())
     }
 }

@@ -79,6 +79,14 @@ describe('DICOM', () => {
     for (const [axis, expected] of [10.325, -10.85, 45].entries()) expect(centroid[axis]).toBeCloseTo(expected, 1);
   });
 
+  test('a segmentation alone opens as a volume of its labels', async () => {
+    const buffer = await readFile('tests/data/volumes/segmentation/binary.dcm');
+    await open([{ name: 'binary.dcm', mimeType: 'application/dicom', buffer }], 'binary.dcm');
+    expect(await fact('Voxels')).toBe('20 × 16 × 9');
+    expect(await fact('Intensities')).toBe('0 to 3');
+    expect(app.complaints.splice(0).filter((complaint) => !/W: /.test(complaint))).toEqual([]);
+  });
+
   test('invalid DICOM files are refused with a reason', async () => {
     const broken = Buffer.concat([Buffer.alloc(128), Buffer.from('DICM'), Buffer.from('nothing of that kind')]);
     await app.page.setInputFiles('input[type=file]', [

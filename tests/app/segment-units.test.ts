@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { randomNumbers } from '../../bench/random.mjs';
 import { fromHash, INITIAL_VIEW, linkOf, toHash } from '../../www/src/labs/segment-link';
 import { UndoStack } from '../../www/src/labs/undo';
-import { flood, sweep } from '../../www/src/segment/brush';
+import { flood, floodBox, sweep } from '../../www/src/segment/brush';
 import { SEGMENT_EXAMPLES } from '../../www/src/segment/examples';
 import { LabelMap, rangeOf } from '../../www/src/segment/label-map';
 import { labelHead, labelTooth } from '../../www/src/segment/labelling';
@@ -91,6 +91,38 @@ test('fill reaches the connected voxels of one label in one slice', () => {
   expect(found.size).toBe(4 * 7 - 1);
   expect([...found].every((index) => placeOf(index)[0] > 4 && placeOf(index)[2] === 2)).toBe(true);
   expect(box).toEqual({ min: [5, 0, 2], dims: [4, 7, 1] });
+});
+
+test('fill in three dimensions reaches what repeated growth reaches, within its box and mask', () => {
+  const draw = randomNumbers(20261126);
+  const isOpen = (at: Vec3, low: Vec3, high: Vec3) => at.every((x, k) => x >= (low[k] ?? 0) && x <= (high[k] ?? 0));
+  for (let round = 0; round < 100; round++) {
+    const voxels = Uint8Array.from({ length: COUNT }, () => Math.floor(2.5 * draw()) % 2);
+    const mask = round % 2 === 0 ? undefined : Uint8Array.from({ length: COUNT }, () => Number(draw() < 0.8));
+    const seed = DIMS.map((size) => Math.floor(size * draw())) as Vec3;
+    const box = grown({ min: seed, dims: [1, 1, 1] }, 1 + Math.floor(4 * draw()), DIMS);
+    const high = box.min.map((low, axis) => low + (box.dims[axis] ?? 0) - 1) as Vec3;
+    const label = voxels[indexOf(seed)];
+    const reached = new Set<number>();
+    const open = (index: number) =>
+      voxels[index] === label && (!mask || mask[index] === 1) && isOpen(placeOf(index), box.min, high);
+    if (open(indexOf(seed))) reached.add(indexOf(seed));
+    for (let before = -1; before < reached.size; ) {
+      before = reached.size;
+      for (let index = 0; index < COUNT; index++) {
+        const at = placeOf(index);
+        const isBeside = [...reached].some((one) => {
+          const other = placeOf(one);
+          return at.reduce((sum, x, axis) => sum + Math.abs(x - (other[axis] ?? 0)), 0) === 1;
+        });
+        if (isBeside && open(index)) reached.add(index);
+      }
+    }
+    const found: number[] = [];
+    const filled = floodBox(voxels, { dims: DIMS }, { box, ...(mask && { mask }) }, seed, (index) => found.push(index));
+    expect(found.sort((a, b) => a - b)).toEqual([...reached].sort((a, b) => a - b));
+    expect(filled).toEqual(boxOf(found, DIMS));
+  }
 });
 
 describe('a label map', () => {

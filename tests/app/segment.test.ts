@@ -5,6 +5,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } fr
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { labelTooth } from '../../www/src/segment/labelling';
 import { type App, anotherPage, drop, openApp, overflow, reach, unnamedControls } from './browser';
+import { dicomSeries } from './pictures';
 import { changes } from './pixels';
 import { ball } from './volumes';
 
@@ -189,6 +190,56 @@ describe('a volume without a label map', () => {
     await changes(app.page, before, () => slice.screenshot(), 0.02, 'the coronal slice');
   });
 
+  test('draws the outline of each visible surface on the slices, in the colour of its label', async () => {
+    /** Returns the box of the pixels of a slice that have a colour, in voxels, and their number. */
+    const colored = (slice: string, rgb: [number, number, number]) =>
+      app.page.locator(`.slice canvas[aria-label^="${slice}"]`).evaluate(
+        (canvas, [size, ...rgb]) => {
+          const { width, height } = canvas as HTMLCanvasElement;
+          const pixels = (canvas as HTMLCanvasElement).getContext('2d')?.getImageData(0, 0, width, height).data ?? [];
+          const found: [number, number][] = [];
+          for (let i = 0; i < width * height; i++)
+            if (rgb.every((value, k) => Math.abs((pixels[4 * i + k] ?? 0) - value) < 12))
+              found.push([i % width, Math.floor(i / width)]);
+          const span = [0, 1].map((k) => {
+            const all = found.map((at) => at[k] ?? 0);
+            return (Math.max(...all) - Math.min(...all)) / (Math.min(width, height) / size);
+          });
+          return { count: found.length, span };
+        },
+        [SIZE, ...rgb] as [number, number, number, number],
+      );
+    const orange = () => colored('Axial', [230, 159, 0]);
+    await app.page.fill('[data-view=opacity]', '0');
+    await tool('brush', 5);
+    await followed(() => drag('Axial', [-6, 0], [6, 0]));
+    // The outline of the brush would cover that of the surface.
+    await app.page.mouse.move(0, 0);
+    const { count: pixels, span } = await orange();
+    expect(pixels).toBeGreaterThan(100);
+    // A ball of radius 5.5 voxels along 12 voxels; the line has a width.
+    expect(span[0]).toBeGreaterThan(21);
+    expect(span[0]).toBeLessThan(25);
+    expect(span[1]).toBeGreaterThan(9.5);
+    expect(span[1]).toBeLessThan(13);
+    await app.page.uncheck('[data-view=outlines]');
+    expect((await orange()).count).toBe(0);
+    expect(await app.page.evaluate(() => location.hash)).toContain('outlines=false');
+    await app.page.check('[data-view=outlines]');
+    expect((await orange()).count).toBe(pixels);
+    for (let i = 0; i < 8; i++) await app.page.keyboard.press('.');
+    expect((await orange()).count).toBe(0);
+    for (let i = 0; i < 8; i++) await app.page.keyboard.press(',');
+    expect((await orange()).count).toBe(pixels);
+    await app.page.click('[data-control=visible][data-value="1"]');
+    expect((await orange()).count).toBe(0);
+    await app.page.click('[data-control=visible][data-value="1"]');
+    await tool('eraser', 3);
+    await followed(() => drag('Axial', [0, 0]));
+    expect((await orange()).count).toBeGreaterThan(pixels);
+    await app.page.fill('[data-view=opacity]', '0.5');
+  });
+
   test('undo and redo restore the voxels of each stroke, and the surfaces follow', async () => {
     await tool('brush', 2);
     await followed(() => drag('Axial', [-6, -4], [6, -4]));
@@ -242,6 +293,60 @@ describe('a volume without a label map', () => {
     await tool('eraser', 3);
     await followed(() => drag('Axial', [0, 0]));
     expect(count(await voxels(), 1)).toBeLessThan(count(filled, 1) - 20);
+  });
+
+  test('fill in the volume reaches the inside of a label, or intensities in the range, and not beyond its distance', async () => {
+    const [intensities, middle] = [ball(), 15 * (1 + SIZE + SIZE ** 2)];
+    await tool('fill');
+    await app.page.selectOption('[data-tool-setting=extent]', 'box');
+    await app.page.check('[data-tool-setting=in-range]');
+    await app.page.fill('[data-tool-setting=low]', '128');
+    await app.page.fill('[data-tool-setting=high]', '300');
+    await app.page.locator('[data-tool-setting=high]').blur();
+    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
+    const before = await slice.screenshot();
+    await changes(app.page, before, () => slice.screenshot(), 0.02, 'the mask');
+    await followed(() => app.page.keyboard.press('p'));
+    const whole = await voxels();
+    expect(whole).toEqual(Array.from(intensities, (value) => Number(value >= 128)));
+    await followed(() => app.page.keyboard.press('u'));
+    expect(count(await voxels(), 1)).toBe(0);
+    await app.page.fill('[data-tool-setting=reach]', '3');
+    await app.page.locator('[data-tool-setting=reach]').blur();
+    await followed(() => app.page.keyboard.press('p'));
+    expect(count(await voxels(), 1)).toBe(7 ** 3);
+    await app.page.fill('[data-tool-setting=reach]', '100');
+    await app.page.locator('[data-tool-setting=reach]').blur();
+    await followed(() => app.page.keyboard.press('u'));
+    await app.page.fill('[data-tool-setting=low]', '299');
+    await app.page.locator('[data-tool-setting=low]').blur();
+    await expect
+      .poll(async () => {
+        await app.page.keyboard.press('p');
+        return text('.status');
+      })
+      .toMatch(/^Nothing to fill/);
+    expect(count(await voxels(), 1)).toBe(0);
+    const untinted = await slice.screenshot();
+    await app.page.fill('[data-tool-setting=low]', '128');
+    await app.page.locator('[data-tool-setting=low]').blur();
+    await changes(app.page, untinted, () => slice.screenshot(), 0.02, 'the mask');
+    // A cavity of another label, in a ball: the background around is not reached.
+    await followed(() => app.page.keyboard.press('p'));
+    await tool('eraser', 4);
+    await app.page.selectOption('[data-tool-setting=shape]', 'ball');
+    await followed(() => app.page.keyboard.press('p'));
+    expect((await voxels())[middle]).toBe(0);
+    await app.page.click('[data-label=add]');
+    await tool('fill');
+    await app.page.uncheck('[data-tool-setting=in-range]');
+    await followed(() => app.page.keyboard.press('p'));
+    const filled = await voxels();
+    expect(filled.map((label) => Number(label > 0))).toEqual(whole);
+    expect(filled[middle]).toBe(2);
+    expect(count(filled, 2)).toBe((await of(2)).voxels);
+    expect(count(filled, 2)).toBeGreaterThan(150);
+    await app.page.selectOption('[data-tool-setting=extent]', 'slice');
   });
 
   test('labels are added, named, coloured, hidden and removed, and other labels can be kept', async () => {
@@ -327,7 +432,7 @@ describe('files', () => {
     async (format) => {
       const before = await measured();
       const { name, bytes } = await saved(`[data-map=${format}]`);
-      expect(name).toMatch(/^image-labels\.(nii\.gz|nrrd|mha)$/);
+      expect(name).toMatch(/^image-labels\.(nii\.gz|seg\.nrrd|mha)$/);
       // Compressed: as a whole, or inside.
       expect([...bytes.subarray(0, 2)].join() === '31,139').toBe(format === 'nifti');
       expect(bytes.length).toBeLessThan(SIZE ** 3 / 8);
@@ -346,6 +451,49 @@ describe('files', () => {
       expect(await voxels()).toEqual([...boxes()]);
     },
   );
+
+  test('names and colours are kept in NRRD files', async () => {
+    const list = () =>
+      app.page.$$eval('.labels li', (items) =>
+        items.map((item) =>
+          ['name', 'color'].map((control) => item.querySelector<HTMLInputElement>(`[data-control=${control}]`)?.value),
+        ),
+      );
+    for (const [value, name, color] of [
+      [3, 'Größe \\ 1', '#336699'],
+      [7, 'Right: part', '#c0ffee'],
+    ] as const) {
+      await app.page.fill(`[data-control=name][data-value="${value}"]`, name);
+      await app.page.locator(`[data-control=name][data-value="${value}"]`).press('Enter');
+      await app.page.fill(`[data-control=color][data-value="${value}"]`, color);
+    }
+    const named = await list();
+    expect(named).toEqual([
+      ['Größe \\ 1', '#336699'],
+      ['Right: part', '#c0ffee'],
+    ]);
+    const { name, bytes } = await saved('[data-map=nrrd]');
+    await openMap('plain.nii', ballFile(boxes()));
+    await expect.poll(async () => (await list())[0]?.[0]).toBe('Label 3');
+    await reach(app.page, 'done');
+    await openMap(name, bytes);
+    await expect.poll(list).toEqual(named);
+    await reach(app.page, 'done');
+    // Both at once, the label map first: it is recognised by the names in it.
+    await drop(app.page, [
+      { name: 'a.nrrd', bytes },
+      { name: 'b.nii', bytes: ballFile() },
+    ]);
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('a.nrrd'));
+    await reach(app.page, 'done');
+    expect(await list()).toEqual(named);
+    await drop(app.page, [
+      { name: 'image.nii', bytes: ballFile() },
+      { name: 'image-labels.nii', bytes: ballFile(boxes()) },
+    ]);
+    await expect.poll(async () => (await list())[0]?.[0]).toBe('Label 3');
+    await reach(app.page, 'done');
+  });
 
   test('surfaces are saved as one GLB with named nodes, and as a file for each label', async () => {
     await app.page.fill('[data-control=name][data-value="7"]', 'Left part');
@@ -383,6 +531,125 @@ describe('files', () => {
       expect((await measured()).labels).toEqual(before.labels);
     }
     expect(await voxels()).toEqual([...boxes()]);
+  });
+});
+
+describe('DICOM segmentations', () => {
+  const [WIDE, HIGH, DEEP] = [20, 16, 12];
+  const GRID = {
+    dims: [WIDE, HIGH, DEEP] as [number, number, number],
+    spacing: [1.2, 0.8, 2] as [number, number, number],
+    origin: [-12.5, 31.25, 7.75] as [number, number, number],
+    along: [0.8, 0.6, 0, -0.36, 0.48, 0.8] as [number, number, number, number, number, number],
+  };
+
+  /** Returns the labels of the files, computed as by the script that made them. */
+  const expected = () =>
+    Array.from({ length: WIDE * HIGH * DEEP }, (_, i) => {
+      const [x, y, z] = [i % WIDE, Math.floor(i / WIDE) % HIGH, Math.floor(i / (WIDE * HIGH))];
+      const squared = (x - 9) ** 2 + (y - 8) ** 2 + 2 * (z - 6) ** 2;
+      if (squared < 36) return squared < 9 ? 2 : 1;
+      return x >= 15 && x < 19 && y >= 2 && y < 13 && z >= 2 && z < 10 ? 3 : 0;
+    });
+
+  /** Returns the slices of the volume that the segmentations belong to. */
+  const series = (more: Partial<typeof GRID> = {}) =>
+    dicomSeries({ ...GRID, ...more, data: Uint16Array.from(expected(), (label) => 1000 + 100 * label) });
+
+  const segmentation = async (name: string) =>
+    new Uint8Array(await readFile(`tests/data/volumes/segmentation/${name}`));
+
+  /** Returns the complaints but for messages of ITK about files that it reads or refuses. */
+  const hushed = () =>
+    app.complaints
+      .splice(0)
+      .filter((one) => !/^console: .*(stderr|Debug mode|W: |E: |scalar image|Wrong SOP)/.test(one));
+
+  const names = async () => (await measured()).labels.map(({ name }) => name);
+
+  async function openTogether(file: string, slices = series()): Promise<void> {
+    const bytes = await segmentation(file);
+    const dropped = slices.map(({ name, buffer }) => ({ name, bytes: new Uint8Array(buffer) }));
+    await drop(app.page, [...dropped, { name: file, bytes }]);
+  }
+
+  test.each(['binary.dcm', 'overlap.dcm', 'fractional.dcm'])(
+    '%s opens with its series: its labels are at their voxels, with names and colours',
+    async (file) => {
+      await openTogether(file);
+      await app.page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), file);
+      await reach(app.page, 'done');
+      expect(await names()).toEqual(['Liver', 'Left kidney', 'Spleen']);
+      const colors = await app.page.$$eval('[data-control=color]', (all) =>
+        all.map((one) => (one as HTMLInputElement).value),
+      );
+      expect(colors).toEqual(['#dc8264', '#b96653', '#9d6ca2']);
+      expect(await voxels()).toEqual(expected());
+      expect((await of(3)).volume).toBeCloseTo(count(expected(), 3) * 1.2 * 0.8 * 2, 3);
+      const shared = count(expected(), 2);
+      if (file === 'overlap.dcm') expect(await text('.facts')).toContain(`${shared} voxels are in several segments`);
+      expect(hushed()).toEqual([]);
+    },
+  );
+
+  test('opens in the place of a label map, also for a volume whose axes have other directions', async () => {
+    // The same grid in RAS, with x backwards: as after a conversion to NIfTI.
+    const [x, y] = [GRID.along.slice(0, 3), GRID.along.slice(3)] as [number[], number[]];
+    const normal = [0.48, -0.64, 0.6];
+    const column = (way: number[], step: number) => [
+      -step * (way[0] ?? 0),
+      -step * (way[1] ?? 0),
+      step * (way[2] ?? 0),
+      0,
+    ];
+    const far = GRID.origin.map((from, axis) => from + (WIDE - 1) * 1.2 * (x[axis] ?? 0));
+    const volume = new Volume({
+      data: new Uint8Array(WIDE * HIGH * DEEP).map((_, i) => i % WIDE),
+      dims: GRID.dims,
+      affine: [
+        ...column(x, -1.2),
+        ...column(y, 0.8),
+        ...column(normal, 2),
+        -(far[0] ?? 0),
+        -(far[1] ?? 0),
+        far[2] ?? 0,
+        1,
+      ],
+      space: 'RAS',
+    });
+    await drop(app.page, [{ name: 'converted.nii', bytes: volume.toBytes('nifti') }]);
+    volume.free();
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('converted.nii'));
+    await reach(app.page, 'done');
+    await openMap('binary.dcm', await segmentation('binary.dcm'));
+    await expect.poll(names).toEqual(['Liver', 'Left kidney', 'Spleen']);
+    await reach(app.page, 'done');
+    const mirrored = expected().map((_, i, all) => all[i - (i % WIDE) + WIDE - 1 - (i % WIDE)]);
+    expect(await voxels()).toEqual(mirrored);
+    expect(hushed()).toEqual([]);
+  });
+
+  test('of another grid, beyond the volume, or of a class that cannot be read is refused, and nothing changes', async () => {
+    await openTogether('binary.dcm');
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('binary.dcm'));
+    await reach(app.page, 'done');
+    const refused: [Partial<typeof GRID>, string, RegExp][] = [
+      [{ spacing: [1.2, 0.9, 2] }, 'binary.dcm', /not voxels of the volume/],
+      [{ origin: [-12, 31.25, 7.75] }, 'binary.dcm', /not voxels of the volume/],
+      // Shifted by four slices.
+      [{ origin: [-12.5 + 8 * 0.48, 31.25 - 8 * 0.64, 7.75 + 8 * 0.6] }, 'binary.dcm', /outside the volume/],
+      [{}, 'labelmap.dcm', /Label Map Segmentation/],
+    ];
+    for (const [more, file, reason] of refused) {
+      await openTogether(file, series(more));
+      await app.page.waitForSelector('[data-state=error]');
+      expect(await text('.banner')).toMatch(reason);
+      await app.page.click('.banner button');
+      await reach(app.page, 'done');
+      expect(await names()).toEqual(['Liver', 'Left kidney', 'Spleen']);
+    }
+    expect(await voxels()).toEqual(expected());
+    expect(hushed()).toEqual([]);
   });
 });
 

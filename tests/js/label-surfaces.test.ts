@@ -62,6 +62,31 @@ test('surfaces follow what is written to the volume, and live meshes show it', (
   expect([one.info().components, surfaces.mesh(7).vertexCount]).toEqual([1, 0]);
 });
 
+test('versions of a mesh increase only when its own surface changes', () => {
+  const dims: Vec3 = [60, 8, 8];
+  const label = (x: number, y: number, z: number) =>
+    y % 7 > 0 && z % 7 > 0 && x % 20 > 3 ? 1 + Math.floor(x / 20) : 0;
+  const data = Uint8Array.from({ length: 60 * 64 }, (_, i) =>
+    label(i % 60, Math.floor(i / 60) % 8, Math.floor(i / 480)),
+  );
+  const volume = new Volume({ data, dims });
+  using surfaces = new LabelSurfaces({ volume });
+  surfaces.step(50);
+  const versions = () =>
+    [1, 2, 3].map((value) => [surfaces.mesh(value).topologyVersion, surfaces.mesh(value).geometryVersion]);
+  const sizes = () => [1, 2, 3].map((value) => [surfaces.mesh(value).vertexCount, surfaces.mesh(value).triangleCount]);
+  const [before, size] = [versions(), sizes()];
+  volume.write({ min: [10, 3, 3], dims: [2, 2, 2], data: new Uint8Array(8) });
+  surfaces.refresh({ min: [10, 3, 3], dims: [2, 2, 2] });
+  surfaces.step(50);
+  const [after, other] = [versions(), sizes()];
+  expect(after[0]?.every((version, i) => version > (before[0]?.[i] ?? version))).toBe(true);
+  expect([after.slice(1), other.slice(1)]).toEqual([before.slice(1), size.slice(1)]);
+  const arrays = surfaces.mesh(1).arrays();
+  expect(other[0]).toEqual([arrays.positions.length / 3, arrays.indices.length / 3]);
+  expect(other[0]?.[0]).toBeGreaterThan(size[0]?.[0] ?? 0);
+});
+
 test('a saved state continues with the same bits', () => {
   const volume = blocks();
   using surfaces = new LabelSurfaces({ volume, labels: [300, 1] });

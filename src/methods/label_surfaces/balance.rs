@@ -59,12 +59,7 @@ impl Zone {
     /// Returns the volume that the label of lower number has gained at a polygon, and the polygon's area, normal to it
     /// and away from that label.
     fn gain(&self, polygon: &Polygon) -> (f32, Vec3) {
-        let origin = self.at[polygon.cells[0] as usize];
-        let corners = polygon.cells.map(|i| {
-            let at = self.at[i as usize];
-            let middle = Vec3::from([0, 1, 2].map(|axis| at[axis] as f32 - origin[axis] as f32));
-            (middle, self.offsets[i as usize])
-        });
+        let corners = self.corners(polygon);
         let halves =
             halves(corners.map(|(middle, offset)| middle + offset)).map(|half| half.map(|i| corners[i]));
         let area = halves.iter().map(|half| area_of(half.map(|(middle, offset)| middle + offset))).sum();

@@ -239,11 +239,17 @@ impl Cells {
         found
     }
 
-    /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass.
+    /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass; sets
+    /// the flag in `changed` of each label, by number, that is in a cell that has changed, or was.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
-    pub fn update(&mut self, grid: &LabelGrid, area: CellBox) -> Result<(), VolumeError> {
+    pub fn update(
+        &mut self,
+        grid: &LabelGrid,
+        area: CellBox,
+        changed: &mut [bool],
+    ) -> Result<(), VolumeError> {
         let width = grid.dims()[0] + 2;
         let layer = width * (grid.dims()[1] + 2);
         let numbers = grid.numbers();
@@ -253,14 +259,20 @@ impl Cells {
                 let start = width * y as usize + layer * z as usize;
                 let rows = [start, start + width, start + layer, start + width + layer]
                     .map(|start| &numbers[start + first..start + last + 2]);
-                self.update_row(grid, [area.low[0], y, z], rows)?;
+                self.update_row(grid, [area.low[0], y, z], rows, changed)?;
             }
         }
         Ok(())
     }
 
     /// Updates a row of cells from `at` on; `rows` are the four rows of voxels around it.
-    fn update_row(&mut self, grid: &LabelGrid, at: [u32; 3], rows: [&[u16]; 4]) -> Result<(), VolumeError> {
+    fn update_row(
+        &mut self,
+        grid: &LabelGrid,
+        at: [u32; 3],
+        rows: [&[u16]; 4],
+        changed: &mut [bool],
+    ) -> Result<(), VolumeError> {
         let [a, b, c, d] = rows;
         let mut before = true;
         for i in 0..a.len() {
@@ -268,9 +280,15 @@ impl Cells {
             if i > 0 {
                 let crossed = !(uniform && before && a[i] == a[i - 1]);
                 let cell = [at[0] + i as u32 - 1, at[1], at[2]];
+                let known = self.find(cell);
+                let corners = if crossed { grid.corners(cell) } else { [BACKGROUND; 8] };
+                let before = known.map_or([BACKGROUND; 8], |slot| self.get(slot).corners);
+                if corners != before {
+                    before.iter().chain(&corners).for_each(|&number| changed[usize::from(number)] = true);
+                }
                 if crossed {
-                    self.store(cell, grid.corners(cell))?;
-                } else if let Some(slot) = self.find(cell) {
+                    self.store(cell, corners)?;
+                } else if let Some(slot) = known {
                     self.remove(cell, slot);
                 }
             }

@@ -22,46 +22,54 @@ impl Counts {
         self.vertices as i64 - self.triangles as i64 / 2
     }
 
-    /// Returns the counts after a part that had the counts `before` was replaced by one that has `after`.
-    pub fn replaced(&self, before: Self, after: Self) -> Self {
-        Self {
-            vertices: self.vertices - before.vertices + after.vertices,
-            triangles: self.triangles - before.triangles + after.triangles,
-        }
+    /// Adds those of a part.
+    pub fn add(&mut self, part: Self) {
+        self.vertices += part.vertices;
+        self.triangles += part.triangles;
+    }
+
+    /// Subtracts those of a part.
+    pub fn remove(&mut self, part: Self) {
+        self.vertices -= part.vertices;
+        self.triangles -= part.triangles;
     }
 }
 
 impl Nets {
-    /// Counts the vertices in and the polygons that begin at the cells of a box.
-    pub fn counts(&self, area: &CellBox) -> Counts {
-        let mut counts = Counts::default();
+    /// Counts the vertices in and the polygons that begin at the cells of a box: calls `add` with parts of the counts of
+    /// each label, by number.
+    pub fn count(&self, area: &CellBox, mut add: impl FnMut(u16, Counts)) {
         let mut on_faces = BTreeSet::new();
         for slot in self.cells.within(area) {
             let cell = self.cells.get(slot);
-            counts.vertices += cell.numbers().map(|number| loops_of(cell, number)).sum::<usize>();
+            cell.numbers()
+                .for_each(|number| add(number, Counts { vertices: loops_of(cell, number), triangles: 0 }));
             for crossing in self.crossings(slot) {
                 let is_divided = self.has_face_vertices(&crossing);
                 for far in [false, true] {
-                    if crossing.ends[usize::from(far)] == BACKGROUND {
+                    let number = crossing.ends[usize::from(far)];
+                    if number == BACKGROUND {
                         continue;
                     }
                     if !is_divided {
-                        counts.triangles += 2;
+                        add(number, Counts { vertices: 0, triangles: 2 });
                         continue;
                     }
                     let patch = self.patch(&crossing, far);
-                    counts.triangles += patch.triangles().len();
                     // Divided around a vertex of its own.
-                    counts.vertices += 1;
+                    add(number, Counts { vertices: 1, triangles: patch.triangles().len() });
                     let faces = patch.triangles().iter().flatten();
                     on_faces.extend(faces.filter(|vertex| matches!(vertex, NetVertex::Face { .. })));
                 }
             }
         }
-        let is_inside = |slot: u32| area.contains(self.cells.get(slot).at);
-        let owned = |vertex: &&NetVertex| matches!(vertex, NetVertex::Face { slot, .. } if is_inside(*slot));
-        counts.vertices += on_faces.iter().filter(owned).count();
-        counts
+        for vertex in on_faces {
+            let NetVertex::Face { slot, corner, .. } = vertex else { continue };
+            let cell = self.cells.get(slot);
+            if area.contains(cell.at) {
+                add(cell.corners[usize::from(corner)], Counts { vertices: 1, triangles: 0 });
+            }
+        }
     }
 
     /// Counts the connected components of all surfaces.

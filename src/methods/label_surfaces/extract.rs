@@ -10,8 +10,11 @@ use std::collections::BTreeMap;
 struct Extraction<'a> {
     nets: &'a Nets,
     mesh: TriangleMesh,
-    /// Index in the mesh of the first vertex in each cell; those of its other loops follow.
+    /// Index in the mesh of the first vertex in each cell, from the first one in which the label is to the last one; those
+    /// of its other loops follow.
     first: Vec<u32>,
+    /// Slot of the first cell in which the label is.
+    start: u32,
     /// Index in the mesh of each vertex on a face.
     on_faces: BTreeMap<NetVertex, u32>,
 }
@@ -35,29 +38,27 @@ impl Nets {
 
 impl<'a> Extraction<'a> {
     fn new(nets: &'a Nets) -> Self {
-        let first = vec![0; nets.cells.slots().len()];
-        Self { nets, mesh: TriangleMesh::default(), first, on_faces: BTreeMap::new() }
+        Self { nets, mesh: TriangleMesh::default(), first: Vec::new(), start: 0, on_faces: BTreeMap::new() }
     }
 
     fn add(&mut self, number: u16) {
         debug_assert_ne!(number, BACKGROUND);
         let nets = self.nets;
         let reflected = nets.to_world().matrix3.determinant() < 0.0;
+        let slots = nets.slots_of(number);
+        let [Some(&start), Some(&last)] = [slots.first(), slots.last()] else { return };
         self.on_faces.clear();
-        for (slot, cell) in (0..).zip(nets.cells.slots()) {
-            if !cell.corners.contains(&number) {
-                continue;
-            }
-            let count = cube_loops()[cell.case(number)].count;
-            self.first[slot as usize] = self.mesh.positions.len() as u32;
+        self.start = start;
+        self.first.clear();
+        self.first.resize((last - start) as usize + 1, 0);
+        for &slot in slots {
+            let count = cube_loops()[nets.cells.get(slot).case(number)].count;
+            self.first[(slot - start) as usize] = self.mesh.positions.len() as u32;
             for on in 0..count {
                 self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));
             }
         }
-        for (slot, cell) in (0..).zip(nets.cells.slots()) {
-            if !cell.is_live() || !cell.corners.contains(&number) {
-                continue;
-            }
+        for &slot in slots {
             for crossing in nets.crossings(slot) {
                 let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
                 let mut on_edge = None;
@@ -77,7 +78,7 @@ impl<'a> Extraction<'a> {
     fn index(&mut self, number: u16, vertex: NetVertex, on_edge: &mut Option<u32>) -> u32 {
         let next = self.mesh.positions.len() as u32;
         let index = match vertex {
-            NetVertex::Cell { slot, on } => self.first[slot as usize] + u32::from(on),
+            NetVertex::Cell { slot, on } => self.first[(slot - self.start) as usize] + u32::from(on),
             NetVertex::Face { .. } => *self.on_faces.entry(vertex).or_insert(next),
             NetVertex::Edge { .. } => *on_edge.get_or_insert(next),
         };

@@ -19,6 +19,7 @@ mod params;
 mod smooth;
 mod state;
 mod untangle;
+mod versions;
 mod zone;
 
 pub use params::LabelParams;
@@ -33,6 +34,7 @@ use cells::CellBox;
 use counts::Counts;
 use label_grid::LabelGrid;
 use nets::Nets;
+use versions::Versions;
 use zone::Zone;
 
 /// Least number of smoothing iterations in a step.
@@ -60,10 +62,12 @@ pub struct LabelSurfaces {
     iterations: u32,
     steps: u32,
     residual: f64,
+    /// The counts of all surfaces together.
     counts: Counts,
+    /// Those of each label; that of number 1 comes first.
+    label_counts: Vec<Counts>,
     components: usize,
-    topology_version: u32,
-    geometry_version: u32,
+    versions: Versions,
     clock: fn() -> f64,
 }
 
@@ -79,7 +83,7 @@ impl LiveSurface for LabelSurfaces {
     }
 
     fn versions(&self) -> [u32; 2] {
-        [self.topology_version, self.geometry_version]
+        self.versions.all()
     }
 }
 
@@ -96,7 +100,8 @@ impl LabelSurfaces {
         let nets = Nets::new(LabelGrid::new(volume, labels)?, volume.affine())?;
         let everywhere = nets.everywhere();
         let mut surfaces = Self {
-            counts: nets.counts(&everywhere),
+            counts: Counts::default(),
+            label_counts: Vec::new(),
             components: nets.components(),
             nets,
             params,
@@ -104,10 +109,10 @@ impl LabelSurfaces {
             iterations: 0,
             steps: 0,
             residual: f64::NAN,
-            topology_version: 0,
-            geometry_version: 0,
+            versions: Versions::default(),
             clock: || 0.0,
         };
+        surfaces.recount();
         surfaces.nets.untangle(everywhere);
         surfaces.wake(everywhere);
         Ok(surfaces)
@@ -124,6 +129,25 @@ impl LabelSurfaces {
     /// [`MethodError::InvalidArgument`] if the label has no surface.
     pub fn mesh(&self, label: f64) -> Result<TriangleMesh, MethodError> {
         Ok(self.nets.mesh(self.number_of(label)?))
+    }
+
+    /// Returns the numbers of vertices and triangles of the surface of one label.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if the label has no surface.
+    pub fn mesh_counts(&self, label: f64) -> Result<[usize; 2], MethodError> {
+        let number = self.number_of(label)?;
+        let counts = self.label_counts.get(usize::from(number) - 1).copied().unwrap_or_default();
+        Ok([counts.vertices, counts.triangles])
+    }
+
+    /// Returns the topology and the geometry version of the surface of one label, as [`LiveSurface::versions`] does for
+    /// all together: they increase only when that surface changes.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if the label has no surface.
+    pub fn mesh_versions(&self, label: f64) -> Result<[u32; 2], MethodError> {
+        Ok(self.versions.of(self.number_of(label)?))
     }
 
     /// Returns the number of a label that has, or had, a surface.
@@ -157,22 +181,42 @@ impl LabelSurfaces {
             high: [0, 1, 2].map(|axis| (region.min[axis] + region.dims[axis]) as u32),
         };
         let touched = changed.grown(1, dims);
-        let before = self.nets.counts(&touched);
         let mut old = self.nets.grid.read(volume, region)?;
-        if let Err(error) = self.nets.cells.update(&self.nets.grid, changed) {
+        self.count(&touched, Counts::remove);
+        let updated = self.nets.update(changed);
+        if updated.is_err() {
             // The cells as they were need no memory that they did not have.
             self.nets.grid.replace(region, &mut old);
-            self.nets.cells.update(&self.nets.grid, changed)?;
-            return Err(error.into());
+            self.nets.update(changed)?;
         }
-        self.nets.untangle(touched);
-        self.counts = self.counts.replaced(before, self.nets.counts(&touched));
+        self.count(&touched, Counts::add);
+        let mut reconnected = updated?;
+        let untangled = self.nets.untangle(touched);
+        self.nets.flag_labels_in(untangled, &mut reconnected);
+        self.versions.record(&[], &reconnected);
         self.components = self.nets.components();
-        self.topology_version = self.topology_version.wrapping_add(1);
-        self.geometry_version = self.geometry_version.wrapping_add(1);
         let area = changed.grown(HALO, dims);
         self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         Ok(())
+    }
+
+    /// Counts again from the beginning, when labels may have other numbers.
+    fn recount(&mut self) {
+        self.counts = Counts::default();
+        self.label_counts.clear();
+        self.count(&self.nets.everywhere(), Counts::add);
+    }
+
+    /// Adds the counts of the part in a box to those of its labels and of all, or removes them.
+    fn count(&mut self, area: &CellBox, change: fn(&mut Counts, Counts)) {
+        let labels = self.nets.grid.values().len();
+        if self.label_counts.len() < labels {
+            self.label_counts.resize(labels, Counts::default());
+        }
+        self.nets.count(area, |number, part| {
+            change(&mut self.counts, part);
+            change(&mut self.label_counts[usize::from(number) - 1], part);
+        });
     }
 
     /// Returns the current parameters.
@@ -210,6 +254,7 @@ impl LabelSurfaces {
             let wanted = self.params.smoothing.saturating_sub(self.iterations).min(most);
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
+            let (offsets, diagonals) = (zone.offsets.clone(), zone.diagonals());
             self.timed("smoothing", &mut times, |surfaces| {
                 for i in 1..=wanted {
                     surfaces.residual = zone.smooth();
@@ -224,10 +269,15 @@ impl LabelSurfaces {
                 zone.write(&mut surfaces.nets);
             });
             self.timed("intersections", &mut times, |surfaces| {
-                surfaces.nets.untangle(zone.area.grown(1, surfaces.nets.grid.dims()));
+                let untangled = surfaces.nets.untangle(zone.area.grown(1, surfaces.nets.grid.dims()));
                 zone.read(&surfaces.nets);
+                let [mut moved, mut reconnected] = [(); 2].map(|()| surfaces.nets.no_labels());
+                surfaces.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
+                zone.flag_reconnected(&diagonals, &mut reconnected);
+                // Diagonals around these are not known, as far as they are outside the zone.
+                surfaces.nets.flag_labels_in(untangled, &mut reconnected);
+                surfaces.versions.record(&moved, &reconnected);
             });
-            self.geometry_version = self.geometry_version.wrapping_add(1);
             self.zone = (!is_last).then_some(zone);
         }
         Ok(self.report(times))

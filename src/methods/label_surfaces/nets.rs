@@ -11,6 +11,7 @@
 use super::cells::{Cell, CellBox, Cells};
 use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
+use crate::math::order::sort_distinct;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::volume::VolumeError;
 
@@ -87,6 +88,8 @@ pub struct Nets {
     pub grid: LabelGrid,
     /// The cells through which surfaces pass.
     pub cells: Cells,
+    /// Slots of the cells in which each label is, in ascending order; those of the label with number 1 come first.
+    of_labels: Vec<Vec<u32>>,
     to_world: DAffine3,
 }
 
@@ -97,9 +100,59 @@ impl Nets {
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
-        let mut nets = Self { cells: Cells::new(grid.dims())?, grid, to_world };
-        nets.cells.update(&nets.grid, nets.everywhere())?;
+        let mut nets = Self { cells: Cells::new(grid.dims())?, of_labels: Vec::new(), grid, to_world };
+        nets.update(nets.everywhere())?;
         Ok(nets)
+    }
+
+    /// Has the cells of a box follow the labels; returns a flag for each label, by number, whether it is in a cell that
+    /// has changed, or was.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn update(&mut self, area: CellBox) -> Result<Vec<bool>, VolumeError> {
+        let mut changed = self.no_labels();
+        self.cells.update(&self.grid, area, &mut changed)?;
+        self.of_labels.resize(changed.len() - 1, Vec::new());
+        for slot in self.cells.within(&area) {
+            for number in self.cells.get(slot).numbers().filter(|&number| changed[usize::from(number)]) {
+                self.of_labels[usize::from(number) - 1].push(slot);
+            }
+        }
+        let Self { cells, of_labels, .. } = self;
+        for (slots, number) in
+            of_labels.iter_mut().zip(1..).filter(|&(_, number)| changed[usize::from(number)])
+        {
+            slots.retain(|&slot| cells.get(slot).corners.contains(&number));
+            sort_distinct(slots);
+        }
+        Ok(changed)
+    }
+
+    /// Replaces labels and cells.
+    pub fn restore(&mut self, grid: LabelGrid, cells: Cells) {
+        let mut of_labels = vec![Vec::new(); grid.values().len()];
+        for (slot, cell) in (0..).zip(cells.slots()) {
+            cell.numbers().for_each(|number| of_labels[usize::from(number) - 1].push(slot));
+        }
+        (self.grid, self.cells, self.of_labels) = (grid, cells, of_labels);
+    }
+
+    /// Returns the slots of the cells in which a label is, in ascending order.
+    pub fn slots_of(&self, number: u16) -> &[u32] {
+        self.of_labels.get(usize::from(number) - 1).map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns a flag for each label, by number, and the background, that is not set.
+    pub fn no_labels(&self) -> Vec<bool> {
+        vec![false; self.grid.values().len() + 1]
+    }
+
+    /// Sets the flag, by number, of each label that is in the cell in one of the given slots.
+    pub fn flag_labels_in(&self, slots: impl IntoIterator<Item = u32>, flags: &mut [bool]) {
+        for slot in slots {
+            self.cells.get(slot).corners.iter().for_each(|&number| flags[usize::from(number)] = true);
+        }
     }
 
     /// Returns the map from the index space of the volume to world space.

@@ -71,15 +71,15 @@ impl LabelSurfaces {
             return bad("labels", "inconsistent");
         };
         let Some(cells) = self.restored(&grid, &state)? else { return bad("cells", "inconsistent") };
-        (self.nets.grid, self.nets.cells) = (grid, cells);
+        self.nets.restore(grid, cells);
+        self.recount();
         self.params = state.params;
         self.zone = None;
         if let Some([low, high]) = state.area {
             self.wake(CellBox { low, high });
         }
         (self.iterations, self.steps, self.residual) = (state.iterations, state.steps, state.residual);
-        self.topology_version = self.topology_version.wrapping_add(1);
-        self.geometry_version = self.geometry_version.wrapping_add(1);
+        self.versions.record_all(self.nets.grid.values().len());
         Ok(())
     }
 

@@ -190,6 +190,71 @@ impl Brush {
     }
 }
 
+/// The surface and the versions of each label.
+struct Copies(Vec<(f64, TriangleMesh, [u32; 2])>);
+
+impl Copies {
+    fn of(surfaces: &LabelSurfaces) -> Self {
+        let values = surfaces.nets.grid.values().iter();
+        let copy = |&label: &f64| {
+            let mesh = surfaces.mesh(label).unwrap();
+            let counts = [mesh.positions.len(), mesh.triangles.len()];
+            assert_eq!(counts, surfaces.mesh_counts(label).unwrap(), "label {label}");
+            (label, mesh, surfaces.mesh_versions(label).unwrap())
+        };
+        Self(values.map(copy).collect())
+    }
+
+    /// Takes new copies, asserts that versions have increased where surfaces have changed, and returns the labels whose
+    /// version has increased and whose surface has not changed.
+    fn update(&mut self, surfaces: &LabelSurfaces, what: &str) -> Vec<f64> {
+        let before = std::mem::replace(self, Self::of(surfaces));
+        let mut needless = Vec::new();
+        for (label, mesh, [topology, geometry]) in before.0 {
+            let (_, now, versions) = self.0.iter().find(|copy| copy.0 == label).unwrap();
+            let what = format!("{what}, label {label}");
+            assert!(versions[0] > topology || now.triangles == mesh.triangles, "{what}: triangles");
+            assert!(versions[1] > geometry || now.positions == mesh.positions, "{what}: positions");
+            assert!(versions[0] == topology || versions[1] > geometry, "{what}: {versions:?}");
+            if versions[1] > geometry && *now == mesh {
+                needless.push(label);
+            }
+        }
+        needless
+    }
+}
+
+#[test]
+fn versions_increase_only_for_surfaces_that_change() {
+    let n = 60;
+    let label = |i: usize| {
+        let [x, y, z] = [i % n, i / n % n, i / n / n].map(|i| i / 10);
+        if (x + y + z).is_multiple_of(2) { (1 + x + 6 * y + 36 * z) as u8 } else { 0 }
+    };
+    let mut volume = volume([n, n, n], (0..n * n * n).map(label).collect());
+    let mut surfaces = settled(&volume);
+    let mut copies = Copies::of(&surfaces);
+    let versions = |surfaces: &LabelSurfaces| -> Vec<[u32; 2]> {
+        surfaces.labels().iter().map(|&label| surfaces.mesh_versions(label).unwrap()).collect()
+    };
+    let before = versions(&surfaces);
+    let region = Region { min: [24, 26, 23], dims: [3, 3, 3] };
+    volume.write(region, &Voxels::U8(vec![1; 27]), 0).unwrap();
+    surfaces.refresh(&volume, region).unwrap();
+    assert_eq!(copies.update(&surfaces, "refreshed"), [0.0; 0]);
+    // One label loses voxels, and one gets some.
+    let changed = |now: &[[u32; 2]]| now.iter().zip(&before).filter(|(now, before)| now != before).count();
+    assert_eq!(changed(&versions(&surfaces)), 2);
+    settle(&mut surfaces);
+    // Of labels at the end of the zone, some move by less than rounding shows.
+    assert!(copies.update(&surfaces, "settled").len() < 4);
+    assert!((2..20).contains(&changed(&versions(&surfaces))) && before.len() == 108);
+    // Nothing moves any more.
+    let before = (surfaces.versions(), versions(&surfaces));
+    surfaces.step().unwrap();
+    assert_eq!((surfaces.versions(), versions(&surfaces)), before);
+}
+
 /// Paints strokes, and compares the surfaces after each with those of the label map as it is then.
 fn fuzz_strokes(seed: u64, strokes: usize) {
     let mut random = Random::new(seed);
@@ -198,15 +263,18 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
     let mut volume = noise(dims, if random.below(2) == 0 { 0 } else { labels }, seed);
     let mut brush = Brush { random, labels };
     let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    let mut copies = Copies::of(&surfaces);
     for stroke in 0..strokes {
         let what = format!("seed {seed}, stroke {stroke}");
         let region = brush.paint(&mut volume);
         surfaces.refresh(&volume, region).unwrap();
         check(&surfaces, &what);
+        copies.update(&surfaces, &what);
         // Some strokes follow before the surfaces are settled.
         if brush.random.below(3) > 0 {
             settle(&mut surfaces);
             check(&surfaces, &what);
+            copies.update(&surfaces, &what);
         }
         let anew = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
         assert_eq!(
@@ -269,8 +337,11 @@ fn a_saved_run_continues_with_the_same_bits() {
     }
     let state = surfaces.save();
     let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    let mut copies = Copies::of(&other);
     other.restore(&state).unwrap();
     assert!(other.save() == state);
+    copies.update(&other, "restored");
+    assert_eq!(other.counts, surfaces.counts);
     let region = brush.paint(&mut volume);
     for surfaces in [&mut surfaces, &mut other] {
         surfaces.step().unwrap();

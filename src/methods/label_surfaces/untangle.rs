@@ -60,15 +60,11 @@ struct Neighbourhood {
 }
 
 impl Nets {
-    /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box. Returns the number
-    /// of cells moved.
-    pub fn untangle(&mut self, area: CellBox) -> usize {
+    /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box. Returns the slots of
+    /// the cells moved.
+    pub fn untangle(&mut self, area: CellBox) -> Vec<u32> {
         let mut halved: BTreeMap<u32, u32> = BTreeMap::new();
-        let slots = (0..).zip(self.cells.slots());
-        let mut to_test: Vec<u32> = slots
-            .filter(|(_, cell)| cell.is_live() && area.contains(cell.at))
-            .map(|(slot, _)| slot)
-            .collect();
+        let mut to_test = self.cells.within(&area);
         let mut neighbourhood = Neighbourhood::default();
         while !to_test.is_empty() {
             let mut tangled = Vec::new();
@@ -86,7 +82,7 @@ impl Nets {
             }
             to_test = self.with_neighbours(&tangled);
         }
-        halved.len()
+        halved.into_keys().collect()
     }
 
     /// Returns the given cells and all that share polygons with them.

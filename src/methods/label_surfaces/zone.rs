@@ -2,7 +2,7 @@
 
 use super::cells::{Cell, CellBox};
 use super::cube_loops;
-use super::nets::Nets;
+use super::nets::{Nets, halves};
 use crate::math::Vec3;
 
 /// Stands for a cell that does not exist, or is not in the zone.
@@ -25,6 +25,8 @@ pub struct Links {
 pub struct Polygon {
     /// The four cells, counter-clockwise seen from the side of the label with the higher number.
     pub cells: [u32; 4],
+    /// Numbers of the two labels.
+    pub labels: [u16; 2],
     /// Whether two labels meet in each of them.
     pub pairs: [bool; 4],
 }
@@ -67,7 +69,7 @@ impl Zone {
             let cells = around.map(|slot| index[slot as usize]);
             if cells.iter().any(|&i| (i as usize) < moving) && !cells.contains(&NONE) {
                 let pairs = around.map(|slot| pair(nets.cells.get(slot)).is_some());
-                polygons.push(Polygon { cells, pairs });
+                polygons.push(Polygon { cells, labels: crossing.ends, pairs });
             }
         }
         Self {
@@ -83,6 +85,40 @@ impl Zone {
     /// Returns the number of cells that move.
     pub fn moving(&self) -> usize {
         self.links.len()
+    }
+
+    /// Returns the slots of the cells whose positions are not those in `offsets` any more.
+    pub fn moved_from(&self, offsets: &[Vec3]) -> impl Iterator<Item = u32> {
+        let moved = |((before, now), &slot): ((&Vec3, &Vec3), &u32)| (before != now).then_some(slot);
+        offsets.iter().zip(&self.offsets).zip(&self.slots).filter_map(moved)
+    }
+
+    /// Returns for each polygon whether the diagonal from its first corner divides it.
+    pub fn diagonals(&self) -> Vec<bool> {
+        let is_first = |polygon| {
+            let divided = halves(self.corners(polygon).map(|(middle, offset)| middle + offset));
+            divided[0].contains(&2)
+        };
+        self.polygons.iter().map(is_first).collect()
+    }
+
+    /// Returns the middle of each cell of a polygon, relative to that of the first, and the position relative to it.
+    pub fn corners(&self, polygon: &Polygon) -> [(Vec3, Vec3); 4] {
+        let origin = self.at[polygon.cells[0] as usize];
+        polygon.cells.map(|i| {
+            let at = self.at[i as usize];
+            let middle = Vec3::from([0, 1, 2].map(|axis| at[axis] as f32 - origin[axis] as f32));
+            (middle, self.offsets[i as usize])
+        })
+    }
+
+    /// Sets the flag, by number, of each label of which a polygon is not divided as in `diagonals` any more.
+    pub fn flag_reconnected(&self, diagonals: &[bool], flags: &mut [bool]) {
+        for ((before, now), polygon) in diagonals.iter().zip(self.diagonals()).zip(&self.polygons) {
+            if *before != now {
+                polygon.labels.iter().for_each(|&number| flags[usize::from(number)] = true);
+            }
+        }
     }
 
     /// Copies the positions of the cells that move from the surfaces.

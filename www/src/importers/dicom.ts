@@ -13,7 +13,7 @@ const PIPELINE = 'read-image-dicom-file-series';
  * Returns the options for itk-wasm: its program that reads DICOM is served beside the page, and runs in the calling
  * worker.
  */
-const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
+export const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
 
 /**
  * Returns the base address of the page that this worker belongs to: the worker's own file is in a subfolder of the
@@ -48,18 +48,18 @@ function unreadable(files: NamedBytes[], reason: string): Refusal {
   return new Refusal('bad-file', text('files.dicomUnreadable', { files: what, reason: firstLine(reason) }));
 }
 
-const firstLine = (text: string) => text.trim().split('\n').at(-1)?.slice(0, 200) ?? '';
+export const firstLine = (text: string) => text.trim().split('\n').at(-1)?.slice(0, 200) ?? '';
 
-function volumeOf({ imageType, data, size, spacing, origin, direction }: Image): VolumeInit {
-  if (imageType.components !== 1)
-    throw new Refusal('bad-file', text('files.dicomComponents', { components: imageType.components }));
+function volumeOf(image: Image): VolumeInit {
+  const { components } = image.imageType;
+  if (components !== 1) throw new Refusal('bad-file', text('files.dicomComponents', { components }));
+  return { ...geometryOf(image), data: image.data as VoxelArray };
+}
+
+/** Returns the grid of an image, in world space LPS. */
+export function geometryOf({ size, spacing, origin, direction }: Image): Omit<VolumeInit, 'data'> {
   const dims = [0, 1, 2].map((axis) => Number(size[axis] ?? 1)) as [number, number, number];
-  return {
-    data: data as VoxelArray,
-    dims,
-    affine: affineOf(spacing, origin, Array.from(direction, Number)),
-    space: 'LPS',
-  };
+  return { dims, affine: affineOf(spacing, origin, Array.from(direction, Number)), space: 'LPS' };
 }
 
 /**

@@ -6,6 +6,7 @@ import type { VolumeInit } from 'vesicle';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
+import type { Segmentation } from './segmentation';
 
 /** Number of bytes before the letters DICM at the start of a DICOM file. */
 const PREAMBLE = 128;
@@ -24,14 +25,41 @@ export function isTiff({ bytes }: NamedBytes): boolean {
   );
 }
 
+/** Number of bytes at the start of a DICOM file that contain the class of the object. */
+const META = 1024;
+/** Classes of segmentations by their number after the prefix of all. */
+const SEGMENTATIONS = /1\.2\.840\.10008\.5\.1\.4\.1\.1\.66\.([47])(?![\d.])/;
+
+/** Whether a file is a DICOM segmentation, with segments or with a label map. */
+export function isSegmentation(file: NamedBytes): boolean {
+  return isDicom(file) && SEGMENTATIONS.test(metaOf(file));
+}
+
+const metaOf = ({ bytes }: NamedBytes) => String.fromCharCode(...bytes.subarray(0, META));
+
+/**
+ * Reads a DICOM segmentation. Throws a `Refusal` if it cannot be read, or is of the newer class with a label map, which
+ * ITK does not read.
+ */
+export async function importSegmentation(file: NamedBytes): Promise<Segmentation> {
+  if (SEGMENTATIONS.exec(metaOf(file))?.[1] === '7') throw new Refusal('bad-file', text('files.segmentationClass'));
+  return (await import('./segmentation')).readSegmentation(file);
+}
+
 /**
  * Reads the volume from the DICOM files among `files`, or else from TIFF files with one slice each or all in one;
- * undefined if no file is DICOM and not all are TIFF. Throws a `Refusal` if the files cannot be read or hold a single
- * slice.
+ * undefined if no file is DICOM and not all are TIFF. A DICOM segmentation is read if there is no series. Throws a
+ * `Refusal` if the files cannot be read or hold a single slice.
  */
 export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
   // DICOM folders contain other files as well, and DICOM files without that extension.
-  const series = files.filter(isDicom);
+  const dicom = files.filter(isDicom);
+  const series = dicom.filter((file) => !isSegmentation(file));
+  const [first, second] = dicom;
+  if (first && series.length === 0) {
+    if (second) throw new Refusal('bad-file', text('files.manySegmentations', { count: dicom.length }));
+    return (await importSegmentation(first)).init;
+  }
   if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
   if (files.length > 0 && files.every(isTiff))
     return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));

@@ -1,11 +1,11 @@
-import { flood, sweep } from '../segment/brush';
+import { flood, floodBox, sweep } from '../segment/brush';
 import type { SegmentClient } from '../segment/client';
 import { LabelMap, type Patch, rangeOf } from '../segment/label-map';
-import { freeValue, type Label, newLabel } from '../segment/labels';
+import { freeValue, type KnownLabel, type Label, newLabel } from '../segment/labels';
 import type { LabelArray, OpenedLabels, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
-import { union } from '../segment/region';
+import { grown, union } from '../segment/region';
 import { text } from '../texts';
-import type { ToolSettings } from '../ui/segment-tools';
+import { type ToolSettings, usesRange } from '../ui/segment-tools';
 import type { Axis } from '../view/anatomy';
 import type { Grip } from '../view/panel';
 import { UndoStack } from './undo';
@@ -28,10 +28,12 @@ export interface EditedLab {
   onLabels: () => void;
   /** Called when voxels have changed, before the surfaces follow. */
   onVoxels: () => void;
-  /** Called with surfaces that have followed a change, at first along the faces of voxels; later `smooth`. */
+  /** Called with surfaces that have followed a change; after a large one they are not `smooth` at first. */
   onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
+  /** Called when a fill has reached no voxel, since the one pressed is not in the range of intensities. */
+  onNothing: () => void;
   onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
   onError: (title: string, error: unknown) => void;
 }
@@ -87,15 +89,18 @@ export class SegmentEditing {
   }
 
   /**
-   * Takes over a newly opened label map, and clears the undo history. `names` are those of an example's labels; without
-   * any label there is one to begin with.
+   * Takes over a newly opened label map, and clears the undo history. `names` are those of an example's labels, from the
+   * value 1 on; without any label there is one to begin with.
    */
   adopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, opened: OpenedLabels, names: string[]): void {
     this.#start(grid, opened);
     const present = opened.surfaces.map(({ value }) => value);
-    const named = new Map(names.map((name, i) => [i + 1, name]));
-    const values = [...new Set([...present, ...named.keys()])].sort((a, b) => a - b);
-    this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, named.get(value)));
+    const [low, high] = rangeOf(opened.voxels);
+    const described = [...names.map((name, i): KnownLabel => ({ value: i + 1, name })), ...opened.known];
+    const known = new Map(described.map((label) => [label.value, label]));
+    const possible = [...known.keys()].filter((value) => value !== 0 && value >= low && value <= high);
+    const values = [...new Set([...present, ...possible])].sort((a, b) => a - b);
+    this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, known.get(value)));
     this.#active = this.#labels[0]?.value ?? 1;
     this.#hidden.clear();
     this.#lab.onLabels();
@@ -124,7 +129,7 @@ export class SegmentEditing {
     // Nobody wants to paint what cannot be seen.
     if (settings.tool !== 'eraser' && this.#hidden.has(this.#active)) this.setVisible(this.#active, true);
     if (settings.tool === 'fill') {
-      this.#fill(at, axis);
+      if (!this.#fill(at, axis, settings)) this.#lab.onNothing();
       return { move: () => undefined, drop: () => undefined };
     }
     let last = at;
@@ -226,13 +231,22 @@ export class SegmentEditing {
     if (box && changed) this.#changed(box);
   }
 
-  #fill(at: Vec3, axis: Axis): void {
+  /** Fills a region around a position in voxels; returns false if the voxel there is not in the range of intensities. */
+  #fill(at: Vec3, axis: Axis, settings: ToolSettings): boolean {
     const map = this.#map;
-    if (!map) return;
+    const mask = usesRange(settings) ? this.mask : undefined;
+    // Until the worker has said which voxels are in the range, none is.
+    if (!map || (usesRange(settings) && !mask)) return true;
     const seed = at.map((x, one) => Math.min((map.dims[one] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3;
-    const box = flood(map.voxels, map, axis, seed, (index) => map.set(index, this.#active));
+    const visit = (index: number) => map.set(index, this.#active);
+    const reachable = grown({ min: seed, dims: [1, 1, 1] }, settings.reach, map.dims);
+    const box =
+      settings.extent === 'slice'
+        ? flood(map.voxels, map, axis, seed, visit)
+        : floodBox(map.voxels, map, { box: reachable, ...(mask && { mask }) }, seed, visit);
     if (box) this.#changed(box);
     this.#endStroke(text('segment.fillStroke'));
+    return box !== undefined;
   }
 
   #endStroke(name: string): void {
@@ -279,15 +293,15 @@ export class SegmentEditing {
   }
 
   /**
-   * Sends the worker what has changed, as often as it is ready for more, and has it smooth the surfaces in between, step
-   * by step, so that the next change never waits for long.
+   * Sends the worker what has changed, as often as it is ready for more, and has it smooth the surfaces step by step, so
+   * that the next change never waits for long.
    */
   async #followChanges(map: number): Promise<void> {
     while (this.#map && (this.#unsent || this.#isRough)) {
       const box = this.#unsent;
       this.#unsent = undefined;
       const update = box
-        ? { ...(await this.#client.request('edit', { map, block: this.#map.block(box) })), done: false }
+        ? await this.#client.request('edit', { map, block: this.#map.block(box) })
         : await this.#client.request('step', { map });
       if (map !== this.#id) return;
       this.#isRough = !update.done || this.#unsent !== undefined;

@@ -6,7 +6,7 @@ import { differing, readValue } from './link';
 
 const ADDRESS = '#segment';
 
-export const INITIAL_VIEW: SegmentViewOptions = { edges: false, slices: 'walls', opacity: 0.5 };
+export const INITIAL_VIEW: SegmentViewOptions = { edges: false, outlines: true, slices: 'walls', opacity: 0.5 };
 
 /** Settings of the Segment lab that are contained in a link; missing ones are as by default. */
 export interface LinkedSegment {
@@ -67,7 +67,7 @@ export function fromHash(hash: string): LinkedSegment | undefined {
 function viewIn(query: URLSearchParams): Partial<SegmentViewOptions> {
   const view: Partial<SegmentViewOptions> = {};
   const [slices, opacity] = [query.get('slices'), Number(query.get('opacity') ?? Number.NaN)];
-  if (query.has('edges')) view.edges = query.get('edges') === 'true';
+  for (const name of ['edges', 'outlines'] as const) if (query.has(name)) view[name] = query.get(name) === 'true';
   if (slices) view.slices = slices as SegmentViewOptions['slices'];
   if (Number.isFinite(opacity)) view.opacity = opacity;
   return view;

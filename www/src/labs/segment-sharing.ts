@@ -15,7 +15,7 @@ import type { SegmentParts, SurfaceFormat } from './segment-parts';
 /** Extension and media type of the files of label maps. */
 const MAPS: Record<VolumeFormat, [string, string]> = {
   nifti: ['nii.gz', 'application/gzip'],
-  nrrd: ['nrrd', 'application/octet-stream'],
+  nrrd: ['seg.nrrd', 'application/octet-stream'],
   mha: ['mha', 'application/octet-stream'],
 };
 
@@ -69,7 +69,7 @@ export class SegmentSharing {
   saveMap(format: VolumeFormat): void {
     const [extension, type] = MAPS[format];
     this.#client
-      .request('exportMap', { format })
+      .request('exportMap', { format, labels: this.#editing.labels })
       .then((bytes) => this.#saving.bytes(extension, bytes, type, '-labels'))
       .catch((error) => this.#states.fail(text('segment.saveFailed'), error));
   }

@@ -7,7 +7,7 @@ import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import type { LabelMeasures } from '../ui/label-measures';
-import type { Tool, ToolSettings } from '../ui/segment-tools';
+import { type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { Overlays } from '../view/label-overlay';
 import { LabStates } from './lab-states';
@@ -49,6 +49,8 @@ export class SegmentLab implements Lab {
   #maskTimer = 0;
   /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
   #released: number | undefined;
+  /** Whether the last fill has reached no voxel. */
+  #isUnfilled = false;
   /** Milliseconds from the end of the last stroke until surfaces with it were drawn, and smooth ones. */
   #latency: { first?: number; smooth?: number } = {};
   /** Number of times that surfaces were shown. */
@@ -66,6 +68,11 @@ export class SegmentLab implements Lab {
       onVoxels: () => ui.view.showLabels(),
       onUpdate: (update, smooth) => this.#take(update, smooth),
       onBusy: () => states.setModelState('running'),
+      onNothing: () => {
+        this.#isUnfilled = true;
+        this.#released = undefined;
+        ui.status.say(text('segment.nothingFilled'));
+      },
       onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
       onError: (title, error) => states.fail(title, error),
     });
@@ -184,7 +191,7 @@ export class SegmentLab implements Lab {
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
       this.#applyTool(this.#ui.tools.value);
-      this.#ui.data.showMap(name);
+      this.#ui.data.showMap(opened.labelFile ?? name);
       this.#showAll(opened);
     } catch (error) {
       this.#states.fail(text('labs.openFailed', { name }), error);
@@ -221,8 +228,8 @@ export class SegmentLab implements Lab {
 
   #show({ surfaces }: SurfaceUpdate): void {
     if (surfaces.length > 0) this.#updates += 1;
+    this.#ui.view.showSurfaces(surfaces);
     for (const { value, voxels, volume, area, surface } of surfaces) {
-      this.#ui.view.showSurface(value, surface);
       const { vertices = 0, triangles = 0 } = surface ?? {};
       const version = (this.#measures.get(value)?.version ?? 0) + 1;
       this.#measures.set(value, { value, voxels, volume, area, vertices, triangles, version });
@@ -255,8 +262,9 @@ export class SegmentLab implements Lab {
 
   #press(at: Parameters<PartEvents['press']>[0], axis: Parameters<PartEvents['press']>[1]) {
     if (!this.#states.canChange) return undefined;
+    this.#isUnfilled = false;
     const grip = this.#editing.press(at, axis, this.#ui.tools.value);
-    if (!grip) return undefined;
+    if (!grip || this.#isUnfilled) return grip;
     this.#released = undefined;
     this.#latency = {};
     const drop = () => {
@@ -301,14 +309,16 @@ export class SegmentLab implements Lab {
     this.#followRange(settings);
   }
 
-  /** Asks the worker which voxels the threshold brush paints, if that tool is in use and the range is another one. */
-  #followRange({ tool, range }: ToolSettings): void {
+  /** Asks the worker which voxels are in the range of intensities, if the tool in use needs that, and it is another one. */
+  #followRange(settings: ToolSettings): void {
     if (!this.#editing || !this.#states.ready) return;
+    const { range } = settings;
     const wanted = range.join(' ');
     const isKnown = wanted === this.#maskRange;
-    this.#ui.view.showLabels({ mask: tool === 'threshold' && isKnown ? this.#editing.mask : undefined });
-    if (tool !== 'threshold' || isKnown) return;
-    clearTimeout(this.#maskTimer);
+    const isUsed = usesRange(settings);
+    this.#ui.view.showLabels({ mask: isUsed && isKnown ? this.#editing.mask : undefined });
+    if (!isUsed || isKnown) return;
+    this.#forgetMask();
     this.#maskTimer = window.setTimeout(() => void this.#requestMask(range, wanted), MASK_DELAY);
   }
 
@@ -326,6 +336,7 @@ export class SegmentLab implements Lab {
 
   #forgetMask(): void {
     this.#maskRange = undefined;
+    this.#editing.mask = undefined;
     clearTimeout(this.#maskTimer);
   }
 

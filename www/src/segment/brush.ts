@@ -1,7 +1,7 @@
 /** The tools that change a label map: which voxels a brush or a fill reaches. */
 import type { Axis } from '../view/anatomy';
 import type { LabelArray, Region, Vec3 } from './protocol';
-import { boxOf } from './region';
+import { boxOf, forEachRow } from './region';
 
 /** The grid of a label map. */
 export interface Grid {
@@ -104,4 +104,49 @@ export function flood(
   const indices = [...found];
   for (const index of indices) visit(index);
   return boxOf(indices, dims);
+}
+
+/** A region that a fill in three dimensions may reach. */
+export interface Fillable {
+  /** Box that the fill does not leave. */
+  box: Region;
+  /** Not 0 for the voxels that it may reach; all in the box if undefined. */
+  mask?: Uint8Array;
+}
+
+/**
+ * Fills a region in three dimensions: calls `visit` with the voxel `seed`, in the box, and all voxels connected to it, side by
+ * side, by voxels of the same label that the fill may reach. Returns the box of these voxels; undefined if the seed is none.
+ */
+export function floodBox(
+  voxels: LabelArray,
+  { dims }: Pick<Grid, 'dims'>,
+  { box, mask }: Fillable,
+  seed: Vec3,
+  visit: (index: number) => void,
+): Region | undefined {
+  const strides = [1, dims[0], dims[0] * dims[1]] as const;
+  const first = seed.reduce((sum, x, axis) => sum + x * (strides[axis] ?? 0), 0);
+  const label = voxels[first];
+  const open = new Uint8Array(voxels.length);
+  forEachRow(box, dims, (start) => {
+    for (let index = start; index < start + box.dims[0]; index++)
+      if (voxels[index] === label && mask?.[index] !== 0) open[index] = 1;
+  });
+  if (!open[first]) return undefined;
+  open[first] = 0;
+  const found = [first];
+  for (const index of found) {
+    const row = Math.floor(index / dims[0]);
+    const at = [index - row * dims[0], row % dims[1], Math.floor(row / dims[1])];
+    for (const [axis, stride] of strides.entries())
+      for (const step of [-1, 1]) {
+        const [x, next] = [(at[axis] ?? 0) + step, index + step * stride];
+        if (x < 0 || x >= (dims[axis] ?? 0) || !open[next]) continue;
+        open[next] = 0;
+        found.push(next);
+      }
+  }
+  for (const index of found) visit(index);
+  return boxOf(found, dims);
 }

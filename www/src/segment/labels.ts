@@ -9,6 +9,14 @@ export interface Label {
   color: string;
 }
 
+/** A label of a file or an example, as far as that describes it. */
+export interface KnownLabel {
+  value: number;
+  name?: string;
+  /** As #rrggbb. */
+  color?: string;
+}
+
 /** Distinct colours, also for most colour-blind people; labels beyond repeat them. */
 const PALETTE = [
   '#e69f00',
@@ -25,12 +33,13 @@ const PALETTE = [
   '#7fd6cf',
 ];
 
-/** Returns a label with the given value, named by `name` or else by its value. */
-export function newLabel(value: number, name = text('segment.labelName', { value })): Label {
+/** Returns a label with the given value, with the name and colour that are known of it, or others by its value. */
+export function newLabel(value: number, { name, color }: Omit<KnownLabel, 'value'> = {}): Label {
+  const index = (((value - 1) % PALETTE.length) + PALETTE.length) % PALETTE.length;
   return {
     value,
-    name,
-    color: PALETTE[(((value - 1) % PALETTE.length) + PALETTE.length) % PALETTE.length] ?? '#888888',
+    name: name ?? text('segment.labelName', { value }),
+    color: color ?? PALETTE[index] ?? '#888888',
   };
 }
 

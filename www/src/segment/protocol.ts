@@ -4,6 +4,7 @@
  */
 import type { MeshFormat, VolumeFormat } from 'vesicle';
 import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
+import type { KnownLabel, Label } from './labels';
 
 export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
 
@@ -49,18 +50,25 @@ export interface SurfaceUpdate {
   milliseconds: number;
 }
 
+/** The surfaces that have changed, after a step; `done` says whether they are smooth. */
+export interface StepUpdate extends SurfaceUpdate {
+  done: boolean;
+}
+
 /** The open label map, with the surfaces of all its labels, which are not smooth yet. */
 export interface OpenedLabels extends SurfaceUpdate {
   /** Number of the map, which requests that concern it name; another one opened meanwhile has another number. */
   map: number;
   voxels: LabelArray;
+  /** Names and colours of labels that the file of the label map has, also of labels without voxels. */
+  known: KnownLabel[];
+  /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
+  labelFile: string | undefined;
 }
 
 export interface OpenedImage extends OpenedLabels {
   volume: VolumeView;
   params: ParamValues;
-  /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
-  labelFile: string | undefined;
 }
 
 /** Requests of the page to the Segment lab's worker: the body of each and its reply. */
@@ -77,21 +85,21 @@ export interface Requests {
   /** Replaces the label map of the open volume by that of a file, which must have the grid of the volume. */
   openLabels: { body: { files: NamedBytes[] }; reply: OpenedLabels };
   /**
-   * Changes voxels of the label map; the surfaces follow at once, along the faces of the voxels. Does nothing if another
-   * map is open.
+   * Changes voxels of the label map and makes a step, after which the surfaces are smooth unless the change was large; the
+   * reply has the surfaces in either case. Does nothing if another map is open.
    */
-  edit: { body: { map: number; block: LabelBlock }; reply: SurfaceUpdate };
+  edit: { body: { map: number; block: LabelBlock }; reply: StepUpdate };
   /**
    * Makes a step that smooths what has changed; the reply to the last one has the surfaces. Does nothing if another map
    * is open.
    */
-  step: { body: { map: number }; reply: SurfaceUpdate & { done: boolean } };
+  step: { body: { map: number }; reply: StepUpdate };
   /** Changes parameters of the surfaces, which the next steps adopt; replies with all parameters. */
   setParams: { body: ParamValues; reply: ParamValues };
   /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */
   mask: { body: { low: number; high: number }; reply: Uint8Array };
-  /** Replies with the label map as a file, in the geometry of the volume. */
-  exportMap: { body: { format: VolumeFormat }; reply: Uint8Array };
+  /** Replies with the label map as a file, in the geometry of the volume; NRRD has names and colours of the labels, too. */
+  exportMap: { body: { format: VolumeFormat; labels: readonly Label[] }; reply: Uint8Array };
   /** Replies with the surface of a label as a file. */
   exportMesh: { body: { value: number; format: MeshFormat }; reply: Uint8Array };
 }

@@ -1,38 +1,51 @@
 /** Opens volumes and label maps. Used by the worker only. */
 
 import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
-import { importVolume } from '../importers';
-import { text } from '../texts';
+import { importSegmentation, importVolume, isDicom, isSegmentation, isTiff } from '../importers';
+import { count, text } from '../texts';
+import { invert, toWorld } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
 import { readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
+import type { KnownLabel } from './labels';
 import type { ImageSource, LabelArray, Labelling, NamedBytes, Vec3 } from './protocol';
+import { labelsIn } from './slicer';
 
 /** Number of different values beyond which a volume is no label map. */
 const MOST_LABELS = 65_536;
 /** Largest distance in voxels between the corners of two grids that count as the same one. */
 const TOLERANCE = 0.01;
+/** Largest distance in voxels, along an axis, between the voxels of two grids that count as the same. */
+const SNAP = 0.1;
+
+/** A label map in the grid of a volume. */
+export interface OpenMap {
+  voxels: LabelArray;
+  /** Names and colours of labels that its file has. */
+  known: KnownLabel[];
+  /** Name of its file, with a note if there is something to say of it; undefined if it has none. */
+  file: string | undefined;
+}
 
 /** A volume and its label map, in the same grid. */
 export interface OpenVolume {
   volume: Volume;
-  labels: LabelArray;
-  labelFile: string | undefined;
+  map: OpenMap;
   /** Length of a world unit, if the volume's file states it. */
   unit: LengthUnit | undefined;
 }
 
 /**
  * Opens a volume with its label map, which is that of a second file, computed, or empty. With several frames, the first
- * one of the label map is used.
+ * one of the label map is used. A DICOM segmentation alone is both.
  */
 export async function openImage({ files, labelling }: ImageSource): Promise<OpenVolume> {
   const [image, map] = await readBoth(files);
   const volume = new Volume(image.init);
   try {
-    const labels = map ? labelsOf(map.init, volume) : computed(volume, labelling);
-    return { volume, labels, labelFile: map?.name, unit: image.init.unit };
+    const labels = map ? labelsOf(map, volume) : { voxels: computed(volume, labelling), known: [], file: undefined };
+    return { volume, map: labels, unit: image.init.unit };
   } catch (error) {
     volume.free();
     throw error;
@@ -40,10 +53,11 @@ export async function openImage({ files, labelling }: ImageSource): Promise<Open
 }
 
 /** Reads a label map; throws if it is none, or does not have the grid of `volume`. */
-export async function openLabels(files: NamedBytes[], volume: Volume): Promise<LabelArray> {
+export async function openLabels(files: NamedBytes[], volume: Volume): Promise<OpenMap> {
   const groups = groupFiles(files);
-  if (groups.length !== 1) throw new Refusal('bad-file', text('segment.oneLabelMap'));
-  return labelsOf(await readFiles(groups[0] ?? []), volume);
+  const [first] = groups;
+  if (!first || groups.length !== 1) throw new Refusal('bad-file', text('segment.oneLabelMap'));
+  return labelsOf(await readMap(first), volume);
 }
 
 /** Returns the label map as a volume in the geometry of another one. */
@@ -55,25 +69,52 @@ export function mapLike(volume: Volume, data: LabelArray, unit: LengthUnit | und
 interface NamedVolume {
   name: string;
   init: VolumeInit;
+  known: KnownLabel[];
+  /** Whether the file is one of segments, which may be cropped to them. */
+  isCropped: boolean;
 }
 
 /** Reads the volume and, if the files contain two, the label map. */
 async function readBoth(files: NamedBytes[]): Promise<[NamedVolume, NamedVolume?]> {
-  const foreign = await importVolume(files);
-  if (foreign) return [{ name: '', init: foreign }];
+  const segmentations = files.filter(isSegmentation);
+  const [segmentation] = segmentations;
+  if (segmentation) {
+    if (segmentations.length > 1)
+      throw new Refusal('bad-file', text('files.manySegmentations', { count: segmentations.length }));
+    const map = await readMap([segmentation]);
+    const others = files.filter((file) => file !== segmentation);
+    return others.length > 0 ? [await readImage(others), map] : [map, map];
+  }
   const groups = groupFiles(files);
+  if (files.some(isDicom) || files.every(isTiff) || groups.length < 2) return [await readImage(files)];
   if (groups.length > 2) throw new Refusal('bad-file', text('segment.atMostTwo', { count: groups.length }));
-  const read: NamedVolume[] = [];
-  for (const group of groups) read.push({ name: group[0]?.name ?? '', init: await readFiles(group) });
-  const [first, second] = read;
-  if (!first) throw new Refusal('bad-file', text('files.noFile'));
-  if (!second) return [first];
+  const [first, second] = (await Promise.all(groups.map(readMap))) as [NamedVolume, NamedVolume];
   return isMap(first, second) ? [second, first] : [first, second];
 }
 
-/** Whether the first of two volumes is the label map: by its name, or else because it has fewer different values. */
+async function readImage(files: NamedBytes[]): Promise<NamedVolume> {
+  const init = (await importVolume(files)) ?? (await readFiles(files));
+  return { name: files[0]?.name ?? '', init, known: [], isCropped: false };
+}
+
+/** Reads a label map, or what may be one, with what its file says of the labels. */
+async function readMap(group: NamedBytes[]): Promise<NamedVolume> {
+  const [first] = group;
+  if (first && isSegmentation(first)) {
+    const { init, labels, shared } = await importSegmentation(first);
+    const name = shared > 0 ? text('segment.sharedVoxels', { file: first.name, count: count(shared) }) : first.name;
+    return { name, init, known: labels, isCropped: true };
+  }
+  const known = group.flatMap(({ bytes }) => labelsIn(bytes));
+  return { name: first?.name ?? '', init: await readFiles(group), known, isCropped: known.length > 0 };
+}
+
+/**
+ * Whether the first of two volumes is the label map: because it names its labels, by its name, or else because it has
+ * fewer different values.
+ */
 function isMap(one: NamedVolume, other: NamedVolume): boolean {
-  const isNamed = ({ name }: NamedVolume) => /label|seg|mask|annot/i.test(name);
+  const isNamed = ({ name, known }: NamedVolume) => known.length > 0 || /label|seg|mask|annot/i.test(name);
   if (isNamed(one) !== isNamed(other)) return isNamed(one);
   return valuesIn(one) < valuesIn(other);
 }
@@ -88,19 +129,72 @@ function valuesIn({ init: { data } }: NamedVolume): number {
   return found.size;
 }
 
-/** Returns the voxels of a label map, in the type of its file unless this has slope and intercept. */
-function labelsOf(init: VolumeInit, volume: Volume): LabelArray {
+/** Returns the label map in the grid of a volume, in the type of its file unless this has slope and intercept. */
+function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume): OpenMap {
   const map = new Volume(init);
   try {
-    requireSameGrid(map, volume);
+    if (!isCropped) requireSameGrid(map, volume);
     // Says what is wrong with voxels that are no labels.
     map.labels();
     const count = map.dims.reduce((product, size) => product * size, 1);
-    if ((init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0) return init.data.slice(0, count) as LabelArray;
-    return Int32Array.from(map.intensities());
+    const isPlain = (init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0;
+    const voxels = isPlain ? (init.data.slice(0, count) as LabelArray) : Int32Array.from(map.intensities());
+    return { voxels: isCropped ? placed(map, voxels, volume) : voxels, known, file: name };
   } finally {
     map.free();
   }
+}
+
+/**
+ * Returns the labels of a map whose voxels are voxels of a volume, such as a cropped one, in the grid of the volume;
+ * axes may have another order or direction.
+ */
+function placed(map: Volume, labels: LabelArray, volume: Volume): LabelArray {
+  const inverse = invert(volume.affine);
+  const sign = map.space === volume.space ? 1 : -1;
+  const indexOf = (at: Vec3) => {
+    const [x, y, z] = toWorld(map.affine, at);
+    return toWorld(inverse, [sign * x, sign * y, z]);
+  };
+  const first = indexOf([0, 0, 0]);
+  const start = first.map(Math.round) as Vec3;
+  const steps = (
+    [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ] as Vec3[]
+  ).map((along) => indexOf(along).map((x, axis) => Math.round(x - (first[axis] ?? 0))));
+  const target = ([x, y, z]: Vec3) =>
+    start.map((from, axis) => [x, y, z].reduce((sum, n, k) => sum + n * (steps[k]?.[axis] ?? 0), from)) as Vec3;
+  for (let corner = 0; corner < 8; corner++) {
+    const at = map.dims.map((size, axis) => ((corner >> axis) & 1) * (size - 1)) as Vec3;
+    const exact = indexOf(at);
+    if (target(at).some((x, axis) => !(Math.abs(x - (exact[axis] ?? 0)) <= SNAP)) || !isPermutation(steps))
+      throw new Refusal('invalid-argument', text('segment.otherGrid'));
+  }
+  return copied(labels, map.dims, volume.dims, target);
+}
+
+/** Whether each row and each column has a single entry, 1 or −1. */
+function isPermutation(steps: number[][]): boolean {
+  const lengths = [...steps, ...[0, 1, 2].map((axis) => steps.map((step) => step[axis] ?? 0))];
+  return lengths.every((entries) => entries.reduce((sum, x) => sum + Math.abs(x), 0) === 1);
+}
+
+/** Copies labels to a larger grid; `target` returns the index there of a voxel. */
+function copied(labels: LabelArray, dims: Vec3, larger: Vec3, target: (at: Vec3) => Vec3): LabelArray {
+  const out = new (labels.constructor as new (length: number) => LabelArray)(larger[0] * larger[1] * larger[2]);
+  for (let i = 0; i < labels.length; i++) {
+    const label = labels[i] ?? 0;
+    if (label === 0) continue;
+    const row = Math.floor(i / dims[0]);
+    const at = target([i - row * dims[0], row % dims[1], Math.floor(row / dims[1])]);
+    if (at.some((x, axis) => x < 0 || x >= (larger[axis] ?? 0)))
+      throw new Refusal('invalid-argument', text('segment.outside'));
+    out[(at[2] * larger[1] + at[1]) * larger[0] + at[0]] = label;
+  }
+  return out;
 }
 
 function requireSameGrid(map: Volume, volume: Volume): void {

@@ -14,22 +14,21 @@ import type {
   OpenedImage,
   OpenedLabels,
   ParamValues,
-  Region,
   RequestKind,
   Requests,
+  StepUpdate,
   Surface,
   SurfaceUpdate,
   ToWorker,
 } from './protocol';
-import { forEachRow, grown } from './region';
-import { mapLike, type OpenVolume, openImage, openLabels } from './source';
+import { forEachRow } from './region';
+import { withLabels } from './slicer';
+import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
 };
 
-/** Distance in voxels from a change within which surfaces may move: they are smoothed again up to 6 cells away. */
-const HALO = 8;
 let maps = 0;
 
 /** A label map with its surfaces. */
@@ -40,12 +39,9 @@ class LiveMap {
   readonly surfaces: LabelSurfaces;
   /** Number of voxels of each label, the background included. */
   readonly #counts = new Map<number, number>();
-  /** Numbers of vertices and triangles of the surfaces when they were last sent, to reserve memory for the next. */
-  readonly #sizes = new Map<number, [number, number]>();
   readonly #voxelVolume: number;
-  /** Labels whose surfaces may have changed since they were smooth. */
-  #changed = new Set<number>();
-  #isSmooth = false;
+  /** Version of each label's surface when it was last sent. */
+  readonly #sent = new Map<number, number>();
 
   constructor({ volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>, voxels: LabelArray, params: ParamValues) {
     this.voxels = voxels;
@@ -58,30 +54,16 @@ class LiveMap {
       throw error;
     }
     for (const label of voxels) this.#count(label, 1);
-    this.#changed = new Set(this.surfaces.labels);
   }
 
-  /** Makes a step; returns whether the surfaces are smooth. */
-  step(): boolean {
-    this.#isSmooth = this.surfaces.step(1).done;
-    return this.#isSmooth;
+  /** Labels whose surfaces have changed since they were last sent; also those that have lost all voxels. */
+  get changed(): number[] {
+    const known = [...this.#counts.keys()].filter((label) => label !== 0);
+    return known.filter((label) => this.surfaces.mesh(label).geometryVersion !== this.#sent.get(label));
   }
 
-  /** Labels whose surfaces may have changed by the last edits, until others follow when the surfaces are smooth. */
-  get changed(): ReadonlySet<number> {
-    return this.#changed;
-  }
-
-  setParams(params: ParamValues): void {
-    this.surfaces.setParams(params);
-    this.#changed = new Set(this.surfaces.labels);
-    this.#isSmooth = false;
-  }
-
-  /** Changes voxels, and has the surfaces follow; returns the labels whose surfaces may have changed. */
-  write(block: LabelBlock): Set<number> {
-    const near = grown(block, HALO, this.map.dims);
-    const affected = this.#labelsIn(near);
+  /** Changes voxels; the surfaces follow them by the next steps. */
+  write(block: LabelBlock): void {
     this.map.write(block);
     let at = 0;
     forEachRow(block, this.map.dims, (first) => {
@@ -94,21 +76,12 @@ class LiveMap {
     });
     const { min, dims } = block;
     this.surfaces.refresh({ min, dims });
-    for (const label of this.#labelsIn(near)) affected.add(label);
-    if (this.#isSmooth) this.#changed.clear();
-    for (const label of affected) this.#changed.add(label);
-    this.#isSmooth = false;
-    return affected;
-  }
-
-  /** Returns all labels that have voxels. */
-  get labels(): readonly number[] {
-    return this.surfaces.labels;
   }
 
   describe(value: number): LabelSurface {
     const voxels = this.#counts.get(value) ?? 0;
     const surface = voxels > 0 ? this.#surface(value) : undefined;
+    this.#sent.set(value, this.surfaces.mesh(value).geometryVersion);
     return { value, voxels, volume: voxels * this.#voxelVolume, area: surface ? areaOf(surface) : 0, surface };
   }
 
@@ -117,32 +90,18 @@ class LiveMap {
     this.map.free();
   }
 
-  /** Copies a surface into arrays with spare capacity, in one extraction of it. */
+  /** Copies a surface into arrays with spare capacity. */
   #surface(value: number): Surface {
-    const [vertices, triangles] = this.#sizes.get(value) ?? [0, 0];
+    const mesh = this.surfaces.mesh(value);
+    const { vertexCount: vertices, triangleCount: triangles } = mesh;
     const [numbers, corners] = [3 * capacityFor(vertices), 3 * capacityFor(triangles)];
     const arrays = {
       positions: new Float32Array(numbers),
       normals: new Float32Array(numbers),
       indices: new Uint32Array(corners),
     };
-    const counts = this.surfaces.mesh(value).copyTo(arrays);
-    this.#sizes.set(value, [counts.vertices, counts.triangles]);
-    return { ...arrays, ...counts };
-  }
-
-  #labelsIn(region: Region): Set<number> {
-    const found = new Set<number>();
-    let last = 0;
-    forEachRow(region, this.map.dims, (first) => {
-      for (let x = first; x < first + region.dims[0]; x++) {
-        const label = this.voxels[x] ?? 0;
-        if (label !== last) found.add(label);
-        last = label;
-      }
-    });
-    found.delete(0);
-    return found;
+    mesh.copyTo(arrays);
+    return { ...arrays, vertices, triangles };
   }
 
   #count(label: number, change: number): void {
@@ -161,19 +120,19 @@ class Session {
     },
     open: (body) => this.#openImage(body),
     openLabels: ({ files }) => this.#openLabels(files),
-    edit: ({ map, block }) => {
-      const began = performance.now();
-      const live = this.#current();
-      return this.#update(map === live.id ? live.write(block) : [], began);
-    },
+    edit: ({ map, block }) => this.#step(map, block),
     step: ({ map }) => this.#step(map),
     setParams: (params) => {
-      const live = this.#current();
-      live.setParams(params);
-      return { ...live.surfaces.params };
+      const { surfaces } = this.#current();
+      surfaces.setParams(params);
+      return { ...surfaces.params };
     },
     mask: ({ low, high }) => this.#mask(low, high),
-    exportMap: ({ format }) => this.#current().map.toBytes(format, { gzip: true }),
+    exportMap: ({ format, labels }) => {
+      const { map } = this.#current();
+      const file = map.toBytes(format, { gzip: true });
+      return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
+    },
     exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
   };
 
@@ -181,14 +140,13 @@ class Session {
     const began = performance.now();
     const opened = await openImage(source);
     try {
-      const live = new LiveMap(opened, labels ?? opened.labels, params);
+      const live = new LiveMap(opened, labels ?? opened.map.voxels, params);
       this.#adopt(live);
       this.#open?.volume.free();
       this.#open = opened;
-      const all = this.#all(live, began);
+      const all = this.#all(live, opened.map, began);
       const volume = viewOf(opened.volume, name);
-      const { labelFile } = opened;
-      return withTransfer({ ...all, volume, params: { ...live.surfaces.params }, labelFile }, [
+      return withTransfer({ ...all, volume, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
         all.voxels,
         volume.voxels,
@@ -202,18 +160,21 @@ class Session {
   async #openLabels(files: Requests['openLabels']['body']['files']): Promise<OpenedLabels> {
     const began = performance.now();
     const image = this.#image();
-    const live = new LiveMap(image, await openLabels(files, image.volume), { ...this.#current().surfaces.params });
+    const opened = await openLabels(files, image.volume);
+    const live = new LiveMap(image, opened.voxels, { ...this.#current().surfaces.params });
     this.#adopt(live);
-    const all = this.#all(live, began);
+    const all = this.#all(live, opened, began);
     return withTransfer(all, [...arraysOf(all), all.voxels]);
   }
 
-  #step(map: number): SurfaceUpdate & { done: boolean } {
+  /** Makes a step, after a change of voxels if there is one, which a single step settles unless it is a large one. */
+  #step(map: number, block?: LabelBlock): StepUpdate {
     const began = performance.now();
     const live = this.#current();
     if (map !== live.id) return { surfaces: [], milliseconds: 0, done: true };
-    const done = live.step();
-    const update = this.#update(done ? live.changed : [], began);
+    if (block) live.write(block);
+    const { done } = live.surfaces.step(1);
+    const update = this.#update(done || block ? live.changed : [], began);
     return withTransfer({ ...update, done }, arraysOf(update));
   }
 
@@ -222,8 +183,9 @@ class Session {
     this.#live = live;
   }
 
-  #all(live: LiveMap, began: number): OpenedLabels {
-    return { ...this.#update(live.labels, began), map: live.id, voxels: live.voxels.slice() };
+  #all(live: LiveMap, { known, file }: OpenMap, began: number): OpenedLabels {
+    const update = this.#update(live.surfaces.labels, began);
+    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {

@@ -7,6 +7,7 @@ import { choice, PLACEMENTS } from './view-options';
 export class SegmentOptionControls {
   readonly element: HTMLElement;
   readonly #edges = h('input', { type: 'checkbox', 'data-view': 'edges' });
+  readonly #outlines = h('input', { type: 'checkbox', 'data-view': 'outlines' });
   readonly #slices: HTMLSelectElement;
   readonly #opacity: HTMLInputElement;
   readonly #value: SegmentViewOptions;
@@ -16,6 +17,7 @@ export class SegmentOptionControls {
     this.#value = { ...initial };
     this.#onChange = onChange;
     this.#edges.addEventListener('change', () => this.set({ edges: this.#edges.checked }));
+    this.#outlines.addEventListener('change', () => this.set({ outlines: this.#outlines.checked }));
     const slices = choice(text('controls.slices'), 'slices', PLACEMENTS, initial.slices, (value) =>
       this.set({ slices: value }),
     );
@@ -27,6 +29,7 @@ export class SegmentOptionControls {
       'div',
       { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
       h('label', {}, this.#edges, text('controls.viewWireframe')),
+      h('label', {}, this.#outlines, text('segment.outlines')),
       slices.element,
       h('span', { class: 'placement' }, h('label', { for: id }, text('segment.opacity')), this.#opacity),
     );
@@ -48,6 +51,7 @@ export class SegmentOptionControls {
 
   #show(): void {
     this.#edges.checked = this.#value.edges;
+    this.#outlines.checked = this.#value.outlines;
     this.#slices.value = this.#value.slices;
     this.#opacity.valueAsNumber = this.#value.opacity;
   }

@@ -6,14 +6,21 @@ export type Tool = 'navigate' | 'brush' | 'threshold' | 'eraser' | 'fill';
 
 /** Shape of the brush: a ball in the volume, or a disc in the slice. */
 export type BrushShape = 'ball' | 'disc';
+/** Extent of a fill: the slice, or a box of the volume. */
+export type FillExtent = 'slice' | 'box';
 
 export interface ToolSettings {
   tool: Tool;
   /** Radius of the brush, in shortest sides of a voxel. */
   radius: number;
   shape: BrushShape;
-  /** Intensities that the threshold brush paints, both included. */
+  /** Intensities that the threshold brush paints, and that a fill may be limited to, both included. */
   range: [number, number];
+  extent: FillExtent;
+  /** Largest distance of a fill in the volume along each axis, in voxels. */
+  reach: number;
+  /** Whether a fill in the volume is limited to the range of intensities. */
+  inRange: boolean;
   /** Whether only background is painted, and only the active label erased. */
   protect: boolean;
 }
@@ -26,6 +33,13 @@ const TOOLS: { tool: Tool; key: string; label: string; help: string }[] = [
   { tool: 'fill', key: 'f', label: text('segment.fill'), help: text('segment.fillHelp') },
 ];
 const MOST_RADIUS = 40;
+const MOST_REACH = 500;
+
+/** Whether the tool in use changes only voxels in the range of intensities. */
+export function usesRange({ tool, extent, inRange }: ToolSettings): boolean {
+  return tool === 'threshold' || (tool === 'fill' && extent === 'box' && inRange);
+}
+
 const UNDO = 'M8 5 2.5 10 8 15v-3.5h6a3.5 3.5 0 0 1 0 7H8V21h6a6 6 0 0 0 0-12H8z';
 const REDO = 'm16 5 5.5 5-5.5 5v-3.5h-6a3.5 3.5 0 0 0 0 7h6V21h-6a6 6 0 0 1 0-12h6z';
 
@@ -50,6 +64,12 @@ export class SegmentTools {
   readonly #radiusRow: HTMLElement;
   readonly #shape: HTMLSelectElement;
   readonly #shapeRow: HTMLElement;
+  readonly #extent: HTMLSelectElement;
+  readonly #extentRow: HTMLElement;
+  readonly #reach: HTMLInputElement;
+  readonly #reachRow: HTMLElement;
+  readonly #inRange = h('input', { type: 'checkbox', 'data-tool-setting': 'in-range' });
+  readonly #inRangeRow = h('label', { class: 'check' }, this.#inRange, text('segment.inRange'));
   readonly #ends: [HTMLInputElement, HTMLInputElement];
   readonly #rangeRow: HTMLElement;
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
@@ -57,7 +77,10 @@ export class SegmentTools {
   readonly #apply: HTMLButtonElement;
   readonly #undo: HTMLButtonElement;
   readonly #redo: HTMLButtonElement;
-  #value: ToolSettings = { tool: 'brush', radius: 3, shape: 'ball', range: [0, 0], protect: false };
+  #value: ToolSettings = {
+    ...{ tool: 'brush', radius: 3, shape: 'ball', range: [0, 0], protect: false },
+    ...{ extent: 'slice', reach: 50, inRange: false },
+  };
 
   constructor(events: ToolEvents) {
     this.#events = events;
@@ -70,7 +93,10 @@ export class SegmentTools {
     });
     [this.#radiusRow, this.#radius, this.#output] = this.#buildRadius();
     [this.#shapeRow, this.#shape] = this.#buildShape();
+    [this.#extentRow, this.#extent] = this.#buildExtent();
+    [this.#reachRow, this.#reach] = this.#buildReach();
     [this.#rangeRow, this.#ends] = this.#buildRange();
+    this.#inRange.addEventListener('change', () => this.set({ inRange: this.#inRange.checked }));
     this.#protect.addEventListener('change', () => this.set({ protect: this.#protect.checked }));
     this.#apply = h(
       'button',
@@ -91,6 +117,9 @@ export class SegmentTools {
       { class: 'tool-settings' },
       this.#help,
       this.#shapeRow,
+      this.#extentRow,
+      this.#reachRow,
+      this.#inRangeRow,
       this.#rangeRow,
       this.#error,
       h('label', { class: 'check' }, this.#protect, text('segment.protect')),
@@ -109,7 +138,9 @@ export class SegmentTools {
   /** Changes settings and reports all of them to the lab. */
   set(changed: Partial<ToolSettings>): void {
     const radius = Math.min(MOST_RADIUS, Math.max(0, changed.radius ?? this.#value.radius));
-    this.#value = { ...this.#value, ...changed, radius };
+    const wanted = Math.round(changed.reach ?? this.#value.reach);
+    const reach = Number.isNaN(wanted) ? this.#value.reach : Math.min(MOST_REACH, Math.max(1, wanted));
+    this.#value = { ...this.#value, ...changed, radius, reach };
     this.#show();
     this.#events.onSettings(this.#value);
   }
@@ -162,6 +193,26 @@ export class SegmentTools {
     return [h('div', { class: 'row' }, h('label', { for: id }, text('segment.shape')), select), select];
   }
 
+  #buildExtent(): [HTMLElement, HTMLSelectElement] {
+    const id = uniqueId('extent');
+    const select = h(
+      'select',
+      { id, 'data-tool-setting': 'extent' },
+      h('option', { value: 'slice' }, text('segment.extentSlice')),
+      h('option', { value: 'box' }, text('segment.extentBox')),
+    );
+    select.addEventListener('change', () => this.set({ extent: select.value as FillExtent }));
+    return [h('div', { class: 'row' }, h('label', { for: id }, text('segment.extent')), select), select];
+  }
+
+  #buildReach(): [HTMLElement, HTMLInputElement] {
+    const id = uniqueId('reach');
+    const input = h('input', { type: 'number', id, min: 1, max: MOST_REACH, step: 1, 'data-tool-setting': 'reach' });
+    input.addEventListener('change', () => this.set({ reach: input.valueAsNumber }));
+    const title = text('segment.reachHelp');
+    return [h('div', { class: 'row', title }, h('label', { for: id }, text('segment.reach')), input), input];
+  }
+
   #buildRange(): [HTMLElement, [HTMLInputElement, HTMLInputElement]] {
     const ends = (['low', 'high'] as const).map((end) => {
       const label = text(end === 'low' ? 'segment.rangeLow' : 'segment.rangeHigh');
@@ -186,7 +237,7 @@ export class SegmentTools {
   }
 
   #show(): void {
-    const { tool, radius, shape, range, protect } = this.#value;
+    const { tool, radius, shape, range, protect, extent, reach, inRange } = this.#value;
     for (const [one, radio] of this.#radios) radio.checked = one === tool;
     this.#help.textContent = TOOLS.find((one) => one.tool === tool)?.help ?? '';
     const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
@@ -195,7 +246,12 @@ export class SegmentTools {
     this.#radius.disabled = !hasBrush;
     this.#shape.value = shape;
     this.#shapeRow.hidden = !hasBrush;
-    this.#rangeRow.hidden = tool !== 'threshold';
+    this.#extent.value = extent;
+    this.#extentRow.hidden = tool !== 'fill';
+    this.#reach.valueAsNumber = reach;
+    this.#inRange.checked = inRange;
+    for (const row of [this.#reachRow, this.#inRangeRow]) row.hidden = tool !== 'fill' || extent === 'slice';
+    this.#rangeRow.hidden = !usesRange(this.#value);
     for (const [side, input] of this.#ends.entries()) input.valueAsNumber = range[side] ?? 0;
     this.#error.textContent = '';
     this.#protect.checked = protect;

@@ -233,16 +233,7 @@ export class SlicePanel {
   }
 
   #drawOutline(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
-    const points = this.#outline;
-    context.beginPath();
-    for (let i = 0; i + 3 < points.length; i += 4) {
-      context.moveTo((points[i] ?? 0) * scaleX, (points[i + 1] ?? 0) * scaleY);
-      context.lineTo((points[i + 2] ?? 0) * scaleX, (points[i + 3] ?? 0) * scaleY);
-    }
-    context.lineCap = 'round';
-    context.lineWidth = 1.4;
-    context.strokeStyle = this.#color;
-    context.stroke();
+    drawSegments(context, this.#outline, scaleX, scaleY, this.#color);
   }
 
   /**
@@ -349,6 +340,25 @@ export class SlicePanel {
     const place = this.#placeAt(canvasX, canvasY);
     return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
   }
+}
+
+/** Draws an outline over a slice image; `points` are as returned by {@link projectSegments}. */
+export function drawSegments(
+  context: CanvasRenderingContext2D,
+  points: Float32Array,
+  scaleX: number,
+  scaleY: number,
+  color: string,
+): void {
+  context.beginPath();
+  for (let i = 0; i + 3 < points.length; i += 4) {
+    context.moveTo((points[i] ?? 0) * scaleX, (points[i + 1] ?? 0) * scaleY);
+    context.lineTo((points[i + 2] ?? 0) * scaleX, (points[i + 3] ?? 0) * scaleY);
+  }
+  context.lineCap = 'round';
+  context.lineWidth = 1.4;
+  context.strokeStyle = color;
+  context.stroke();
 }
 
 /**

@@ -4,6 +4,7 @@ import { count, text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
 import { type Axis, toWorld } from './anatomy';
+import { LabelOutlines } from './label-outlines';
 import { LabelPicture, type Overlays } from './label-overlay';
 import { type Grip, SlicePanel } from './panel';
 import { SurfaceObject } from './surface';
@@ -12,6 +13,8 @@ import { VolumeScene } from './volume-scene';
 
 export interface SegmentViewOptions {
   edges: boolean;
+  /** Whether the outlines of the surfaces are drawn on the slices. */
+  outlines: boolean;
   slices: SlicePlacement;
   /** Opacity of the labels on the slices, 0..1. */
   opacity: number;
@@ -39,6 +42,7 @@ export class SegmentView {
   #options: SegmentViewOptions;
   #scene: VolumeScene | undefined;
   #pictures: LabelPicture[] = [];
+  #outlines: LabelOutlines | undefined;
   #overlays: Omit<Overlays, 'opacity'> | undefined;
   #hidden: ReadonlySet<number> = new Set();
   #colors = new Map<number, string>();
@@ -77,6 +81,7 @@ export class SegmentView {
       return panel;
     });
     this.#scene = scene;
+    this.#outlines = new LabelOutlines(scene);
     this.#viewport.fitVolume(volume);
     this.#moveTo(volume.dims.map((size) => (size - 1) >> 1) as Vec3);
   }
@@ -88,14 +93,17 @@ export class SegmentView {
     this.#paint();
   }
 
-  /** Shows another surface of a label, or none; its arrays are used without a copy until the next one is shown. */
-  showSurface(label: number, surface: Surface | undefined): void {
-    const shown = this.#surfaces.get(label);
-    if (surface) {
-      const object = shown?.object ?? this.#newSurface(label);
-      this.#surfaces.set(label, { object, surface });
-      object.show(surface);
-    } else if (shown) this.#drop(label, shown);
+  /** Shows other surfaces of labels, or none; their arrays are used without a copy until the next ones are shown. */
+  showSurfaces(surfaces: Iterable<{ value: number; surface: Surface | undefined }>): void {
+    for (const { value, surface } of surfaces) {
+      const shown = this.#surfaces.get(value);
+      if (surface) {
+        const object = shown?.object ?? this.#newSurface(value);
+        this.#surfaces.set(value, { object, surface });
+        object.show(surface);
+      } else if (shown) this.#drop(value, shown);
+    }
+    if (this.#options.outlines) this.#redraw();
     this.#viewport.invalidate();
   }
 
@@ -167,12 +175,17 @@ export class SegmentView {
   }
 
   #dress(label: number, object: SurfaceObject): void {
-    object.plainColor = this.#colors.get(label) ?? '#888888';
+    object.plainColor = this.#colorOf(label);
     object.object.visible = !this.#hidden.has(label);
+  }
+
+  #colorOf(label: number): string {
+    return this.#colors.get(label) ?? '#888888';
   }
 
   #drop(label: number, { object }: Shown): void {
     this.#surfaces.delete(label);
+    this.#outlines?.drop(label);
     this.#viewport.remove(object.object);
     object.dispose();
   }
@@ -217,7 +230,17 @@ export class SegmentView {
     if (!picture) return;
     context.imageSmoothingEnabled = false;
     context.drawImage(picture.canvas, 0, 0, picture.canvas.width * scaleX, picture.canvas.height * scaleY);
+    if (this.#options.outlines) this.#drawOutlines(panel, context, scaleX, scaleY);
     this.#drawBrush(panel, context, scaleX, scaleY);
+  }
+
+  /** Draws the outlines of the visible surfaces, each in the colour of its label. */
+  #drawOutlines(panel: SlicePanel, ...canvas: [CanvasRenderingContext2D, number, number]): void {
+    const index = this.#crosshair[panel.orientation.axis];
+    for (const [label, { surface }] of this.#surfaces) {
+      if (this.#hidden.has(label)) continue;
+      this.#outlines?.draw(panel, index, label, surface, this.#colorOf(label), ...canvas);
+    }
   }
 
   /** Draws the outline of the brush: on all slices that it reaches, or for a disc on the one under the pointer. */
@@ -279,6 +302,7 @@ export class SegmentView {
     this.#scene?.dispose();
     this.#scene = undefined;
     this.#pictures = [];
+    this.#outlines = undefined;
     this.#pointer = undefined;
   }
 }
