@@ -17,22 +17,46 @@ pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 pub(super) const MAX_NORMALISED: f64 = 100.0;
 
 /// One level of the image pyramid, sampled at positions in model space.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct LevelImage {
     /// The intensities of the level; without values if the level is sparse.
     grid: Grid,
     /// The loaded bricks of a sparse level, while the model computes; between its steps the volume has them.
-    pub(super) bricks: Option<BrickGrid>,
+    bricks: Option<BrickGrid>,
     gradient: Option<VectorGrid>,
     /// Maps positions in model space to this level, together with `offset`: voxel index = position · scale + offset.
     scale: Vec3,
     offset: Vec3,
 }
 
+impl Clone for LevelImage {
+    fn clone(&self) -> Self {
+        // By `bricks`, so that modules without sparse volumes do not copy them.
+        Self {
+            grid: self.grid.clone(),
+            bricks: self.bricks().cloned(),
+            gradient: self.gradient.clone(),
+            ..*self
+        }
+    }
+}
+
 impl LevelImage {
     fn new(grid: Grid, finest: [usize; 3]) -> Self {
         let scale = Vec3::from([0, 1, 2].map(|axis| grid.dims[axis] as f32 / finest[axis] as f32));
         Self { grid, bricks: None, gradient: None, scale, offset: (scale - Vec3::ONE) * 0.5 }
+    }
+
+    /// Returns the loaded bricks of a sparse level, while the model computes; `None` for a level that is there as a whole.
+    /// A constant without the feature `sparse`, so that modules without it have no code for bricks.
+    #[inline]
+    pub(super) fn bricks(&self) -> Option<&BrickGrid> {
+        if cfg!(feature = "sparse") { self.bricks.as_ref() } else { None }
+    }
+
+    /// As [`Self::bricks`], to change them.
+    pub(super) fn bricks_mut(&mut self) -> Option<&mut BrickGrid> {
+        if cfg!(feature = "sparse") { self.bricks.as_mut() } else { None }
     }
 
     /// Returns the length of the side of a cube with the volume of a voxel of this level, in model units.
@@ -50,7 +74,7 @@ impl LevelImage {
     /// the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
-        match &self.bricks {
+        match self.bricks() {
             None => self.grid.sample_padded(self.index(p), background, known),
             Some(bricks) => bricks.sample_padded(self.index(p), background, known),
         }
@@ -250,10 +274,16 @@ impl Pyramid {
         Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse })
     }
 
+    /// Returns whether this is the pyramid of a sparse volume; a constant without the feature `sparse`.
+    #[inline]
+    pub(super) fn is_sparse(&self) -> bool {
+        cfg!(feature = "sparse") && self.sparse.is_some()
+    }
+
     /// Returns δ, the lower bound of the edge length, on a level in voxels of the finest level; it grows by
     /// [`REDUCTION`] with each level (15), or, in a sparse volume, with the size of the level's voxels.
     pub(super) fn delta_at(&self, finest: f64, level: usize) -> f32 {
-        if self.sparse.is_some() {
+        if self.is_sparse() {
             return (finest * self.levels[level].side()) as f32;
         }
         (0..level).fold(finest, |delta, _| delta * REDUCTION) as f32

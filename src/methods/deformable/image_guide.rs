@@ -49,7 +49,8 @@ impl<'a> ImageGuide<'a> {
 
     /// Returns whether the image is followed at all of some vertices.
     fn follows(&self, mesh: &Mesh, vertices: &[VertexId]) -> bool {
-        self.within.is_none_or(|bounds| vertices.iter().all(|&v| bounds.contains(mesh.position(v))))
+        !cfg!(feature = "sparse")
+            || self.within.is_none_or(|bounds| vertices.iter().all(|&v| bounds.contains(mesh.position(v))))
     }
 
     fn depth(&self, p: Vec3) -> f32 {

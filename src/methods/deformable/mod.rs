@@ -251,7 +251,7 @@ impl DeformableModel {
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
         let domain = Domain::new(pyramid.dims(), delta);
-        let seeds = pyramid.sparse.is_none() && params.seeding != Seeding::Off;
+        let seeds = !pyramid.is_sparse() && params.seeding != Seeding::Off;
         let context = StartContext {
             image: &pyramid.levels[level],
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
@@ -334,7 +334,7 @@ impl DeformableModel {
     /// long; other parameters may reduce it again. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.sparse.is_some() { self.step_if_loaded() } else { self.iterate() }
+        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate() }
     }
 
     fn iterate(&mut self) -> Result<StepReport, MethodError> {
@@ -358,7 +358,7 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        if std::mem::take(&mut self.needs_factor) {
+        if self.pyramid.is_sparse() && std::mem::take(&mut self.needs_factor) {
             self.image_force_factor = self.measured_factor();
         }
         let examine_all = std::mem::take(&mut self.convergence.examine_next);
@@ -450,7 +450,7 @@ impl DeformableModel {
     /// added; the parameter `seeding` decides.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
-            _ if self.pyramid.sparse.is_some() => false,
+            _ if self.pyramid.is_sparse() => false,
             Seeding::Auto => self.from_contour,
             Seeding::On => true,
             Seeding::Off => false,
@@ -508,7 +508,7 @@ impl DeformableModel {
     /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         params.validate()?;
-        if self.pyramid.sparse.is_some() {
+        if self.pyramid.is_sparse() {
             sparse::check_params(&params)?;
         }
         let before = std::mem::replace(&mut self.params, params);
@@ -565,12 +565,12 @@ impl DeformableModel {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
         self.motion.forces.forget_image();
-        self.needs_factor = self.pyramid.levels[self.level].bricks.is_some();
+        self.needs_factor = self.pyramid.levels[self.level].bricks().is_some();
         if self.needs_factor {
             self.level_iso = self.pyramid.normalised(self.params.iso);
             return Ok(());
         }
-        self.level_iso = if self.seeds_levels() || self.pyramid.sparse.is_some() {
+        self.level_iso = if self.seeds_levels() || self.pyramid.is_sparse() {
             self.pyramid.normalised(self.params.iso)
         } else {
             coarse::iso(&self.pyramid, &self.params, self.level)

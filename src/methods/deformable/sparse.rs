@@ -114,7 +114,7 @@ impl DeformableModel {
 
     /// Returns an error if the volume is sparse, so that no level but the coarsest can be read whole.
     pub(super) fn check_is_whole(&self) -> Result<(), MethodError> {
-        if self.pyramid.sparse.is_none() {
+        if !self.pyramid.is_sparse() {
             return Ok(());
         }
         Err(MethodError::invalid("volume", "must not be sparse: this needs all voxels of a level"))
@@ -132,7 +132,7 @@ impl DeformableModel {
     fn exchange_bricks(&mut self) {
         let Some(SparseLevels { volume, finest }) = &self.pyramid.sparse else { return };
         let levels = self.pyramid.levels.iter_mut().enumerate();
-        volume.exchange(levels.filter_map(|(k, level)| Some((finest + k, level.bricks.as_mut()?))));
+        volume.exchange(levels.filter_map(|(k, level)| Some((finest + k, level.bricks_mut()?))));
     }
 
     fn try_to_iterate(&mut self) -> Result<StepReport, MethodError> {
@@ -164,7 +164,7 @@ impl DeformableModel {
         }
         let may_end = self.convergence.quiet + 1 >= self.quiet_iterations();
         let mut needs = Vec::new();
-        if self.pyramid.levels[self.level].bricks.is_some() {
+        if self.pyramid.levels[self.level].bricks().is_some() {
             let reads_all = may_end || self.needs_factor || self.convergence.examine_next;
             let vertices = if reads_all { self.followed_vertices() } else { self.awake_vertices() };
             needs.extend(self.needs_around(self.level, &vertices));
@@ -183,7 +183,7 @@ impl DeformableModel {
         };
         let delta = self.pyramid.delta_at(self.finest_delta, level);
         let image = &self.pyramid.levels[level];
-        let Some(bricks) = &image.bricks else { return Vec::new() };
+        let Some(bricks) = image.bricks() else { return Vec::new() };
         let near = |reach: f32, vertices: &[VertexId]| {
             ranks_around(image, bricks, &self.mesh, vertices, reach * delta)
         };
@@ -200,7 +200,7 @@ impl DeformableModel {
         let mut missed = Vec::new();
         let Some(SparseLevels { finest, .. }) = self.pyramid.sparse else { return Ok(missed) };
         for (k, level) in self.pyramid.levels.iter().enumerate() {
-            if let Some(bricks) = &level.bricks {
+            if let Some(bricks) = level.bricks() {
                 missed.extend(merged(bricks, finest + k, &bricks.take_missed()));
             }
         }
@@ -209,7 +209,7 @@ impl DeformableModel {
 
     /// Drops the bricks of a level that the run has left.
     fn drop_level(&mut self, level: usize) {
-        if let Some(bricks) = &mut self.pyramid.levels[level].bricks {
+        if let Some(bricks) = self.pyramid.levels[level].bricks_mut() {
             bricks.retain(|_| false);
         }
     }
@@ -217,11 +217,11 @@ impl DeformableModel {
     /// Drops the bricks of the current level that no vertex is near, if there are many.
     fn drop_spare(&mut self) {
         let image = &self.pyramid.levels[self.level];
-        let Some(bricks) = &image.bricks else { return };
+        let Some(bricks) = image.bricks() else { return };
         let reach = (REACH + MARGIN) * self.model_delta();
         let near = ranks_around(image, bricks, &self.mesh, &self.followed_vertices(), reach);
         if bricks.len() > MOST_SPARE * near.len()
-            && let Some(bricks) = &mut self.pyramid.levels[self.level].bricks
+            && let Some(bricks) = self.pyramid.levels[self.level].bricks_mut()
         {
             bricks.retain(|brick| near.binary_search(&brick.rank()).is_ok());
         }
@@ -285,6 +285,9 @@ impl DeformableModel {
     }
 
     fn bounds_on(&self, level: usize) -> Option<Bounds> {
+        if !self.pyramid.is_sparse() {
+            return None;
+        }
         self.follow.filter(|follow| level < follow.whole).map(|follow| follow.bounds)
     }
 
@@ -317,7 +320,7 @@ impl DeformableModel {
         if self.params.topology == Topology::Fixed || self.bounds_on(self.level - 1).is_some() {
             return 0;
         }
-        if self.pyramid.sparse.is_none() {
+        if !self.pyramid.is_sparse() {
             return 1;
         }
         let shortest = self.pyramid.delta_at(self.finest_delta, self.level - 1)
@@ -336,7 +339,7 @@ impl DeformableModel {
     /// Sets the sizes of the vertices on a sparse level just begun. The part of the surface that it does not follow keeps
     /// its edge lengths: δ was larger there by the factor `ratio`.
     pub(super) fn begin_sizes(&mut self, ratio: f32) {
-        if self.pyramid.sparse.is_none() {
+        if !self.pyramid.is_sparse() {
             return;
         }
         let first = self.first_size(self.level);

@@ -68,7 +68,7 @@ impl DeformableModel {
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        if self.pyramid.sparse.is_some() {
+        if self.pyramid.is_sparse() {
             let problem = "runs on sparse volumes cannot be restored".into();
             return Err(MethodError::BadState { field: "volume", problem });
         }
