@@ -94,6 +94,7 @@ test('a folder is opened', async () => {
 test('measurements that need the whole volume say that they do not', async () => {
   await app.page.getByRole('button', { name: 'Measure coverage' }).click();
   await expect.poll(() => app.page.textContent('.coverage')).toMatch(/larger than memory/);
+  expect(await app.page.locator('[data-transport=undo]').isDisabled()).toBe(true);
 });
 
 test('the page names the servers that it may reach, and its policy has the same', async () => {

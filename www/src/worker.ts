@@ -294,6 +294,8 @@ class Session {
   }
 
   #save(): SavedRun {
+    // Without saved runs there is no undo.
+    this.#image();
     const model = this.#current();
     const state = model.save();
     return withTransfer({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
