@@ -62,7 +62,7 @@ fn main() {
                 }
                 println!("asks for {} boxes of level {}", needs.len(), needs[0].level);
             }
-            Err(error) => panic!("{error}"),
+            Err(error) => return println!("{error}"),
         }
     }
     println!(
