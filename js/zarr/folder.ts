@@ -78,7 +78,9 @@ export async function zipStore(zip: Blob): Promise<AsyncReadable> {
   return store;
 }
 
-function withoutFolder<T>(entries: Record<string, T>): Record<string, T> {
+function withoutFolder<T>(all: Record<string, T>): Record<string, T> {
+  // What macOS adds beside the folder.
+  const entries = Object.fromEntries(Object.entries(all).filter(([name]) => !name.startsWith('__MACOSX/')));
   const names = Object.keys(entries);
   const folder = `${names[0]?.split('/')[0]}/`;
   const isWhole = ['zarr.json', '.zgroup'].some((name) => name in entries);

@@ -10,7 +10,21 @@ import { HttpError } from './requests.js';
 export function httpStore(zarrita: Zarrita, url: URL, timeoutMs: number): AsyncReadable {
   // Ranges that are counted from the end are not asked for: servers of other origins would have to allow each in
   // advance, and those of Azure do not know them.
-  return new zarrita.FetchStore(url, { fetch: (request) => send(request, timeoutMs) });
+  const root = new URL(url);
+  return new zarrita.FetchStore(url, {
+    fetch: (request) => {
+      checkWithin(root, request);
+      return send(request, timeoutMs);
+    },
+  });
+}
+
+/** Throws unless a request stays below the address of the image: paths in its metadata may be whole addresses. */
+function checkWithin(root: URL, { url }: Request): void {
+  const { origin, pathname } = new URL(url);
+  const folder = root.pathname.endsWith('/') ? root.pathname : `${root.pathname}/`;
+  if (origin !== root.origin || !pathname.startsWith(folder))
+    throw new HttpError(400, `${url}: outside of the image at ${root.href}`);
 }
 
 /** Sends a request, and returns the answer with all of its body. */
@@ -19,6 +33,13 @@ async function send(request: Request, timeoutMs: number): Promise<Response> {
   try {
     const response = await fetch(request, { signal: watch.signal });
     const { status, headers } = response;
+    if (new URL(response.url || request.url).origin !== new URL(request.url).origin) {
+      await response.body?.cancel();
+      throw new HttpError(
+        400,
+        `${request.url}: redirected to ${new URL(response.url).origin}; open that address instead`,
+      );
+    }
     if (status === 200 && request.method === 'HEAD') checkLength(headers, request);
     if (hasData(request, status)) return new Response(await read(response, watch), { status, headers });
     await response.body?.cancel();

@@ -27,7 +27,7 @@ const TYPES: Record<string, [ZarrVoxelType, VoxelArrays]> = {
 const MOST_VOXELS = 0xffffffff;
 
 /** Largest number of voxels of a chunk, with all channels and times. */
-const LARGEST_CHUNK = 2 ** 29;
+const LARGEST_CHUNK = 2 ** 27;
 
 /**
  * How far apart the fields of view of two levels may be, in voxels of the coarser one: those that fit only in part may

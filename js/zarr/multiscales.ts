@@ -29,6 +29,9 @@ const SPACE: readonly AxisName[] = ['x', 'y', 'z'];
 /** Type of each axis in OME-NGFF, and how it is called by writers that abbreviate nothing. */
 const TYPES: Record<AxisName, string> = { x: 'space', y: 'space', z: 'space', c: 'channel', t: 'time' };
 
+/** Largest number of levels: with each half as long as the one before, the limits of sizes allow no more. */
+const MOST_LEVELS = 32;
+
 /** Millimetres per unit of length, by its name in OME-NGFF (that of UDUNITS-2), and by symbols that are also written. */
 const MILLIMETRES: Record<string, number> = {
   ...{ picometer: 1e-9, pm: 1e-9, angstrom: 1e-7, Å: 1e-7, nanometer: 1e-6, nm: 1e-6 },
@@ -48,7 +51,11 @@ export function parseMultiscale(attributes: Json): Multiscale {
   const { names, units } = parseAxes(image.axes);
   const { unit, factors } = millimetres(names, units);
   const whole = parseTransform(image.coordinateTransformations ?? [], names.length, 'coordinateTransformations');
-  const levels = list(image.datasets, 'multiscales[0].datasets').map((dataset, index) => {
+  const datasets = list(image.datasets, 'multiscales[0].datasets');
+  if (datasets.length > MOST_LEVELS) {
+    throw badZarr('multiscales[0].datasets', `must be at most ${MOST_LEVELS} levels, got ${datasets.length}`);
+  }
+  const levels = datasets.map((dataset, index) => {
     const { path, ...own } = parseDataset(dataset, names.length, index);
     const { scale, translation } = composed(own, whole);
     return { path, scale: product(scale, factors), translation: product(translation, factors) };
@@ -89,7 +96,7 @@ function parseAxes(value: unknown): { names: AxisName[]; units: unknown[] } {
 }
 
 function axisName({ name, type }: Json, part: string): AxisName {
-  const known = TYPES[name as AxisName] ? (name as AxisName) : nameOfType(type);
+  const known = Object.hasOwn(TYPES, String(name)) ? (name as AxisName) : nameOfType(type);
   if (known && (type === undefined || type === TYPES[known])) return known;
   throw badZarr(
     part,
@@ -106,7 +113,7 @@ function nameOfType(type: unknown): AxisName | undefined {
 /** Returns the factor of each axis by which lengths become millimetres; 1 if no unit of length is known. */
 function millimetres(names: AxisName[], units: unknown[]): { unit: 'mm' | undefined; factors: number[] } {
   const spatial = names.map((name) => SPACE.includes(name));
-  const known = units.map((unit, axis) => (spatial[axis] ? MILLIMETRES[unit as string] : 1));
+  const known = units.map((unit, axis) => (spatial[axis] ? lengthOf(unit) : 1));
   const lengths = known.filter((_, axis) => spatial[axis]);
   if (lengths.every((length) => length === undefined)) return { unit: undefined, factors: names.map(() => 1) };
   const missing = known.indexOf(undefined);
@@ -115,6 +122,10 @@ function millimetres(names: AxisName[], units: unknown[]): { unit: 'mm' | undefi
     `multiscales[0].axes[${missing}].unit`,
     `must be a unit of length if other axes have one, such as "micrometer", got ${shown(units[missing])}`,
   );
+}
+
+function lengthOf(unit: unknown): number | undefined {
+  return Object.hasOwn(MILLIMETRES, String(unit)) ? MILLIMETRES[String(unit)] : undefined;
 }
 
 function parseDataset(dataset: Json, rank: number, index: number): LevelTransform {

@@ -26,6 +26,27 @@ export async function openLevels(
   selection: Selection,
   signal: AbortSignal | undefined,
 ): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
+  // Ends all other requests if one fails.
+  const stop = new AbortController();
+  const abort = () => stop.abort(signal?.reason);
+  signal?.addEventListener('abort', abort);
+  try {
+    return await openArrays(zarrita, store, path, selection, stop.signal);
+  } catch (error) {
+    stop.abort(error);
+    throw error;
+  } finally {
+    signal?.removeEventListener('abort', abort);
+  }
+}
+
+async function openArrays(
+  zarrita: Zarrita,
+  store: Readable,
+  path: string,
+  selection: Selection,
+  signal: AbortSignal,
+): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
   const opener = new Opener(zarrita, signal);
   const group = await opener.group(zarrita.root(store).resolve(path.replace(/^\/+|\/+$/g, '')));
   const image = parseMultiscale(Object(group.attrs));
@@ -46,12 +67,12 @@ export async function openLevels(
 /** Opens groups on Zarr 3, or else on Zarr 2, and then arrays of the same version. */
 class Opener {
   readonly #zarrita: Zarrita;
-  readonly #options: { signal?: AbortSignal };
+  readonly #options: { signal: AbortSignal };
   #version: 'v2' | 'v3' = 'v3';
 
-  constructor(zarrita: Zarrita, signal: AbortSignal | undefined) {
+  constructor(zarrita: Zarrita, signal: AbortSignal) {
     this.#zarrita = zarrita;
-    this.#options = signal ? { signal } : {};
+    this.#options = { signal };
   }
 
   async group(location: Location<Readable>): Promise<Group<Readable>> {
@@ -75,7 +96,7 @@ class Opener {
 
   /** Returns an error that says that nothing is there, or at least nothing that may be read, and throws others. */
   #missing(part: string, error: unknown): { error: unknown } {
-    this.#options.signal?.throwIfAborted();
+    this.#options.signal.throwIfAborted();
     if (error instanceof RefusedError) return { error };
     if (!this.#zarrita.isZarritaError(error, 'NotFoundError')) throw translated(this.#zarrita, part, error);
     if (error.found === undefined) return { error };
@@ -90,7 +111,7 @@ class Opener {
       // Level checks the type.
       return array as ZarrArray<'uint8'>;
     } catch (error) {
-      this.#options.signal?.throwIfAborted();
+      this.#options.signal.throwIfAborted();
       throw translated(this.#zarrita, part, error);
     }
   }

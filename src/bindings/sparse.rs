@@ -55,7 +55,7 @@ impl RawSparseVolume {
     pub fn new(description: &JsValue) -> Result<RawSparseVolume, JsValue> {
         let of = |name: &str| property(description, name);
         let kind = of("type").as_string().unwrap_or_default();
-        let fill = of("fill").as_f64().unwrap_or(0.0);
+        let fill = of("fill").as_f64().ok_or_else(|| Failure::invalid("fill", "must be a number"))?;
         let init = SparseInit {
             levels: items(&of("levels")).iter().map(level).collect::<Result<_, Failure>>()?,
             range: numbers(&of("range"), "range")?,
@@ -155,7 +155,7 @@ fn three(numbers: &[u32], name: &str) -> Result<[usize; 3], Failure> {
     Ok(numbers.map(|n| n as usize))
 }
 
-/// Returns one voxel of a type given by its name; a number that the type cannot store is rounded to one that it can.
+/// Returns one voxel of a type given by its name; a number that the type cannot store becomes one that it can.
 fn typed(kind: &str, value: f64) -> Result<Voxels, Failure> {
     Ok(match kind {
         "u8" => Voxels::U8(vec![value as u8]),

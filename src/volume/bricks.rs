@@ -9,7 +9,7 @@ use super::voxels::{VoxelNumber, Voxels, each, map_each};
 use super::{Grid, Normalisation, Region};
 use crate::math::Vec3;
 use crate::math::order::sort_ranks;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// The number of voxels along each side of a brick. With 32 there are 1.6 times as many voxels around a surface; with 8,
 /// half of the reads between voxels cross from one brick to the next.
@@ -22,8 +22,22 @@ const PAGE: usize = 8;
 /// within 1/128 of a voxel.
 pub(super) const MAX_SIDE: usize = 1 << 16;
 
-/// The largest number of pages of the table.
-const MAX_PAGES: usize = 1 << 24;
+/// The largest number of pages of the tables of all levels of a volume.
+pub(super) const MAX_PAGES: u64 = 1 << 24;
+
+/// Returns the number of pages of the table of a grid.
+pub(super) fn page_count(dims: [usize; 3]) -> u64 {
+    dims.iter().fold(1, |product, n| product.saturating_mul(n.div_ceil(BRICK * PAGE) as u64))
+}
+
+/// Returns an error if the number of voxels of a box does not fit into memory.
+pub(super) fn check_size(region: Region) -> Result<(), VolumeError> {
+    let count = region.dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
+    if count <= isize::MAX as u64 / size_of::<f64>() as u64 {
+        return Ok(());
+    }
+    Err(VolumeError::TooLarge { bytes: count })
+}
 
 /// No brick, in the table.
 const NONE: u32 = u32::MAX;
@@ -91,15 +105,14 @@ impl BrickGrid {
     /// Creates a grid of `dims` voxels without any brick.
     ///
     /// # Errors
-    /// A dimension of 0 or above [`MAX_SIDE`], or too many voxels for the table.
+    /// A dimension of 0 or above [`MAX_SIDE`]; [`VolumeError::TooLarge`].
     pub(super) fn new(dims: [usize; 3], normalisation: Normalisation) -> Result<Self, VolumeError> {
         let pages = dims.map(|n| n.div_ceil(BRICK * PAGE));
-        let count = pages.iter().try_fold(1usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
-        if dims.iter().any(|n| !(1..=MAX_SIDE).contains(n)) || count > MAX_PAGES {
+        if dims.iter().any(|n| !(1..=MAX_SIDE).contains(n)) {
             let problem = format!("must be from 1 to {MAX_SIDE} voxels along each axis, got {dims:?}");
             return Err(VolumeError::invalid("dims", problem));
         }
-        let table = filled(count, None)?;
+        let table = filled(page_count(dims) as usize, None)?;
         Ok(Self { dims, normalisation, pages, table, ..Self::default() })
     }
 
@@ -111,11 +124,6 @@ impl BrickGrid {
     /// Returns the number of loaded bricks.
     pub fn len(&self) -> usize {
         self.loaded.len()
-    }
-
-    /// Returns whether no brick is loaded.
-    pub fn is_empty(&self) -> bool {
-        self.loaded.is_empty()
     }
 
     /// Returns the memory of the loaded bricks in bytes.
@@ -156,6 +164,7 @@ impl BrickGrid {
     /// length; [`VolumeError::TooLarge`]; nothing has changed then.
     pub(super) fn insert(&mut self, region: Region, data: &Voxels) -> Result<(), VolumeError> {
         self.check_whole_bricks(region)?;
+        check_size(region)?;
         if data.len() != region.len() {
             let problem =
                 format!("must have {} voxels for dims {:?}, got {}", region.len(), region.dims, data.len());
@@ -223,7 +232,7 @@ impl BrickGrid {
     #[inline]
     fn slot(&self, brick: BrickId) -> u32 {
         let (page, entry) = self.location(brick);
-        self.table[page].as_ref().map_or(NONE, |page| page[entry])
+        self.table.get(page).and_then(Option::as_ref).map_or(NONE, |page| page[entry])
     }
 
     /// Returns the loaded brick with a voxel; if it is missing, that is recorded.
@@ -239,15 +248,15 @@ impl BrickGrid {
 
     #[cold]
     fn miss(&self, at: BrickId) {
-        if let Ok(mut missed) = self.missed.lock() {
+        let mut missed = self.missed.lock().unwrap_or_else(PoisonError::into_inner);
+        if missed.last() != Some(&at.rank()) {
             missed.push(at.rank());
         }
     }
 
     /// Returns the ranks of the bricks that were missing when they were read since the last call, in ascending order.
     pub fn take_missed(&self) -> Vec<u64> {
-        let mut missed =
-            self.missed.lock().map_or_else(|_| Vec::new(), |mut missed| std::mem::take(&mut *missed));
+        let mut missed = std::mem::take(&mut *self.missed.lock().unwrap_or_else(PoisonError::into_inner));
         sort_ranks(&mut missed);
         missed.dedup();
         missed

@@ -50,7 +50,8 @@ mod unscaled;
 mod voxels;
 mod write;
 
-pub use bricks::{BRICK, BrickGrid, BrickId};
+pub use bricks::BRICK;
+pub(crate) use bricks::{BrickGrid, BrickId};
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use coverage::coverage;
 pub use enrich::Enrichment;

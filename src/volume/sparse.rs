@@ -1,6 +1,6 @@
 //! Volumes that are larger than memory: the levels of a pyramid, of each of which some bricks are loaded.
 
-use super::bricks::{BRICK, BrickGrid, BrickId};
+use super::bricks::{BRICK, BrickGrid, BrickId, MAX_PAGES, check_size, page_count};
 use super::error::VolumeError;
 use super::voxels::Voxels;
 use super::{Grid, Normalisation, Region, check_corners, invert, span};
@@ -9,6 +9,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The largest number of levels.
 const MAX_LEVELS: usize = 32;
+
+/// The largest number of bricks of a level whose missing ones are listed.
+const MAX_LISTED: u64 = 1 << 24;
 
 /// The largest number of voxels of the coarsest level, which is loaded whole.
 const MAX_COARSEST: usize = 1 << 28;
@@ -58,8 +61,8 @@ impl SparseVolume {
     /// # Errors
     /// [`VolumeError::InvalidArgument`] if there is no level, or more than 32; a level has a dimension of 0 or above
     /// 65536, or more voxels than the next finer one along an axis, or a map that is not finite, not invertible, or not
-    /// parallel to that of the finest level; the coarsest level has more than 2²⁸ voxels; the range is not finite or not
-    /// ascending; `fill` is not one voxel.
+    /// parallel to that of the finest level; the levels have more than 2²⁴ blocks of 128³ voxels; the coarsest level has
+    /// more than 2²⁸ voxels; the range is not finite or not ascending; `fill` is not one voxel.
     pub fn new(init: SparseInit) -> Result<Self, VolumeError> {
         check_levels(&init.levels)?;
         let [low, high] = init.range;
@@ -70,6 +73,11 @@ impl SparseVolume {
         }
         if init.fill.len() != 1 {
             return Err(VolumeError::invalid("fill", format!("must be one voxel, got {}", init.fill.len())));
+        }
+        let pages = init.levels.iter().map(|level| page_count(level.dims));
+        if pages.fold(0u64, u64::saturating_add) > MAX_PAGES {
+            let problem = format!("must have at most {MAX_PAGES} blocks of 128³ voxels in all");
+            return Err(VolumeError::invalid("levels", problem));
         }
         let normalisation = Normalisation::new([1.0, 0.0], init.range);
         let bricks = init.levels.iter().map(|level| BrickGrid::new(level.dims, normalisation));
@@ -118,6 +126,7 @@ impl SparseVolume {
     pub fn insert_fill(&self, at: BrickBox) -> Result<(), VolumeError> {
         self.check_level(at.level)?;
         at.region.check("dims", self.levels[at.level].dims)?;
+        check_size(at.region)?;
         let data = self.fill.gathered(at.region.len(), std::iter::repeat_n(0..1, at.region.len()))?;
         self.insert(at, &data)
     }
@@ -130,19 +139,18 @@ impl SparseVolume {
     /// Returns the bricks of a level that are not loaded, merged along x.
     ///
     /// # Errors
-    /// [`VolumeError::InvalidArgument`] if there is no such level; [`VolumeError::TooLarge`].
+    /// [`VolumeError::InvalidArgument`] if there is no such level; [`VolumeError::TooLarge`] if it has more than 2²⁴
+    /// bricks.
     pub fn missing(&self, level: usize) -> Result<Vec<BrickBox>, VolumeError> {
         self.check_level(level)?;
         let bricks = self.bricks();
-        let counts = bricks[level].dims().map(|n| n.div_ceil(BRICK));
-        let mut missing = Vec::new();
-        for z in 0..counts[2] {
-            for y in 0..counts[1] {
-                let row = (0..counts[0]).map(|x| BrickId([x, y, z])).filter(|&at| !bricks[level].has(at));
-                missing.extend(row.map(BrickId::rank));
-            }
+        let dims = bricks[level].dims();
+        let count = dims.iter().fold(1u64, |product, n| product.saturating_mul(n.div_ceil(BRICK) as u64));
+        if count > MAX_LISTED {
+            return Err(VolumeError::TooLarge { bytes: count.saturating_mul(size_of::<BrickBox>() as u64) });
         }
-        Ok(merged(&bricks[level], level, &missing))
+        let missing = all_bricks(dims).filter(|&at| !bricks[level].has(at)).map(BrickId::rank);
+        Ok(merged(&bricks[level], level, &missing.collect::<Vec<u64>>()))
     }
 
     /// Returns a level that is loaded whole, scaled to [0, 1]; `None` if a brick is missing.
@@ -151,19 +159,16 @@ impl SparseVolume {
     /// [`VolumeError::TooLarge`].
     pub(crate) fn whole(&self, level: usize) -> Result<Option<Grid>, VolumeError> {
         let bricks = self.bricks();
+        if !all_bricks(bricks[level].dims()).all(|at| bricks[level].has(at)) {
+            return Ok(None);
+        }
         let grid = bricks[level].part(Region { min: [0; 3], dims: self.levels[level].dims })?;
-        bricks[level].take_missed();
         Ok(grid)
     }
 
-    /// Exchanges the loaded bricks of the levels with `others`. While a model computes it has the bricks, and reads them
-    /// without locking; the volume has none then.
-    pub(crate) fn exchange<'a>(&self, others: impl Iterator<Item = (usize, &'a mut BrickGrid)>) {
-        let mut bricks = self.bricks();
-        others.for_each(|(level, other)| std::mem::swap(&mut bricks[level], other));
-    }
-
-    fn bricks(&self) -> MutexGuard<'_, Vec<BrickGrid>> {
+    /// Locks the bricks of all levels. A model exchanges them with its own while it computes, and reads them without
+    /// locking; the volume has none then, so others have to wait.
+    pub(crate) fn bricks(&self) -> MutexGuard<'_, Vec<BrickGrid>> {
         // No code that holds the lock leaves bricks in part.
         self.bricks.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -175,6 +180,13 @@ impl SparseVolume {
         let problem = format!("must be below {}, got {level}", self.levels.len());
         Err(VolumeError::invalid("level", problem))
     }
+}
+
+/// Returns all bricks of a level of `dims` voxels, in the order of their ranks.
+fn all_bricks(dims: [usize; 3]) -> impl Iterator<Item = BrickId> {
+    let [nx, ny, nz] = dims.map(|n| n.div_ceil(BRICK));
+    let rows = (0..nz).flat_map(move |z| (0..ny).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| (0..nx).map(move |x| BrickId([x, y, z])))
 }
 
 /// Returns the boxes of bricks given by ascending ranks, those next to each other along x merged.

@@ -91,7 +91,11 @@ test('a folder is opened', async () => {
   await expectExtracted(() => app.page.getByRole('button', { name: 'Open a folder…' }).click());
 });
 
-test('measurements that need the whole volume say that they do not', async () => {
+test('what needs the whole volume is refused with a reason', async () => {
+  await openLab();
+  await expectExtracted(async () =>
+    drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
+  );
   await app.page.getByRole('button', { name: 'Measure coverage' }).click();
   await expect.poll(() => app.page.textContent('.coverage')).toMatch(/larger than memory/);
   expect(await app.page.locator('[data-transport=undo]').isDisabled()).toBe(true);
@@ -109,4 +113,32 @@ test('the page names the servers that it may reach, and its policy has the same'
   await app.page.getByLabel('Address').fill('https://example.org/image.zarr');
   await app.page.getByLabel('Address').press('Enter');
   expect(await app.page.textContent('.large [role=alert]')).toMatch(/^example\.org is not among/);
+});
+
+test('an image that does not answer gives way to the next one at once', async () => {
+  await openLab();
+  await app.page.context().route('**/images/silent.zarr/**', () => undefined);
+  const address = app.page.getByLabel('Address');
+  await address.fill(`${app.address}images/silent.zarr`);
+  await address.press('Enter');
+  await reach(app.page, 'loading');
+  await app.page.getByLabel('Example').selectOption('linked-rings');
+  await reach(app.page, 'done');
+  expect(await app.page.textContent('.facts')).not.toContain('silent');
+  expect(await app.page.locator('.banner').isVisible()).toBe(false);
+});
+
+test('single steps wait for the data that they need', async () => {
+  await openLab();
+  await expectExtracted(async () =>
+    drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
+  );
+  await app.page.getByRole('button', { name: 'Reset', exact: true }).click();
+  await reach(app.page, 'paused');
+  const step = app.page.getByRole('button', { name: 'Step', exact: true });
+  for (const iteration of [1, 2, 3]) {
+    await step.click();
+    await expect.poll(() => app.page.textContent('.iteration')).toContain(String(iteration));
+    await reach(app.page, 'paused');
+  }
 });

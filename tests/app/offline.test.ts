@@ -1,4 +1,4 @@
-import { cp, mkdtemp, readFile, rm } from 'node:fs/promises';
+import { cp, mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
@@ -53,6 +53,16 @@ test('data opened later are cached, too', async () => {
   await page.goto(`${server.address}#reconstruct?example=angel`);
   await reach(page, 'running', 'done');
   await expect.poll(kept).toContain('data/angel.ply');
+});
+
+test('what the page reads of images beside it is not cached', async () => {
+  await mkdir(join(folder, 'images'));
+  await writeFile(join(folder, 'images/zarr.json'), '{}');
+  const read = (name: string) => page.evaluate(async (url) => (await fetch(url)).text(), server.address + name);
+  expect(await read('images/zarr.json')).toBe('{}');
+  await read('data/README.md');
+  await expect.poll(kept).toContain('data/README.md');
+  expect(await kept()).not.toContain('images/zarr.json');
 });
 
 test('without a server the examples run as before, at all of their addresses', async () => {

@@ -2,7 +2,7 @@
 import { afterEach, describe, expect, test } from 'vitest';
 import { openZarr, type ZarrVolume } from '../../pkg/zarr/index.js';
 import { failure, rejection } from './helpers.js';
-import { changed, DIMS, type ImageServer, serveImage, storeOf, type TestStore, zipOf } from './zarr-stores.js';
+import { changed, DIMS, filesOf, type ImageServer, serveImage, storeOf, type TestStore, zipOf } from './zarr-stores.js';
 
 type Triple = [number, number, number];
 
@@ -220,6 +220,14 @@ describe('metadata that lies', () => {
     ['no scale', 'datasets.1.coordinateTransformations', undefined, /datasets\[1\].*missing/],
     ['rotation', 'datasets.0.coordinateTransformations.0.type', 'rotation', /must be "scale", .*got "rotation"/],
     ['no datasets', 'datasets', [], /datasets: must be a list/],
+    [
+      'many datasets',
+      'datasets',
+      Array.from({ length: 99 }, () => ({})),
+      /datasets: must be at most 32 levels, got 99/,
+    ],
+    ['inherited name of an axis', 'axes.0.name', 'constructor', /axes\[0\]: must be x, y or z .*got "constructor"/],
+    ['inherited name of a unit', 'axes.1.unit', 'toString', /axes\[1\].unit: .*got "toString"/],
     ['no path', 'datasets.0.path', undefined, /datasets\[0\].path: must be a string/],
     ['wrong path', 'datasets.2.path', 's7', /array "s7": Not found/],
     ['path of a group', 'datasets.2.path', '.', /array "\."/],
@@ -661,5 +669,34 @@ describe('a server', () => {
     expect(await region).toBe('enough');
     await expect.poll(server.open).toBe(0);
     expect(server.log.length).toBe(before + 8);
+  });
+});
+
+describe('an image does not lead elsewhere:', () => {
+  test.each(['./http://127.0.0.1:9/x', '%2F%2F127.0.0.1:9/x', '../other'])('path %s', async (path) => {
+    const server = await serveImage('v3-zstd-zyx');
+    const json = JSON.parse(new TextDecoder().decode((await filesOf('v3-zstd-zyx')).get('/zarr.json')));
+    json.attributes.ome.multiscales[0].datasets[1].path = path;
+    server.answer = ({ url }, response) => {
+      if (url !== '/image/zarr.json') return false;
+      response.end(JSON.stringify(json));
+      return true;
+    };
+    const error = await rejection(openZarr(server.url));
+    expect(error.message).toMatch(/outside of the image at|Not found/);
+    expect(server.log.filter((line) => !line.includes('/image/'))).toEqual([]);
+    await server.close();
+  });
+
+  test('a redirect', async () => {
+    const [server, other] = [await serveImage('v3-zstd-zyx'), await serveImage('v3-zstd-zyx')];
+    server.answer = ({ url }, response) => {
+      response.writeHead(302, { Location: other.url + url?.slice('/image'.length) }).end();
+      return true;
+    };
+    const error = await rejection(openZarr(server.url));
+    expect([error.code, error.message]).toEqual(['unavailable', expect.stringContaining('redirected to')]);
+    await server.close();
+    await other.close();
   });
 });

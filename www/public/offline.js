@@ -8,7 +8,9 @@ const CACHE = 'vesicle';
 const HASHED = /\/assets\/[^/]+-[\w-]{8}\.\w+$/;
 
 const scope = self.registration.scope;
-const isOwn = (url) => url.startsWith(scope);
+// Images that are larger than memory must not fill the storage chunk by chunk: only the page's own files are kept.
+const KEPT = /^(?:(?:assets|data|dicom|docs|embed)\/.*|[^/]*)$/;
+const isOwn = (url) => url.startsWith(scope) && KEPT.test(url.slice(scope.length).replace(/[?#].*$/, ''));
 const withoutHash = (url) => url.replace(/#.*$/, '');
 
 /** Returns the cached response, or undefined if there is none or the cache is not available. */

@@ -177,6 +177,8 @@ export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
   load: { body: { name: string; source: VolumeSource | LargeSource; setup: Setup }; reply: Loaded };
+  /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
+  cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };

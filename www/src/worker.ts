@@ -80,6 +80,10 @@ class Session {
   #levels = 0;
   #measuredAt = 0;
   #receivedAt = 0;
+  /** What has been read of a volume larger than memory. */
+  #data: Omit<DataEvent, 'event'> | undefined;
+  /** Aborts the opening of a volume larger than memory. */
+  #opening: AbortController | undefined;
   #run: Task | undefined;
   #comparison: Task | undefined;
   #coverageRun: Task | undefined;
@@ -90,6 +94,10 @@ class Session {
       return { version: version(), specs: paramSpecs('deformable') };
     },
     load: ({ name, source, setup }) => this.#load(name, source, setup),
+    cancelLoad: () => {
+      this.#opening?.abort();
+      return undefined;
+    },
     rebuild: (setup) => this.#rebuild(setup),
     play: () => this.#play(),
     pause: () => this.#pause(),
@@ -131,11 +139,14 @@ class Session {
   }
 
   async #loadLarge(name: string, source: LargeSource, setup: Setup): Promise<Loaded> {
+    const opening = new AbortController();
+    this.#opening = opening;
     const { LargeVolume } = await import('./worker/large');
-    const large = await LargeVolume.open(source);
+    const large = await LargeVolume.open(source, opening.signal);
     try {
       const view = large.view(name);
-      const ready = this.#replaceModel(large.model(setup), 'measured');
+      const levels = Math.min(setup.levels, large.coarserLevels);
+      const ready = this.#replaceModel(large.model({ ...setup, levels }), 'measured');
       this.#keep({ large });
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
@@ -150,6 +161,7 @@ class Session {
     this.#large?.free();
     this.#volume = volume;
     this.#large = large;
+    this.#data = undefined;
   }
 
   #build(setup: Setup): DeformableModel {
@@ -188,13 +200,19 @@ class Session {
   async #play(): Promise<undefined> {
     await this.#cancelCompare();
     const model = this.#current();
-    if (this.#run) return;
-    const abort = new AbortController();
-    this.#run = { abort, ended: this.#runToEnd(model, abort.signal) };
-    send({ event: 'state', state: 'running' });
+    if (!this.#run) this.#begin(model);
   }
 
-  async #runToEnd(model: DeformableModel, signal: AbortSignal, maxIterations = Number.MAX_SAFE_INTEGER): Promise<void> {
+  /** Starts a run, unless one is in progress. */
+  #begin(model: DeformableModel, maxIterations = Number.MAX_SAFE_INTEGER): Task {
+    const abort = new AbortController();
+    const run = { abort, ended: this.#runToEnd(model, abort.signal, maxIterations) };
+    this.#run = run;
+    send({ event: 'state', state: 'running' });
+    return run;
+  }
+
+  async #runToEnd(model: DeformableModel, signal: AbortSignal, maxIterations: number): Promise<void> {
     try {
       await model.run({
         signal,
@@ -205,11 +223,14 @@ class Session {
     } catch (error) {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
+    // Nothing is read any more, whatever was to come.
+    if (this.#data) send({ event: 'data', ...this.#data, waiting: 0 });
     this.#run = undefined;
     this.#reportStopped();
   }
 
   #received(data: Omit<DataEvent, 'event'>): void {
+    this.#data = data;
     const now = performance.now();
     if (data.waiting > 0 && now - this.#receivedAt < TELL_EVERY) return;
     this.#receivedAt = now;
@@ -240,7 +261,8 @@ class Session {
 
   async #pause(): Promise<undefined> {
     await this.#cancelCompare();
-    await stop(this.#run);
+    // Another may begin before this goes on.
+    while (this.#run) await stop(this.#run);
   }
 
   async #step(count: number): Promise<undefined> {
@@ -248,9 +270,7 @@ class Session {
     const model = this.#current();
     if (this.#large) {
       // A step may have to wait for data.
-      const abort = new AbortController();
-      this.#run = { abort, ended: this.#runToEnd(model, abort.signal, count) };
-      await this.#run.ended;
+      await this.#begin(model, count).ended;
       return;
     }
     for (let i = 0; i < count && !this.#done; i++) this.#stepped(model.step(1));
@@ -280,7 +300,6 @@ class Session {
   }
 
   #pyramid(levels: number): LevelView[] {
-    if (this.#large) return [];
     const views = levelsOf(this.#image(), levels, this.#window);
     return withTransfer(
       views,

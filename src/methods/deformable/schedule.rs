@@ -281,11 +281,15 @@ impl DeformableModel {
     }
 
     fn refine(&mut self) -> Result<(), MethodError> {
-        for _ in 0..self.refinements() {
-            let most = self.resolver.max_vertices();
-            if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
-                return Err(MethodError::TooManyVertices { most });
-            }
+        let (times, most) = (self.refinements(), self.resolver.max_vertices());
+        // Each adds a vertex to every triangle, and makes three of it.
+        let new = (3u64.saturating_pow(times) - 1) / 2;
+        let vertices = (self.mesh.vertex_count() as u64)
+            .saturating_add(new.saturating_mul(self.mesh.triangle_count() as u64));
+        if times > 0 && vertices > most as u64 {
+            return Err(MethodError::TooManyVertices { most });
+        }
+        for _ in 0..times {
             // If the mesh cannot be refined, edges that are too long on the finer level are split.
             let sampling = Sampling::new(self.model_delta());
             self.resolver.refine(&mut self.mesh, sampling)?;

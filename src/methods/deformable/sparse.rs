@@ -122,17 +122,24 @@ impl DeformableModel {
 
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
-        self.exchange_bricks();
+        let Some(SparseLevels { volume, finest }) = self.pyramid.sparse.clone() else {
+            return self.iterate();
+        };
+        // Locked all the time, so that other models of the volume wait.
+        let mut bricks = volume.bricks();
+        self.exchange_bricks(&mut bricks[finest..]);
         let result = self.try_to_iterate();
-        self.exchange_bricks();
+        self.exchange_bricks(&mut bricks[finest..]);
         result
     }
 
     /// Takes the bricks of all levels from the volume, or gives them back.
-    fn exchange_bricks(&mut self) {
-        let Some(SparseLevels { volume, finest }) = &self.pyramid.sparse else { return };
-        let levels = self.pyramid.levels.iter_mut().enumerate();
-        volume.exchange(levels.filter_map(|(k, level)| Some((finest + k, level.bricks_mut()?))));
+    fn exchange_bricks(&mut self, bricks: &mut [BrickGrid]) {
+        for (level, bricks) in self.pyramid.levels.iter_mut().zip(bricks) {
+            if let Some(own) = level.bricks_mut() {
+                std::mem::swap(own, bricks);
+            }
+        }
     }
 
     fn try_to_iterate(&mut self) -> Result<StepReport, MethodError> {

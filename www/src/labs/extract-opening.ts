@@ -106,7 +106,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
     const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
     const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const body = { name: source.name, source: volume, setup };
-    return { ...(await this.#client.request('load', body, transferable(volume))), choice, setup };
+    const loaded = await this.#client.request('load', body, transferable(volume));
+    const { large } = loaded.volume;
+    const levels = large ? Math.min(choice.levels, large.levels.length - 1) : choice.levels;
+    return { ...loaded, choice: { ...choice, levels }, setup };
   }
 
   protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
@@ -136,6 +139,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
     this.#ui.status.say(
       newest ? text('extract.restartedFrom', { iteration: count(newest.saved.iteration) }) : text('extract.restarted'),
     );
+  }
+
+  protected override superseded(): void {
+    this.#client.request('cancelLoad', undefined).catch(() => undefined);
   }
 
   protected override save(): void {

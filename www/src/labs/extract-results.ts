@@ -61,10 +61,11 @@ export class ExtractResults {
 
   /**
    * Requests the `levels` coarser levels of the image pyramid from the worker, and displays them with the volume
-   * itself.
+   * itself; of a volume larger than memory none, since only parts of its levels are read.
    */
-  async showPyramid({ dims }: VolumeView, levels: number): Promise<void> {
+  async showPyramid({ dims, large }: VolumeView, levels: number): Promise<void> {
     const asked = ++this.#pyramids;
+    if (large) return this.#ui.pyramid.clear();
     try {
       const coarser = await this.#client.request('pyramid', { levels });
       if (asked === this.#pyramids) this.#ui.pyramid.setLevels(dims, coarser, this.#level);

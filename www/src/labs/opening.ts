@@ -122,6 +122,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return undefined;
   }
 
+  /** Called when a request to open something is made, to end the one before if that takes long; does nothing by default. */
+  protected superseded(): void {}
+
   /** Called when the engine has loaded, with the parameters of the method; does nothing by default. */
   protected onEngineReady(_specs: ParamSpec[]): void {}
 
@@ -233,6 +236,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   protected async open(source: Source<Example, Linked, Data>, reopening = false): Promise<void> {
     const request = ++this.#requestCount;
+    this.superseded();
     if (this.states.canChange) this.save();
     const changesDone = this.states.open(
       reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),

@@ -4,8 +4,8 @@ import { h, uniqueId } from './dom';
 import { bytes } from './format';
 
 /**
- * Servers that the page's content-security policy (`index.html`) allows to read images from, besides the page's own. A
- * star stands for one part of a name or several.
+ * Servers that images may be read from, besides the page's own; the page's content-security policy (`index.html`) has the
+ * same. A star stands for one part of a name or several.
  */
 export const SERVERS = [
   'https://uk1s3.embassy.ebi.ac.uk',
@@ -89,7 +89,7 @@ export class LargeSourceControls {
     const url = new URL(this.#address.value, location.href);
     const isAllowed = mayReach(url);
     this.#error.textContent = isAllowed ? '' : text('extractPanels.largeRefused', { host: url.host });
-    this.#address.toggleAttribute('aria-invalid', !isAllowed);
+    this.#address.setAttribute('aria-invalid', String(!isAllowed));
     const name = url.pathname.split('/').filter(Boolean).at(-1) ?? url.host;
     if (isAllowed) this.#onOpen(name, { zarr: url.href });
   }
@@ -101,8 +101,10 @@ export class LargeSourceControls {
     const pick = () =>
       showDirectoryPicker.call(window).then(
         (folder) => this.#onOpen(folder.name, { zarr: folder }),
-        // The user has chosen none.
-        () => undefined,
+        (error: DOMException) => {
+          // Otherwise the user has chosen none.
+          if (error.name !== 'AbortError') this.#error.textContent = error.message;
+        },
       );
     return [h('button', { type: 'button', class: 'wide', onclick: pick }, text('extractPanels.largeFolder'))];
   }

@@ -60,6 +60,15 @@ export class PyramidPanel {
     this.redraw();
   }
 
+  /** Shows no levels, and the volume itself in the slices. */
+  clear(): void {
+    this.#levels = [];
+    this.#dims = [];
+    this.#buttons = [];
+    this.#list.replaceChildren();
+    this.#choose(0);
+  }
+
   /** Marks the level that the model is fitted to; shows it in the slices if the user wants them to follow the model. */
   setInUse(level: number): void {
     if (level === this.#inUse) return;

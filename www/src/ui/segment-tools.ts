@@ -33,7 +33,7 @@ const TOOLS: { tool: Tool; key: string; label: string; help: string }[] = [
   { tool: 'fill', key: 'f', label: text('segment.fill'), help: text('segment.fillHelp') },
 ];
 const MOST_RADIUS = 40;
-const MOST_REACH = 500;
+const MOST_REACH = 128;
 
 /** Whether the tool in use changes only voxels in the range of intensities. */
 export function usesRange({ tool, extent, inRange }: ToolSettings): boolean {

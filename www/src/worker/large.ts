@@ -24,17 +24,24 @@ export class LargeVolume {
   }
 
   /** Opens an image, and reads its coarsest level. */
-  static async open({ zarr }: LargeSource): Promise<LargeVolume> {
+  static async open({ zarr }: LargeSource, signal: AbortSignal): Promise<LargeVolume> {
     await init();
-    const image = await openZarr(zarr);
+    const image = await openZarr(zarr, { signal });
     try {
       const last = image.levels.length - 1;
       const max = image.levels[last]?.dims ?? [0, 0, 0];
-      return new LargeVolume(image, await image.region(last, { min: [0, 0, 0], max }));
+      // Opening has not read a coarsest level that is too large.
+      if (!image.range) throw new Refusal('too-large', text('extract.largeCoarsest', { dims: max.join(' × ') }));
+      return new LargeVolume(image, await image.region(last, { min: [0, 0, 0], max }, { signal }));
     } catch (error) {
       image.free();
       throw error;
     }
+  }
+
+  /** Number of levels coarser than the finest. */
+  get coarserLevels(): number {
+    return this.#image.levels.length - 1;
   }
 
   /** Describes the image, with the voxels of its coarsest level. */
@@ -45,7 +52,7 @@ export class LargeVolume {
 
   /** Builds a model that starts on the coarsest level, and ends as many levels below as the set-up says. */
   model(setup: Setup): DeformableModel {
-    const coarser = this.#image.levels.length - 1;
+    const coarser = this.coarserLevels;
     if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
     const { levels, ...options } = modelOptions(this.#coarsest, setup);
     const finest = coarser - levels;
