@@ -79,7 +79,7 @@ export async function zipStore(zip: Blob): Promise<AsyncReadable> {
 }
 
 function withoutFolder<T>(all: Record<string, T>): Record<string, T> {
-  // What macOS adds beside the folder.
+  // Without the files that macOS adds beside the folder.
   const entries = Object.fromEntries(Object.entries(all).filter(([name]) => !name.startsWith('__MACOSX/')));
   const names = Object.keys(entries);
   const folder = `${names[0]?.split('/')[0]}/`;

@@ -23,11 +23,20 @@ const PAGE: usize = 8;
 pub(super) const MAX_SIDE: usize = 1 << 16;
 
 /// The largest number of pages of the tables of all levels of a volume.
-pub(super) const MAX_PAGES: u64 = 1 << 24;
+pub(super) const MAX_PAGES: u64 = 25_000_000;
 
 /// Returns the number of pages of the table of a grid.
 pub(super) fn page_count(dims: [usize; 3]) -> u64 {
     dims.iter().fold(1, |product, n| product.saturating_mul(n.div_ceil(BRICK * PAGE) as u64))
+}
+
+/// Returns an error unless all dimensions of a grid are from 1 to [`MAX_SIDE`].
+pub(super) fn check_sides(dims: [usize; 3]) -> Result<(), VolumeError> {
+    if dims.iter().all(|n| (1..=MAX_SIDE).contains(n)) {
+        return Ok(());
+    }
+    let problem = format!("must be from 1 to {MAX_SIDE} voxels along each axis, got {dims:?}");
+    Err(VolumeError::invalid("dims", problem))
 }
 
 /// Returns an error if the number of voxels of a box does not fit into memory.
@@ -108,10 +117,7 @@ impl BrickGrid {
     /// A dimension of 0 or above [`MAX_SIDE`]; [`VolumeError::TooLarge`].
     pub(super) fn new(dims: [usize; 3], normalisation: Normalisation) -> Result<Self, VolumeError> {
         let pages = dims.map(|n| n.div_ceil(BRICK * PAGE));
-        if dims.iter().any(|n| !(1..=MAX_SIDE).contains(n)) {
-            let problem = format!("must be from 1 to {MAX_SIDE} voxels along each axis, got {dims:?}");
-            return Err(VolumeError::invalid("dims", problem));
-        }
+        check_sides(dims)?;
         let table = filled(page_count(dims) as usize, None)?;
         Ok(Self { dims, normalisation, pages, table, ..Self::default() })
     }

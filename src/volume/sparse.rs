@@ -1,6 +1,6 @@
 //! Volumes that are larger than memory: the levels of a pyramid, of each of which some bricks are loaded.
 
-use super::bricks::{BRICK, BrickGrid, BrickId, MAX_PAGES, check_size, page_count};
+use super::bricks::{BRICK, BrickGrid, BrickId, MAX_PAGES, check_sides, check_size, page_count};
 use super::error::VolumeError;
 use super::voxels::Voxels;
 use super::{Grid, Normalisation, Region, check_corners, invert, span};
@@ -61,7 +61,7 @@ impl SparseVolume {
     /// # Errors
     /// [`VolumeError::InvalidArgument`] if there is no level, or more than 32; a level has a dimension of 0 or above
     /// 65536, or more voxels than the next finer one along an axis, or a map that is not finite, not invertible, or not
-    /// parallel to that of the finest level; the levels have more than 2²⁴ blocks of 128³ voxels; the coarsest level has
+    /// parallel to that of the finest level; the levels have more than 25 million blocks of 128³ voxels; the coarsest level has
     /// more than 2²⁸ voxels; the range is not finite or not ascending; `fill` is not one voxel.
     pub fn new(init: SparseInit) -> Result<Self, VolumeError> {
         check_levels(&init.levels)?;
@@ -74,6 +74,7 @@ impl SparseVolume {
         if init.fill.len() != 1 {
             return Err(VolumeError::invalid("fill", format!("must be one voxel, got {}", init.fill.len())));
         }
+        init.levels.iter().try_for_each(|level| check_sides(level.dims))?;
         let pages = init.levels.iter().map(|level| page_count(level.dims));
         if pages.fold(0u64, u64::saturating_add) > MAX_PAGES {
             let problem = format!("must have at most {MAX_PAGES} blocks of 128³ voxels in all");

@@ -7,14 +7,14 @@ use vesicle::volume::{BrickBox, SparseInit, SparseLevel, SparseVolume, Voxels};
 pub struct Store {
     pub levels: Vec<SparseLevel>,
     /// The distance of a point outside the object, negative inside, in voxels of the finest level.
-    pub distance: Box<dyn Fn(Vec3) -> f32>,
+    pub distance: Box<dyn Fn(Vec3) -> f32 + Send + Sync>,
 }
 
 /// The intensity of the object; that of the background is 0, and its boundary is at half of it.
 pub const OBJECT: f32 = 1000.0;
 
 impl Store {
-    pub fn new(side: usize, count: u32, distance: impl Fn(Vec3) -> f32 + 'static) -> Self {
+    pub fn new(side: usize, count: u32, distance: impl Fn(Vec3) -> f32 + Send + Sync + 'static) -> Self {
         let level = |k: u32| {
             let voxel = f64::from(1 << k);
             let affine = DAffine3::from_scale(DVec3::splat(voxel));

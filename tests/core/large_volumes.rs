@@ -272,6 +272,9 @@ fn bad_descriptions_and_boxes_are_refused() {
     assert_eq!(make(vec![level(1000, 1.0)], [0.0, 1.0], one()), "levels");
     assert_eq!(make(vec![level(1 << 17, 1.0), level(9, 9.0)], [0.0, 1.0], one()), "dims");
     assert_eq!(make(vec![level(9, 1.0), level(0, 9.0)], [0.0, 1.0], one()), "dims");
+    // Each alone is not too large.
+    let large = vec![level(1 << 15, 1.0), level(1 << 15, 1.0), level(9, 1.0)];
+    assert_eq!(make(large, [0.0, 1.0], one()), "levels");
     for scale in [f64::NAN, 0.0, f64::INFINITY, -2.0] {
         assert_eq!(make(vec![level(9, 1.0), level(4, scale)], [0.0, 1.0], one()), "affine", "{scale}");
     }
@@ -308,4 +311,43 @@ fn bad_descriptions_and_boxes_are_refused() {
         volume.missing(0).unwrap().iter().map(|at| at.region.dims.iter().product::<usize>()).sum::<usize>(),
         40 * 40 * 40 - 8 * 32 * 24
     );
+}
+
+/// On wasm32 the number of voxels of such a box, 2⁴⁵, does not fit into a `usize`.
+#[test]
+fn a_box_larger_than_memory_is_refused() {
+    let level = |n: usize, scale: f64| SparseLevel {
+        dims: [n; 3],
+        affine: DAffine3::from_scale(DVec3::splat(scale)),
+    };
+    let levels = vec![level(1 << 15, 1.0), level(1 << 7, 256.0)];
+    let volume =
+        SparseVolume::new(SparseInit { levels, range: [0.0, 1.0], fill: Voxels::U8(vec![0]) }).unwrap();
+    let all = BrickBox { level: 0, region: Region { min: [0; 3], dims: [1 << 15; 3] } };
+    assert!(volume.insert(all, &Voxels::U8(vec![])).is_err());
+    assert!(matches!(volume.missing(0), Err(VolumeError::TooLarge { .. })));
+    assert_eq!(volume.loaded(), [[0, 0], [0, 0]]);
+}
+
+/// A second thread that steps a model of the same volume waits, and finds the bricks where they belong.
+#[cfg(not(target_arch = "wasm32"))]
+#[test]
+fn models_of_a_volume_may_step_in_two_threads() {
+    let store = store();
+    let volume = store.volume();
+    let options = || SparseOptions { finest: 1, ..SparseOptions::default() };
+    let own = store.volume();
+    let (_, alone) = run(&own, options(), |needs| store.load(&own, needs));
+    let expected = fingerprint(&alone.surface().positions);
+    std::thread::scope(|scope| {
+        let threads = [0, 1].map(|_| {
+            scope.spawn(|| {
+                let (_, model) = run(&volume, options(), |needs| store.load(&volume, needs));
+                fingerprint(&model.surface().positions)
+            })
+        });
+        for thread in threads {
+            assert_eq!(thread.join().unwrap(), expected);
+        }
+    });
 }

@@ -80,7 +80,7 @@ class Session {
   #levels = 0;
   #measuredAt = 0;
   #receivedAt = 0;
-  /** What has been read of a volume larger than memory. */
+  /** The last report on how much has been read of a volume larger than memory. */
   #data: Omit<DataEvent, 'event'> | undefined;
   /** Aborts the opening of a volume larger than memory. */
   #opening: AbortController | undefined;
