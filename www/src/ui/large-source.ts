@@ -89,7 +89,8 @@ export class LargeSourceControls {
     const url = new URL(this.#address.value, location.href);
     const isAllowed = mayReach(url);
     this.#error.textContent = isAllowed ? '' : text('extractPanels.largeRefused', { host: url.host });
-    this.#address.setAttribute('aria-invalid', String(!isAllowed));
+    if (isAllowed) this.#address.removeAttribute('aria-invalid');
+    else this.#address.setAttribute('aria-invalid', 'true');
     const name = url.pathname.split('/').filter(Boolean).at(-1) ?? url.host;
     if (isAllowed) this.#onOpen(name, { zarr: url.href });
   }
