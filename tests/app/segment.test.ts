@@ -629,7 +629,7 @@ describe('DICOM segmentations', () => {
     expect(hushed()).toEqual([]);
   });
 
-  test('of another grid, beyond the volume, or of a class that cannot be read is refused, and nothing changes', async () => {
+  test('is refused, and changes nothing, if it has another grid, extends beyond the volume, or is of a class that cannot be read', async () => {
     await openTogether('binary.dcm');
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('binary.dcm'));
     await reach(app.page, 'done');

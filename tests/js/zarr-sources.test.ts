@@ -114,7 +114,7 @@ describe('an image is read from', () => {
     expect(other.message).toContain('this is an array; must be the group of an image');
   });
 
-  test('a ZIP that is none, or truncated', async () => {
+  test('a file that is not a ZIP, or truncated', async () => {
     for (const zip of [new Blob([]), new Blob(['hello']), zipOf('v3-zstd-zyx').slice(0, 9000)]) {
       const error = await rejection(openZarr(zip));
       expect([error.code, error.message]).toEqual(['bad-file', expect.stringMatching(/^OME-Zarr: ZIP: /)]);

@@ -44,6 +44,9 @@ export interface LargeSource {
   zarr: string | Blob | FileSystemDirectoryHandle;
 }
 
+/** Any source that the Extract lab opens. */
+export type ImageSource = VolumeSource | LargeSource;
+
 /** All that the worker builds a deformable model from, besides the volume. */
 export interface Setup {
   start: StartShape;
@@ -176,7 +179,7 @@ export interface Loaded extends Ready {
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: VolumeSource | LargeSource; setup: Setup }; reply: Loaded };
+  load: { body: { name: string; source: ImageSource; setup: Setup }; reply: Loaded };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
   cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */

@@ -5,6 +5,7 @@ import type {
   Attractor,
   Coverage,
   DataEvent,
+  ImageSource,
   LargeSource,
   LevelView,
   Loaded,
@@ -21,7 +22,6 @@ import type {
   SurfaceBuffers,
   ToWorker,
   VertexQuantity,
-  VolumeSource,
   WorkerEvent,
 } from './protocol';
 import { text } from './texts';
@@ -121,7 +121,7 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load(name: string, source: VolumeSource | LargeSource, setup: Setup): Promise<Loaded> {
+  async #load(name: string, source: ImageSource, setup: Setup): Promise<Loaded> {
     await this.#pause();
     if ('zarr' in source) return this.#loadLarge(name, source, setup);
     const volume = await volumeFrom(source);

@@ -37,6 +37,7 @@ impl Awake {
     /// `within`, vertices outside that box sleep in any case.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool, within: Option<Bounds>) {
         let still = mesh.scalar(still);
+        // A constant without the feature, so that smaller modules have no code for boxes.
         let within = if cfg!(feature = "sparse") { within } else { None };
         self.moving.clear();
         let is_awake = |v: &VertexId| {

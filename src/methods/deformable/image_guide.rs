@@ -49,6 +49,7 @@ impl<'a> ImageGuide<'a> {
 
     /// Returns whether the image is followed at all of some vertices.
     fn follows(&self, mesh: &Mesh, vertices: &[VertexId]) -> bool {
+        // The first is a constant, by which modules without the feature have no code for boxes.
         !cfg!(feature = "sparse")
             || self.within.is_none_or(|bounds| vertices.iter().all(|&v| bounds.contains(mesh.position(v))))
     }

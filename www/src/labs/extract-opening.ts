@@ -1,7 +1,7 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
-import type { LargeSource, Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
+import type { ImageSource, LargeSource, Loaded, ParamSpec, ParamValues, Setup } from '../protocol';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -15,7 +15,7 @@ import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
 import { Opening, type Source } from './opening';
 
-export type ExtractSource = Source<Example, Linked, VolumeSource | LargeSource>;
+export type ExtractSource = Source<Example, Linked, ImageSource>;
 
 /** A volume opened in the Extract lab, and the settings of its model, which has done no step yet. */
 interface OpenedVolume extends Loaded {
@@ -24,7 +24,7 @@ interface OpenedVolume extends Loaded {
 }
 
 /** Opens volumes in the Extract lab, and builds models of them. */
-export class ExtractOpening extends Opening<Example, Linked, VolumeSource | LargeSource, OpenedVolume> {
+export class ExtractOpening extends Opening<Example, Linked, ImageSource, OpenedVolume> {
   protected readonly first = EXAMPLES[0];
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -98,11 +98,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
     return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load(
-    source: ExtractSource,
-    volume: VolumeSource | LargeSource,
-    reopening: boolean,
-  ): Promise<OpenedVolume> {
+  protected async load(source: ExtractSource, volume: ImageSource, reopening: boolean): Promise<OpenedVolume> {
     const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
     const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const body = { name: source.name, source: volume, setup };
@@ -168,7 +164,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
    * those in force except the iso value, which is specific to a volume; for a volume larger than memory the defaults;
    * without attractors. A link's settings take precedence.
    */
-  #setupFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource, choice: StartChoice): Setup {
+  #setupFor({ example, linked }: ExtractSource, volume: ImageSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
     const own = 'zarr' in volume ? {} : params;
     const wanted: ParamValues = { ...(example?.params ?? own), ...linked?.params };
@@ -183,7 +179,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
    * are specific to a volume; for a volume larger than memory always the contour, and one finer level. A link's settings
    * take precedence.
    */
-  #startFor({ example, linked }: ExtractSource, volume: VolumeSource | LargeSource): StartChoice {
+  #startFor({ example, linked }: ExtractSource, volume: ImageSource): StartChoice {
     const choice = this.#ui.start.value;
     const own: StartChoice =
       'zarr' in volume
@@ -196,6 +192,6 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource | Larg
   }
 }
 
-function transferable(source: VolumeSource | LargeSource): Transferable[] {
+function transferable(source: ImageSource): Transferable[] {
   return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
 }

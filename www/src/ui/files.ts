@@ -62,7 +62,7 @@ export function acceptDrops(
       const files = [...(event.dataTransfer?.files ?? [])];
       const folder = onFolder && folderIn(event.dataTransfer);
       if (!folder) return onFiles(files);
-      // One that cannot be read is reported as a file that is no volume.
+      // If it cannot be read, opening it as a file gives the error message.
       folder.then(onFolder, () => onFiles(files));
     },
     { signal },
