@@ -47,7 +47,7 @@ describe('the built-in example', () => {
   });
 
   test('is rendered: the view has many colours', async () => {
-    const png = await app.page.locator('.view > canvas').screenshot();
+    const png = await app.page.locator('.scene > canvas').screenshot();
     expect(await countColors(app.page, png)).toBeGreaterThan(1000);
   });
 
@@ -90,7 +90,7 @@ describe('the built-in example', () => {
 
 describe('running', () => {
   test('reset, step, ten steps, play and pause by keyboard', async () => {
-    await app.page.locator('.view > canvas').focus();
+    await app.page.locator('.scene > canvas').focus();
     await app.page.keyboard.press('r');
     await reach(app.page, 'paused');
     expect(await iteration(app.page)).toBe(0);
@@ -116,7 +116,7 @@ describe('running', () => {
   });
 
   test('the arrow keys rotate the view', async () => {
-    const view = app.page.locator('.view > canvas');
+    const view = app.page.locator('.scene > canvas');
     const before = await view.screenshot();
     await view.press('ArrowLeft');
     await view.press('ArrowLeft');

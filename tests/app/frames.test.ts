@@ -66,11 +66,11 @@ test('surfaces are transferred by the worker and uploaded unchanged, into the sa
   await openAt('#extract?start=enclosing&v=2');
   await reach(app.page, 'running');
   await expect.poll(() => iteration(app.page)).toBeGreaterThan(10);
-  await app.page.locator('.view > canvas').press(' ');
+  await app.page.locator('.scene > canvas').press(' ');
   await reach(app.page, 'paused');
   for (let step = 0; step < 6; step++) {
     const { frames } = await watched();
-    await app.page.locator('.view > canvas').press('s');
+    await app.page.locator('.scene > canvas').press('s');
     await expect.poll(async () => (await watched()).frames).toBeGreaterThan(frames);
   }
   const sent = await app.page.workers()[0]?.evaluate(() => (self as unknown as { watched: object }).watched);
@@ -97,7 +97,7 @@ test('the page keeps the displayed surface and returns the previous one', async 
   // Colours are computed from the displayed arrays.
   await app.page.selectOption('.view-options select', 'component');
   await app.page.getByLabel('Wireframe').check();
-  await app.page.locator('.view > canvas').press('ArrowLeft');
+  await app.page.locator('.scene > canvas').press('ArrowLeft');
   await expect.poll(async () => (await watched()).drawn).toBeGreaterThan(1000);
 });
 
@@ -108,7 +108,7 @@ test('with software rendering a large surface is rotated with fewer triangles, a
   expect(all).toBeGreaterThan(50_000);
   await expect.poll(async () => (await watched()).drawn).toBe(all);
   const { gpu } = await watched();
-  const box = await app.page.locator('.view > canvas').boundingBox();
+  const box = await app.page.locator('.scene > canvas').boundingBox();
   const [x, y] = [(box?.x ?? 0) + 90, (box?.y ?? 0) + (box?.height ?? 0) - 60];
   await app.page.mouse.move(x, y);
   await app.page.mouse.down();
@@ -130,7 +130,7 @@ test('slices are rendered by the processor, and the view keeps its size when a r
       all.map((canvas) => (canvas as HTMLCanvasElement).getContext('2d')?.getContextAttributes().willReadFrequently),
     );
   expect(byProcessor).toEqual([true, true, true]);
-  const view = app.page.locator('.view > canvas');
+  const view = app.page.locator('.scene > canvas');
   const running = await view.boundingBox();
   await app.page.getByRole('button', { name: 'Reset', exact: true }).click();
   await expect.poll(() => app.page.textContent('.phase')).toBe('');

@@ -164,7 +164,7 @@ describe('a figure of the paper', () => {
 describe('attractors', () => {
   const items = () => app.page.locator('.attractors li');
   const pause = async () => {
-    await app.page.locator('.view > canvas').focus();
+    await app.page.locator('.scene > canvas').focus();
     if ((await reach(app.page, 'running', 'paused', 'done')) === 'running') await app.page.keyboard.press(' ');
     await reach(app.page, 'paused', 'done');
   };
@@ -175,7 +175,7 @@ describe('attractors', () => {
     for (const slider of await app.page.locator('.slice input[type=range]').all()) await slider.fill('22');
     await app.page.getByLabel('Sagittal', { exact: true }).fill('58');
     const before = await measures(app.page);
-    await app.page.locator('.view > canvas').focus();
+    await app.page.locator('.scene > canvas').focus();
     await app.page.keyboard.press('a');
     await expect.poll(() => items().count()).toBe(1);
     expect(await items().first().textContent()).toContain('58, 22, 22');
@@ -185,11 +185,11 @@ describe('attractors', () => {
   });
 
   test('are shown in the slices and in 3D', async () => {
-    const before = [await picture('.slice canvas'), await picture('.view > canvas')];
+    const before = [await picture('.slice canvas'), await picture('.scene > canvas')];
     await app.page.getByLabel('Radius of attractor 1').fill('11');
     await app.page.getByLabel('Radius of attractor 1').press('Enter');
     await pause();
-    for (const [i, canvas] of ['.slice canvas', '.view > canvas'].entries())
+    for (const [i, canvas] of ['.slice canvas', '.scene > canvas'].entries())
       await changes(app.page, before[i] ?? Buffer.of(), () => picture(canvas), 0.005, canvas);
   });
 
@@ -200,7 +200,7 @@ describe('attractors', () => {
     await slice.click({ position: { x: 0.5 * (box?.width ?? 0), y: 0.3 * (box?.height ?? 0) } });
     await expect.poll(() => items().count()).toBe(2);
     // Some click in a row across the middle hits the surface.
-    const view = app.page.locator('.view > canvas');
+    const view = app.page.locator('.scene > canvas');
     const area = await view.boundingBox();
     for (let part = 0.35; part < 0.7 && (await items().count()) < 3; part += 0.04) {
       await view.click({ position: { x: part * (area?.width ?? 0), y: 0.5 * (area?.height ?? 0) } });
@@ -224,7 +224,7 @@ describe('attractors', () => {
   });
 
   test('are restored by undo', async () => {
-    await app.page.locator('.view > canvas').focus();
+    await app.page.locator('.scene > canvas').focus();
     // The label appears with the saved state.
     await expect
       .poll(() => app.page.getAttribute('[data-transport=undo]', 'title'))
@@ -240,15 +240,15 @@ describe('colour', () => {
     await openAt('#extract?example=figure-7');
     // From here on the list is focused, and its ring is in every picture.
     await app.page.selectOption('[data-view=color]', 'plain');
-    const plain = await picture('.view > canvas');
+    const plain = await picture('.scene > canvas');
     await app.page.selectOption('[data-view=color]', 'speed');
     const legend = app.page.getByRole('group', { name: 'Colour scale' });
     await legend.waitFor();
     expect(await legend.textContent()).toMatch(/^Speed along the normal, δ per iteration−([\d.]+)0\1inwardsoutwards$/);
-    await changes(app.page, plain, () => picture('.view > canvas'), 0.05);
+    await changes(app.page, plain, () => picture('.scene > canvas'), 0.05);
     await app.page.selectOption('[data-view=color]', 'plain');
     await legend.waitFor({ state: 'hidden' });
-    await showsAgain(app.page, plain, () => picture('.view > canvas'));
+    await showsAgain(app.page, plain, () => picture('.scene > canvas'));
   });
 
   test("by curvature has a legend in the volume's unit, and distinguishes convex from concave", async () => {

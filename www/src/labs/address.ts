@@ -11,11 +11,13 @@ export const labOf = (hash: string): string | undefined =>
 
 /**
  * Writes the open lab's state, `hash`, into the address, without a new entry in the browser's history. An address that
- * names another lab is kept: the user has just asked for that lab, and it is about to open.
+ * names another lab is kept: the user has just asked for that lab, and it is about to open. An empty one is kept, too,
+ * while it means the same: it opens the first lab.
  */
 export function showAddress(hash: string): void {
   const named = labOf(location.hash);
-  if (hash === location.hash || (named && named !== labOf(hash))) return;
+  const isSame = hash === location.hash || (!location.hash && hash === `#${LAB_IDS[0]}`);
+  if (isSame || (named && named !== labOf(hash))) return;
   window.history.replaceState(null, '', hash);
 }
 

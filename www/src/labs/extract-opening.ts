@@ -65,7 +65,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   }
 
   /** Opens a volume passed on by another lab, with the parameters passed on with it. */
-  passedOn({ name, bytes, params }: Handoff): Promise<void> {
+  override passedOn({ name, bytes, params }: Handoff): Promise<void> {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
     return this.open({ name, load, linked: { params, attractors: [] }, unit: '' });
   }

@@ -1,43 +1,35 @@
-import { Client, RequestError, toFailure } from '../client';
-import { GUIDES } from '../guides';
+import { Client, toFailure } from '../client';
+import type { Example } from '../examples';
 import type { VertexQuantity, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
-import { plural, text } from '../texts';
+import { text } from '../texts';
 import { History } from '../ui/history';
-import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { ViewOptions } from '../ui/view-options';
-import { ExtractOpening } from './extract-opening';
+import { ExtractOpening, type ExtractSource } from './extract-opening';
 import { ExtractParts, type PartEvents } from './extract-parts';
 import { ExtractResults } from './extract-results';
 import { ExtractSettings } from './extract-settings';
-import { ExtractSharing } from './extract-sharing';
+import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
-import type { Handoff, Lab, OpenInLab } from './labs';
+import type { Handoff, OpenInLab } from './labs';
+import { linkOf, toHash } from './link';
 
-/**
- * The Extract lab: a deformable surface is fitted to a volume. This class connects the lab's parts; opening, settings,
- * results and sharing are in files of their own.
- */
-export class ExtractLab implements Lab {
-  readonly #root: HTMLElement;
-  /** Aborted when the lab is closed, which removes all event listeners. */
-  readonly #closing = new AbortController();
-  readonly #client = new Client((event) => this.#onEvent(event));
-  readonly #ui: ExtractParts;
-  readonly #states: LabStates;
+/** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
+export class ExtractLab extends RunLab<Example> {
+  protected readonly id = 'extract';
+  protected readonly client = new Client((event) => this.#onEvent(event));
+  protected readonly ui: ExtractParts;
+  protected readonly states: LabStates;
+  protected readonly opening: ExtractOpening;
   readonly #results: ExtractResults;
   readonly #settings: ExtractSettings;
-  readonly #opening: ExtractOpening;
-  readonly #sharing: ExtractSharing;
-  readonly #passOn: OpenInLab;
   /** Quantity that the worker computes at each vertex to colour the surface by; undefined if none is needed. */
   #quantity: VertexQuantity | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    this.#root = root;
-    this.#passOn = passOn;
-    const { signal } = this.#closing;
-    const client = this.#client;
+    super(root, help, passOn);
+    const { client } = this;
+    const { signal } = this.closing;
     const history = new History();
     const ui = new ExtractParts(
       root,
@@ -47,106 +39,79 @@ export class ExtractLab implements Lab {
       this.#events(),
     );
     const states = new LabStates(ui.banner, ui.status, signal);
-    this.#ui = ui;
-    this.#states = states;
+    this.ui = ui;
+    this.states = states;
     this.#results = new ExtractResults(client, ui, states, history);
     this.#settings = new ExtractSettings(client, ui, states, this.#results, () => this.#showSettings());
-    this.#opening = new ExtractOpening(client, ui, states, this.#settings, this.#results, () =>
+    this.opening = new ExtractOpening(client, ui, states, this.#settings, this.#results, () =>
       client.request('quantity', this.#quantity),
     );
-    this.#sharing = new ExtractSharing(client, ui, states, this.#settings, this.#opening);
-    states.subscribe((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, GUIDES.extract, signal);
+    const attract = () => ui.attractors.add(ui.stage.crosshair);
+    this.beginRuns([{ key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract }]);
   }
 
-  /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
-  async start(passedOn?: Handoff): Promise<void> {
+  override async start(passedOn?: Handoff): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
-    const open = passedOn && (() => this.#opening.passedOn(passedOn));
-    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress(), open);
+    await super.start(passedOn);
   }
 
-  close(): void {
-    this.#closing.abort();
-    this.#opening.close();
-    this.#client.close();
+  protected override closed(): void {
     this.#results.close();
-    this.#ui.dispose();
-    this.#root.replaceChildren();
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      onFiles: (files) => void this.#opening.files(files),
-      onLarge: (name, source) => void this.#opening.large(name, source),
-      onExample: (example) => void this.#opening.example(example),
-      onExampleId: (id) => this.#opening.byId(id),
+      ...this.runEvents(),
+      onLarge: (name, source) => void this.opening.large(name, source),
       onVariant: (preset, variant) => void this.#settings.changeTo(preset, variant),
       onStart: () => void this.#settings.restart(),
       onParam: (name, value) => void this.#settings.setParam(name, value),
       onAttractors: (attractors, what, tuning) => void this.#settings.setAttractors(attractors, what, tuning),
       onOptions: (options) => this.#setOptions(options),
       onPlanes: (planes) => {
-        if (!this.#states.engineBroken) this.#ask(this.#client.request('planes', planes));
+        if (!this.states.engineBroken) this.ask(this.client.request('planes', planes));
       },
       onCompare: () => void this.#compare(),
-      onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
+      onCancelCompare: () => this.ask(this.client.request('cancelCompare', undefined)),
       onCoverage: () => void this.#measureCoverage(),
-      onCancelCoverage: () => this.#ask(this.#client.request('cancelCoverage', undefined)),
+      onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
-      onSculpt: () => this.#sharing.toSculpt(this.#passOn),
-      onCancel: () => void this.#opening.cancel(),
-      onToggle: () => this.#toggle(),
-      onStep: (steps) => this.#step(steps),
-      onReset: () => void this.#reset(),
-      onUndo: () => void this.#settings.travel('undo'),
-      onRedo: () => void this.#settings.travel('redo'),
-      onDismiss: () => this.#dismiss(),
-      onCopyLink: () => void this.#sharing.copyLink(),
-      onError: (title, error) => this.#states.fail(title, error),
+      onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
     };
   }
 
-  #shortcuts(): Shortcut[] {
-    const attract = () => this.#ui.attractors.add(this.#ui.stage.crosshair);
-    return [
-      ...labShortcuts(this.#events(), [{ key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract }]),
-      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
-    ];
-  }
-
   #showSettings(): void {
-    this.#ui.showParams(this.#settings.params, this.#opening.source?.example);
-    this.#sharing.updateAddress();
+    this.ui.showParams(this.#settings.params, this.opening.source?.example);
+    this.updateAddress();
   }
 
   #setOptions({ color }: ViewOptions): void {
     const quantity = color === 'plain' || color === 'component' ? undefined : color;
-    if (quantity !== this.#quantity) this.#ask(this.#client.request('quantity', quantity));
+    if (quantity !== this.#quantity) this.ask(this.client.request('quantity', quantity));
     this.#quantity = quantity;
-    this.#sharing.updateAddress();
+    this.updateAddress();
   }
 
-  #toggle(): void {
-    const running = this.#states.value === 'running';
-    if (!running && !this.#states.canRun) return;
-    this.#ui.banner.hide();
-    if (!running) this.#settings.checkpoint(text('labs.play'));
-    this.#ask(this.#client.request(running ? 'pause' : 'play', undefined));
+  protected address({ example, name: file }: ExtractSource): string {
+    const { params, sphere, attractors } = this.#settings;
+    const { defaults } = this.opening;
+    const choice = this.ui.start.inForce;
+    return toHash(
+      linkOf({ example, file, choice, sphere, params, defaults, attractors, color: this.ui.options.value.color }),
+    );
   }
 
-  #step(steps: number): void {
-    if (!this.#states.canRun) return;
-    this.#ui.banner.hide();
-    this.#settings.checkpoint(plural('counts.step', steps));
-    this.#ask(this.#client.request('step', { count: steps }));
+  protected override beforeRun(change: string): void {
+    this.#settings.checkpoint(change);
   }
 
-  async #reset(): Promise<void> {
-    const { ready, engineBroken, value } = this.#states;
-    if (!ready || value === 'loading') return;
-    await (engineBroken ? this.#opening.reopen() : this.#settings.startOver());
+  protected startOver(): Promise<void> {
+    return this.#settings.startOver();
+  }
+
+  protected travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#settings.travel(way);
   }
 
   /**
@@ -154,49 +119,45 @@ export class ExtractLab implements Lab {
    * runs.
    */
   async #compare(): Promise<void> {
-    if (!this.#states.canChange) return;
-    const { compare, start } = this.#ui;
+    if (!this.states.canChange) return;
+    const { compare, start } = this.ui;
     if (start.value.levels === 0) return compare.reject(text('extract.compareNeedsLevel'));
     compare.begin();
     try {
       const setup = this.#settings.setup(start.value, this.#settings.params, []);
-      compare.finish(await this.#client.request('compare', setup));
+      compare.finish(await this.client.request('compare', setup));
     } catch (error) {
       compare.reject(text('extract.compareFailed', { message: toFailure(error).message }));
     }
   }
 
   async #measureCoverage(): Promise<void> {
-    const { coverage } = this.#ui;
+    const { coverage } = this.ui;
     coverage.begin();
     try {
-      coverage.finish(await this.#client.request('coverage', undefined));
+      coverage.finish(await this.client.request('coverage', undefined));
     } catch (error) {
       coverage.say(text('extract.coverageFailed', { message: toFailure(error).message }));
     }
   }
 
-  /** Shows an error message if a request fails, without waiting for the reply. */
-  #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
-  }
-
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
-    else if (event.event === 'comparing') this.#ui.compare.showProgress(event);
-    else if (event.event === 'data') this.#ui.large.showProgress(event);
-    else if (event.event === 'covering') this.#ui.coverage.showProgress(event);
-    else if (event.event !== 'state') this.#results.take(event);
-    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
+    if (this.isTaken(event)) return;
+    if (event.event === 'comparing') this.ui.compare.showProgress(event);
+    else if (event.event === 'data') this.ui.large.showProgress(event);
+    else if (event.event === 'covering') this.ui.coverage.showProgress(event);
+    else this.#results.take(event);
   }
 
-  #showState(state: LabState): void {
-    const { modelState, ready } = this.#states;
-    this.#ui.showState(state, modelState, ready);
-    if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
+  protected settled(state: LabState): void {
+    this.#results.showState(state);
   }
 
-  #dismiss(): void {
-    if (this.#states.dismiss()) this.#ui.status.say(this.#results.describe(this.#states.value));
+  protected showControls(state: LabState): void {
+    this.ui.showState(state, this.states.modelState, this.states.ready);
+  }
+
+  protected describe(): string {
+    return this.#results.describe(this.states.value);
   }
 }

@@ -4,6 +4,7 @@ import type { Failure, ParamSpec } from '../protocol';
 import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
+import type { Handoff } from './labs';
 
 /** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
 const SAVE_TIMEOUT_MS = 1000;
@@ -120,6 +121,11 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   protected async saved(): Promise<unknown> {
     return undefined;
+  }
+
+  /** Opens what another lab passes on; by default nothing is accepted, and the first example opens. */
+  passedOn(_handoff: Handoff): Promise<void> {
+    return this.example(this.first);
   }
 
   /** Called when a request to open something is made, to end the one before if that takes long; does nothing by default. */

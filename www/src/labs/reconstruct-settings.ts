@@ -8,7 +8,6 @@ import type { LabStates } from './lab-states';
 import { applyClick, NO_EDITS, withoutRemoved } from './picking';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ReconstructResults } from './reconstruct-results';
-import type { RunControl } from './reconstruct-running';
 import { UndoStack } from './undo';
 
 /** Limits of the undo history: number of states, and their total size in bytes. */
@@ -32,7 +31,6 @@ export class ReconstructSettings {
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #results: ReconstructResults;
-  readonly #running: RunControl;
   readonly #onParams: (params: ParamValues) => void;
   readonly #undo = new UndoStack<Settings>(UNDO_LIMITS);
   #lastChange = { mergeKey: '', at: 0 };
@@ -46,14 +44,12 @@ export class ReconstructSettings {
     ui: ReconstructParts,
     states: LabStates,
     results: ReconstructResults,
-    running: RunControl,
     onParams: (params: ParamValues) => void,
   ) {
     this.#client = client;
     this.#ui = ui;
     this.#states = states;
     this.#results = results;
-    this.#running = running;
     this.#onParams = onParams;
   }
 
@@ -139,7 +135,7 @@ export class ReconstructSettings {
       this.showParams(params);
       if (this.#states.modelState === 'done') {
         this.#results.startOver();
-        this.#running.ask(this.#running.play());
+        this.#play().catch((error) => this.#states.fail(text('labs.requestFailed'), error));
       }
     } catch (error) {
       const { code, message } = toFailure(error);
@@ -157,6 +153,10 @@ export class ReconstructSettings {
     if (back) await this.#apply(back);
   }
 
+  #play(): Promise<undefined> {
+    return this.#client.request('play', undefined);
+  }
+
   get #now(): Settings {
     return { choice: this.choice, params: this.#params, edits: this.#edits };
   }
@@ -171,7 +171,7 @@ export class ReconstructSettings {
       this.#showEdits();
       this.#results.startOver();
       this.showParams(params);
-      await this.#running.play();
+      await this.#play();
       return true;
     } catch (error) {
       this.#ui.setup.show(this.choice);

@@ -1,4 +1,3 @@
-import type { MeshFormat } from '../protocol';
 import { text } from '../texts';
 import { download } from '../ui/files';
 import type { History } from '../ui/history';
@@ -6,23 +5,20 @@ import { toCsv } from './csv';
 
 /** Saves a lab's results as files named after the open volume or mesh; `say` shows the name of each saved file. */
 export class Saving {
-  readonly #fetch: (format: MeshFormat) => Promise<Uint8Array>;
   readonly #say: (text: string) => void;
-  /** Name of the open volume or file, from which the names of saved files are derived. */
-  name = 'surface';
+  #name = 'surface';
 
-  /** `fetch` returns the present surface as a file of the given format; `say` shows a text in the status line. */
-  constructor(fetch: (format: MeshFormat) => Promise<Uint8Array>, say: (text: string) => void) {
-    this.#fetch = fetch;
+  constructor(say: (text: string) => void) {
     this.#say = say;
   }
 
-  /**
-   * Saves the present surface as a file; `type` is the media type of the format, and `suffix` is added to the file's
-   * name.
-   */
-  async mesh(format: MeshFormat, type: string, suffix = ''): Promise<void> {
-    this.bytes(format, await this.#fetch(format), type, suffix);
+  /** Name of the open volume or file, without its folder, from which the names of saved files are derived. */
+  get name(): string {
+    return this.#name;
+  }
+
+  set name(name: string) {
+    this.#name = name.replace(/^.*\//, '');
   }
 
   /** Saves the data of the plots as CSV; `residual` is the heading of the residual's column. */

@@ -4,6 +4,7 @@ import { isSculptPreset, sceneById } from '../sculpt/presets';
 import type { OpenedScene, SceneSource } from '../sculpt/protocol';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
+import type { Handoff } from './labs';
 import { fromExample, fromFiles } from './mesh-files';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedScene } from './sculpt-link';
@@ -34,8 +35,8 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     this.#onOpened = onOpened;
   }
 
-  /** Opens a mesh passed on by another lab, given as the name and the content of a file. */
-  bytes(name: string, bytes: Uint8Array): Promise<void> {
+  /** Opens a mesh passed on by another lab. */
+  override passedOn({ name, bytes }: Handoff): Promise<void> {
     return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }) });
   }
 

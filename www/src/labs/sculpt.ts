@@ -1,6 +1,5 @@
-import { RequestError } from '../channel';
-import { GUIDES } from '../guides';
 import { SculptClient } from '../sculpt/client';
+import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type {
@@ -12,14 +11,13 @@ import type {
   WorkerEvent,
 } from '../sculpt/protocol';
 import type { LabState } from '../state';
-import { plural, text } from '../texts';
+import { text } from '../texts';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
-import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
-import { copyAddress, FILE_NOTE, showAddress } from './address';
+import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
-import type { Handoff, Lab } from './labs';
+import type { OpenInLab } from './labs';
 import { Filming } from './sculpt-filming';
 import { filmOf, linkOf, toHash } from './sculpt-link';
 import { SculptOpening, type SculptSource } from './sculpt-opening';
@@ -36,20 +34,19 @@ const QUANTITIES: readonly string[] = [
 ] satisfies SculptQuantity[];
 
 /**
- * The Sculpt lab: a detailed surface is deformed by ellipsoids. This class connects the lab's parts; opening, settings,
- * posing, filming and results are in files of their own.
+ * The Sculpt lab: a detailed surface is deformed by ellipsoids. Opening, settings, posing, filming and results are in
+ * files of their own.
  */
-export class SculptLab implements Lab {
-  readonly #root: HTMLElement;
-  readonly #closing = new AbortController();
-  readonly #client = new SculptClient((event) => this.#onEvent(event));
-  readonly #ui: SculptParts;
-  readonly #states: LabStates;
+export class SculptLab extends RunLab<SculptExample> {
+  protected readonly id = 'sculpt';
+  protected readonly client = new SculptClient((event) => this.#onEvent(event));
+  protected readonly ui: SculptParts;
+  protected readonly states: LabStates;
+  protected readonly opening: SculptOpening;
   readonly #results: SculptResults;
   readonly #settings: SculptSettings;
   readonly #posing: Posing;
   readonly #filming: Filming;
-  readonly #opening: SculptOpening;
   /**
    * Parameters that the scene opened with, including the model's own choices, but without changes by a link, which
    * contains only parameters that differ from these.
@@ -57,45 +54,32 @@ export class SculptLab implements Lab {
   #usual: ParamValues = {};
   #shown: FrameContents = { layout: 'result', quantity: undefined, textured: false };
 
-  constructor(root: HTMLElement, help: HTMLElement) {
-    this.#root = root;
-    const { signal } = this.#closing;
-    const client = this.#client;
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    super(root, help, passOn);
+    const { client } = this;
+    const { signal } = this.closing;
     const history = new History();
     const ui = new SculptParts(root, history, client, signal, this.#events());
     const states = new LabStates(ui.banner, ui.status, signal);
-    this.#ui = ui;
-    this.#states = states;
+    this.ui = ui;
+    this.states = states;
     this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
     this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
     this.#posing = new Posing(ui, this.#settings);
     this.#filming = new Filming(client, ui, states, this.#settings);
-    this.#opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
-    states.subscribe((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
+    this.opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    const addKey = () => this.#filming.addKey();
+    this.beginRuns([{ key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: addKey }]);
   }
 
-  /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
-  async start(passedOn?: Handoff): Promise<void> {
-    const open = passedOn && (() => this.#opening.bytes(passedOn.name, passedOn.bytes));
-    await this.#opening.start(this.#closing.signal, () => this.#updateAddress(), open);
-  }
-
-  close(): void {
-    this.#closing.abort();
+  protected override closed(): void {
     this.#posing.close();
-    this.#opening.close();
-    this.#client.close();
-    this.#ui.dispose();
-    this.#root.replaceChildren();
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      onFiles: (files) => void this.#opening.files(files),
-      onExample: (example) => void this.#opening.example(example),
-      onExampleId: (id) => this.#opening.byId(id),
+      ...this.runEvents(),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
       onChoose: (index) => this.#settings.choose(index),
       onMode: (mode) => {
@@ -110,33 +94,10 @@ export class SculptLab implements Lab {
       onLoop: (loop) => this.#filming.setLoop(loop),
       onSeek: (frame) => this.#filming.seek(frame),
       onRecord: () => void this.#filming.record(),
-      onCancelRecord: () => void this.#client.request('cancelRecord', undefined),
-      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.#ui.labelOf(name)),
+      onCancelRecord: () => void this.client.request('cancelRecord', undefined),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.labelOf(name)),
       onOptions: (options) => this.#setOptions(options),
-      onCancel: () => void this.#opening.cancel(),
-      onToggle: () => this.#toggle(),
-      onStep: (steps) => this.#step(steps),
-      onReset: () => void this.#reset(),
-      onUndo: () => void this.#settings.travel('undo'),
-      onRedo: () => void this.#settings.travel('redo'),
-      onDismiss: () => this.#dismiss(),
-      onCopyLink: () => void this.#copyLink(),
-      onError: (title, error) => this.#states.fail(title, error),
     };
-  }
-
-  #shortcuts(): Shortcut[] {
-    return [
-      ...labShortcuts(this.#events(), [
-        { key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: () => this.#filming.addKey() },
-      ]),
-      {
-        key: 'Escape',
-        shown: text('labs.keyEscape'),
-        text: text('sculpt.dismissKey'),
-        act: () => this.#escape(),
-      },
-    ];
   }
 
   /**
@@ -144,21 +105,21 @@ export class SculptLab implements Lab {
    * pose from a link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
    */
   async #adopt(opened: OpenedScene, { name, example, linked }: SculptSource): Promise<void> {
-    this.#states.ready = true;
+    this.states.ready = true;
     this.#usual = { ...opened.params };
     for (const [name, value] of Object.entries(linked?.params ?? {}))
       if (example?.params[name] === undefined) delete this.#usual[name];
       else if (Object.is(opened.params[name], value)) this.#usual[name] = example.params[name];
     this.#results.clear();
-    this.#ui.adopt(opened, example, name);
+    this.ui.adopt(opened, example, name);
     const film = filmOf(linked ?? { params: {} }, example?.film);
     const { pose, params } = opened;
     this.#settings.adopt({ pose, names: example?.names ?? [], posed: linked?.pose !== undefined, film, params });
     const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
     const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
     const preset = isSculptPreset(example) ? example : undefined;
-    this.#ui.options.staged = preset?.stages !== undefined;
-    this.#ui.options.set({
+    this.ui.options.staged = preset?.stages !== undefined;
+    this.ui.options.set({
       color,
       layout: layout === 'stages' && !preset?.stages ? 'result' : layout,
       edges: false,
@@ -167,9 +128,9 @@ export class SculptLab implements Lab {
     });
     if (preset?.stages) this.#results.showStages(preset.stages);
     await this.#settings.setFilm(film, 0);
-    await this.#client.request('show', this.#shown);
+    await this.client.request('show', this.#shown);
     const endless = film?.loop === true && prefersReducedMotion();
-    await this.#client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
+    await this.client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
@@ -181,19 +142,19 @@ export class SculptLab implements Lab {
   }
 
   #follow(frame: FrameEvent): void {
-    this.#settings.follow(frame, this.#states.modelState === 'running');
+    this.#settings.follow(frame, this.states.modelState === 'running');
   }
 
   #showSettings(): void {
     const { params, pose } = this.#settings;
-    const example = this.#opening.source?.example;
+    const example = this.opening.source?.example;
     const preset = isSculptPreset(example) ? example : undefined;
-    this.#ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
-    this.#ui.showState(this.#states.modelState, this.#states.ready, this.#canPlay);
-    this.#updateAddress();
+    this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
+    this.showControls(this.states.value);
+    this.updateAddress();
   }
 
-  get #canPlay(): boolean {
+  get #hasFilm(): boolean {
     const { film } = this.#settings;
     return film !== undefined && lastFrame(film) > 0;
   }
@@ -204,98 +165,72 @@ export class SculptLab implements Lab {
     const before = this.#shown;
     const changed = layout !== before.layout || quantity !== before.quantity || textured !== before.textured;
     this.#shown = { layout, quantity, textured };
-    if (!this.#states.ready) return;
-    if (changed) this.#ask(this.#client.request('show', this.#shown));
+    if (!this.states.ready) return;
+    if (changed) this.ask(this.client.request('show', this.#shown));
     this.#results.showOriginals();
-    this.#updateAddress();
+    this.updateAddress();
   }
 
-  #toggle(): void {
-    const { value, canChange } = this.#states;
-    if (!canChange) return;
-    this.#ui.banner.hide();
-    if (value === 'running') this.#ask(this.#client.request('pause', undefined));
-    else if (this.#canPlay || this.#states.modelState === 'paused') {
-      this.#settings.checkpoint(text('labs.play'));
-      this.#ask(this.#client.request('play', undefined));
-    }
+  protected override get canPlay(): boolean {
+    return this.states.canChange && (this.#hasFilm || this.states.modelState === 'paused');
   }
 
-  #step(steps: number): void {
-    if (!this.#states.canChange || this.#states.value === 'running') return;
-    this.#ui.banner.hide();
-    this.#settings.checkpoint(plural('counts.step', steps));
-    this.#ask(this.#client.request('step', { count: steps }));
+  protected override get canStep(): boolean {
+    return this.states.canChange;
+  }
+
+  protected override beforeRun(change: string): void {
+    this.#settings.checkpoint(change);
   }
 
   /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history of steps cleared. */
-  async #reset(): Promise<void> {
-    const { ready, value, engineBroken } = this.#states;
-    if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.reopen();
-    this.#states.load(text('labs.resetting'));
-    try {
+  protected startOver(): Promise<void> {
+    return this.building(async () => {
       await this.#settings.rebuild(undefined);
       this.#results.startOver();
-      await this.#client.request('show', this.#shown);
-      this.#states.idle(text('labs.readyToStart'));
-    } catch (error) {
-      this.#states.fail(text('labs.buildFailed'), error);
-    }
-  }
-
-  /** Shows an error message if a request fails, without waiting for the reply. */
-  #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
-  }
-
-  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
-  #updateAddress(): void {
-    const { source } = this.#opening;
-    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
-    const { params, pose, posed, film } = this.#settings;
-    const { color, layout } = this.#ui.options.value;
-    const { example, name: file } = source;
-    const linked = linkOf({
-      example,
-      file,
-      params,
-      usual: this.#usual,
-      pose: posed ? pose : undefined,
-      film,
-      color,
-      layout,
+      await this.client.request('show', this.#shown);
     });
-    showAddress(toHash(linked));
   }
 
-  async #copyLink(): Promise<void> {
-    this.#updateAddress();
-    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
+  protected travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#settings.travel(way);
+  }
+
+  protected address({ example, name: file }: SculptSource): string {
+    const { params, pose: present, posed, film } = this.#settings;
+    const { color, layout } = this.ui.options.value;
+    const pose = posed ? present : undefined;
+    return toHash(linkOf({ example, file, params, usual: this.#usual, pose, film, color, layout }));
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'recorded') this.#ui.film.showRecording(event.progress);
-    else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
+    if (this.isTaken(event)) return;
+    if (event.event === 'recorded') this.ui.film.showRecording(event.progress);
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);
-    else if (event.event === 'refused') this.#settings.reject(event.pose, event.failure.message);
-    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
+    else this.#settings.reject(event.pose, event.failure.message);
   }
 
-  #showState(state: LabState): void {
-    const { modelState, ready } = this.#states;
-    this.#root.dataset.state = state;
-    this.#ui.showState(modelState, ready, this.#canPlay);
-    if (state === 'done' || state === 'paused') this.#updateAddress();
+  protected settled(state: LabState): void {
+    this.#results.showState(state);
   }
 
-  #escape(): void {
-    if (this.#ui.banner.shown) this.#dismiss();
+  protected showControls(state: LabState): void {
+    const { modelState, ready } = this.states;
+    this.ui.showState(state, modelState, ready, this.#hasFilm);
+  }
+
+  protected describe(): string {
+    return this.#results.describe(this.states.value);
+  }
+
+  /** Dismisses the error message, else deselects the ellipsoid. */
+  protected override escape(): void {
+    if (this.ui.banner.shown) this.dismiss();
     else this.#settings.choose(undefined);
   }
 
-  #dismiss(): void {
-    if (this.#states.dismiss()) this.#ui.status.say(this.#results.describe(this.#states.value));
+  protected override get escapeText(): string {
+    return text('sculpt.dismissKey');
   }
 }

@@ -1,34 +1,27 @@
-import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
-import type { ParamSpec, ParamValues, VolumeFormat } from '../segment/protocol';
+import type { SegmentExample } from '../segment/examples';
+import type { ParamValues, VolumeFormat } from '../segment/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
-import { h } from '../ui/dom';
-import { acceptDrops, fileChooser } from '../ui/files';
+import { h, section, wideButton } from '../ui/dom';
+import { fileChooser } from '../ui/files';
 import { LabelList, type LabelListEvents } from '../ui/label-list';
 import { LabelMeasureTable } from '../ui/label-measures';
-import { ParamControls } from '../ui/params';
 import { SegmentOptionControls } from '../ui/segment-options';
 import { SegmentTools, type ToolEvents } from '../ui/segment-tools';
-import { ErrorBanner, StatusLine } from '../ui/status';
 import { SegmentView, type SegmentViewEvents, type SegmentViewOptions } from '../view/segmentation';
+import { type LabEvents, LabParts } from './lab-parts';
 import { INITIAL_VIEW } from './segment-link';
-import { layOut, SegmentDataPanel } from './segment-page';
+import { segmentData } from './segment-page';
 
 /** Formats in which the surfaces of all labels are saved, one file a label in a ZIP archive, or all in one GLB. */
 export type SurfaceFormat = 'ply' | 'stl' | 'obj' | 'glb';
 
-export interface PartEvents extends LabelListEvents, ToolEvents, SegmentViewEvents {
-  onFiles: (files: File[]) => void;
+export interface PartEvents extends LabEvents<SegmentExample>, LabelListEvents, ToolEvents, SegmentViewEvents {
   onMapFiles: (files: File[]) => void;
-  onExample: (example: SegmentExample) => void;
-  onParam: (name: string, value: unknown) => void;
   onOptions: () => void;
   onSaveMap: (format: VolumeFormat) => void;
   onSaveSurfaces: (format: SurfaceFormat) => void;
-  onCopyLink: () => void;
   onReset: () => void;
-  onCancel: () => void;
-  onDismiss: () => void;
 }
 
 const MAP_FORMATS: { format: VolumeFormat; label: string; help: string }[] = [
@@ -43,34 +36,27 @@ const SURFACE_FORMATS: { format: SurfaceFormat; help: string }[] = [
   { format: 'obj', help: text('segment.zipHelp', { format: 'OBJ' }) },
 ];
 
-/**
- * All controls and views of the Segment lab, laid out. They display what they are given and report the user's actions as
- * events.
- */
-export class SegmentParts {
-  readonly #canvas = h('canvas', { tabindex: 0, role: 'application', 'aria-label': text('segment.viewLabel') });
+/** Controls and views of the Segment lab. */
+export class SegmentParts extends LabParts<SegmentExample> {
   readonly #slices = h('div', { class: 'slices' });
   readonly view: SegmentView;
-  readonly status = new StatusLine();
   readonly measures = new LabelMeasureTable();
-  readonly banner: ErrorBanner;
-  readonly data: SegmentDataPanel;
   readonly options: SegmentOptionControls;
   readonly labels: LabelList;
   readonly tools: SegmentTools;
-  readonly #events: PartEvents;
   readonly #saves: HTMLButtonElement[];
-  readonly #cancel: HTMLButtonElement;
-  readonly #paramsHolder = h('div');
-  #params: ParamControls | undefined;
 
   constructor(root: HTMLElement, signal: AbortSignal, events: PartEvents) {
-    this.#events = events;
-    this.view = new SegmentView(this.#canvas, this.#slices, INITIAL_VIEW, events);
-    this.banner = new ErrorBanner(events.onDismiss);
-    const chooser = fileChooser(events.onFiles, undefined, text('segment.openVolume'));
-    const mapChooser = fileChooser(events.onMapFiles, undefined, text('segment.openMap'));
-    this.data = new SegmentDataPanel(SEGMENT_EXAMPLES, chooser, mapChooser, events.onExample);
+    const choosers = [
+      fileChooser(events.onFiles, undefined, text('segment.openVolume')),
+      fileChooser(events.onMapFiles, undefined, text('segment.openMap')),
+    ];
+    super(root, signal, events, {
+      viewLabel: text('segment.viewLabel'),
+      drop: text('segment.drop'),
+      data: segmentData(choosers, events.onExample),
+    });
+    this.view = new SegmentView(this.canvas, this.#slices, INITIAL_VIEW, events);
     this.options = new SegmentOptionControls(INITIAL_VIEW, (options: SegmentViewOptions) => {
       this.view.setOptions(options);
       events.onOptions();
@@ -84,70 +70,38 @@ export class SegmentParts {
       button(format.toUpperCase(), help, { 'data-export': format }, () => events.onSaveSurfaces(format)),
     );
     this.#saves = [...maps, ...surfaces];
-    this.#cancel = h(
-      'button',
-      { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      text('labs.cancel'),
-    );
-    const drop = h('div', { class: 'drop', hidden: true }, text('segment.drop'));
-    acceptDrops(drop, events.onFiles, signal);
+    const reset = wideButton(text('segment.reset'), 'reset', events.onReset);
+    reset.title = text('segment.resetHelp');
     const exported = (help: string, ...buttons: HTMLElement[]) =>
       h('div', {}, h('div', { class: 'buttons exports' }, ...buttons), h('p', { class: 'help' }, help));
-    layOut(root, {
-      data: this.data.element,
-      labels: this.labels.element,
-      toolBar: this.tools.bar,
-      toolSettings: this.tools.settings,
-      params: this.#paramsHolder,
-      cancel: this.#cancel,
+    this.layOut({
+      name: 'segment',
       options: this.options.element,
-      banner: this.banner.element,
-      status: this.status.element,
-      canvas: this.#canvas,
-      slices: this.#slices,
-      drop,
-      measures: this.measures.element,
-      maps: exported(text('segment.mapsHelp'), ...maps),
-      exports: exported(text('segment.surfacesHelp'), ...surfaces),
-      reset: h(
-        'button',
-        {
-          type: 'button',
-          class: 'wide',
-          onclick: events.onReset,
-          'data-action': 'reset',
-          title: text('segment.resetHelp'),
-        },
-        text('segment.reset'),
-      ),
-      link: h(
-        'button',
-        { type: 'button', class: 'wide', onclick: events.onCopyLink, 'data-action': 'link' },
-        text('labs.copyLink'),
-      ),
+      stage: (view, status) => [this.tools.bar, h('div', { class: 'four' }, view, this.#slices), status],
+      setup: [
+        section(text('segment.sectionLabels'), this.labels.element),
+        section(text('segment.sectionTool'), this.tools.settings),
+        section(text('segment.sectionVolume'), this.data.element, reset),
+        this.paramsSection(),
+      ],
+      results: [
+        section(text('segment.sectionMeasures'), this.measures.element),
+        section(text('segment.sectionMap'), exported(text('segment.mapsHelp'), ...maps)),
+        section(text('segment.sectionSurfaces'), exported(text('segment.surfacesHelp'), ...surfaces)),
+        this.saveSection(),
+      ],
     });
   }
 
-  makeParams(specs: ParamSpec[]): void {
-    if (this.#params) return;
-    this.#params = new ParamControls(specs, [], this.#events.onParam);
-    this.#paramsHolder.replaceWith(this.#params.element);
-  }
-
   showParams(params: ParamValues): void {
-    this.#params?.show(params);
-  }
-
-  refuseParam(name: string, message: string): void {
-    this.#params?.showError(name, message);
+    this.displayParams(params);
   }
 
   /** Enables and disables controls according to the lab's state. `ready`: whether there is a label map. */
   showState(state: LabState, ready: boolean): void {
-    const idle = ready && state !== 'loading';
+    const idle = this.showLoading(state, ready);
     this.tools.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle;
-    this.#cancel.hidden = state !== 'loading' || !ready;
   }
 
   dispose(): void {

@@ -1,22 +1,31 @@
 import { RequestError, toFailure } from '../channel';
-import { GUIDES } from '../guides';
 import { SegmentClient } from '../segment/client';
+import type { SegmentExample } from '../segment/examples';
 import { rgbOf } from '../segment/labels';
-import type { OpenedImage, OpenedLabels, SurfaceUpdate, VolumeView, WorkerEvent } from '../segment/protocol';
+import type {
+  OpenedImage,
+  OpenedLabels,
+  ParamValues,
+  SurfaceUpdate,
+  VolumeView,
+  WorkerEvent,
+} from '../segment/protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import type { LabelMeasures } from '../ui/label-measures';
 import { type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
-import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import type { Shortcut } from '../ui/shortcuts';
 import type { Overlays } from '../view/label-overlay';
+import { LabShell } from './lab-shell';
 import { LabStates } from './lab-states';
-import type { Handoff, Lab, OpenInLab } from './labs';
+import type { OpenInLab } from './labs';
 import { SegmentEditing } from './segment-editing';
-import { INITIAL_VIEW } from './segment-link';
+import { INITIAL_VIEW, linkOf, toHash } from './segment-link';
 import { SegmentOpening, type SegmentSource } from './segment-opening';
-import { type PartEvents, SegmentParts } from './segment-parts';
-import { SegmentSharing } from './segment-sharing';
+import { factsOf, MAP_FACT } from './segment-page';
+import { type PartEvents, SegmentParts, type SurfaceFormat } from './segment-parts';
+import { saveMap, saveSurfaces } from './segment-saving';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
@@ -30,20 +39,20 @@ const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
 };
 
 /**
- * The Segment lab: labels are painted on slices, and their surfaces follow. This class connects the lab's parts; opening,
- * editing and sharing are in files of their own.
+ * The Segment lab: labels are painted on slices, and their surfaces follow. Opening, editing and saving are in files of
+ * their own.
  */
-export class SegmentLab implements Lab {
-  readonly #root: HTMLElement;
-  readonly #closing = new AbortController();
-  readonly #client = new SegmentClient((event) => this.#onEvent(event));
-  readonly #ui: SegmentParts;
-  readonly #states: LabStates;
+export class SegmentLab extends LabShell<SegmentExample> {
+  protected readonly id = 'segment';
+  protected readonly client = new SegmentClient((event) => this.#onEvent(event));
+  protected readonly ui: SegmentParts;
+  protected readonly states: LabStates;
+  protected readonly opening: SegmentOpening;
   readonly #editing: SegmentEditing;
-  readonly #opening: SegmentOpening;
-  readonly #sharing: SegmentSharing;
   readonly #measures = new Map<number, LabelMeasures>();
   #volume: VolumeView | undefined;
+  /** Parameters of the surfaces in force. */
+  #params: ParamValues = {};
   /** Range of intensities of the mask that the editing has, as text; undefined if it has none. */
   #maskRange: string | undefined;
   #maskTimer = 0;
@@ -56,14 +65,14 @@ export class SegmentLab implements Lab {
   /** Number of times that surfaces were shown. */
   #updates = 0;
 
-  constructor(root: HTMLElement, help: HTMLElement, _passOn: OpenInLab) {
-    this.#root = root;
-    const { signal } = this.#closing;
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    super(root, help, passOn);
+    const { signal } = this.closing;
     const ui = new SegmentParts(root, signal, this.#events());
     const states = new LabStates(ui.banner, ui.status, signal);
-    this.#ui = ui;
-    this.#states = states;
-    this.#editing = new SegmentEditing(this.#client, {
+    this.ui = ui;
+    this.states = states;
+    this.#editing = new SegmentEditing(this.client, {
       onLabels: () => this.#showLabels(),
       onVoxels: () => ui.view.showLabels(),
       onUpdate: (update, smooth) => this.#take(update, smooth),
@@ -76,45 +85,30 @@ export class SegmentLab implements Lab {
       onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
       onError: (title, error) => states.fail(title, error),
     });
-    this.#opening = new SegmentOpening(this.#client, ui, states, {
+    this.opening = new SegmentOpening(this.client, ui, states, {
       adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
       labels: () => this.#editing.voxels?.slice(),
     });
-    this.#sharing = new SegmentSharing(this.#client, ui, states, this.#editing, this.#opening);
-    states.subscribe((state) => this.#showState(state));
     this.#applyTool(ui.tools.value);
-    offerShortcuts(this.#shortcuts(), help, GUIDES.segment, signal);
+    this.begin(this.#shortcuts());
   }
 
-  /** Opens what the address asks for, or else the first example. */
-  async start(_passedOn?: Handoff): Promise<void> {
-    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
-  }
-
-  close(): void {
-    this.#closing.abort();
+  protected override closed(): void {
     clearTimeout(this.#maskTimer);
-    this.#opening.close();
-    this.#client.close();
-    this.#ui.dispose();
-    delete this.#root.dataset.tool;
-    this.#root.replaceChildren();
+    delete this.root.dataset.tool;
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      onFiles: (files) => void this.#opening.files(files),
+      ...this.labEvents(),
       onMapFiles: (files) => void this.#openLabels(files),
-      onExample: (example) => void this.#opening.example(example),
       onParam: (name, value) => void this.#setParam(name, value),
       onOptions: () => this.#optionsChanged(),
-      onSaveMap: (format) => this.#sharing.saveMap(format),
-      onSaveSurfaces: (format) => this.#sharing.saveSurfaces(format),
-      onCopyLink: () => void this.#sharing.copyLink(),
+      onSaveMap: (format) =>
+        this.ask(saveMap(format, this.client, this.ui.saving, this.#editing.labels), text('segment.saveFailed')),
+      onSaveSurfaces: (format) => this.#saveSurfaces(format),
       onReset: () => void this.#reset(),
-      onCancel: () => void this.#opening.cancel(),
-      onDismiss: () => this.#dismiss(),
       onActive: (value) => this.#editing.setActive(value),
       onRename: (value, name) => this.#editing.rename(value, name),
       onColor: (value, color) => this.#editing.recolor(value, color),
@@ -135,7 +129,7 @@ export class SegmentLab implements Lab {
       key,
       shown: key,
       text: what,
-      act: () => this.#ui.tools.set({ tool: one }),
+      act: () => this.ui.tools.set({ tool: one }),
     });
     const travel = (direction: 'undo' | 'redo') => () => this.#travel(direction);
     return [
@@ -144,57 +138,56 @@ export class SegmentLab implements Lab {
       tool('e', 'eraser', text('segment.eraser')),
       tool('f', 'fill', text('segment.fill')),
       tool('v', 'navigate', text('segment.navigate')),
-      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.#ui.tools.changeRadius(-1) },
-      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.#ui.tools.changeRadius(1) },
-      { key: ',', shown: ',', text: text('segment.previousSliceKey'), act: () => this.#ui.view.goAlong(-1) },
-      { key: '.', shown: '.', text: text('segment.nextSliceKey'), act: () => this.#ui.view.goAlong(1) },
+      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.ui.tools.changeRadius(-1) },
+      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.ui.tools.changeRadius(1) },
+      { key: ',', shown: ',', text: text('segment.previousSliceKey'), act: () => this.ui.view.goAlong(-1) },
+      { key: '.', shown: '.', text: text('segment.nextSliceKey'), act: () => this.ui.view.goAlong(1) },
       { key: 'p', shown: 'p', text: text('segment.applyKey'), act: () => this.#apply() },
       { key: 'n', shown: 'n', text: text('segment.addKey'), act: () => this.#addLabel() },
       { key: 'u', shown: 'u', text: text('labs.undo'), act: travel('undo') },
       { key: 'z', ctrl: true, shown: text('labs.keyUndo'), text: text('labs.undo'), act: travel('undo') },
       { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: travel('redo') },
       { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: travel('redo') },
-      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }
 
   /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
   #adopt(opened: OpenedImage, { name, example, linked }: SegmentSource, reopening: boolean): void {
     const { volume, voxels, params } = opened;
-    this.#states.ready = true;
+    this.states.ready = true;
     this.#volume = volume;
-    this.#sharing.name = example?.id ?? name;
-    this.#sharing.params = params;
-    this.#ui.data.show(opened, example);
-    this.#ui.showParams(params);
+    this.ui.saving.name = example?.id ?? name;
+    this.#params = params;
+    this.ui.data.show(factsOf(opened, example), example);
+    this.ui.showParams(params);
     this.#forgetMask();
-    this.#ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
+    this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
     if (reopening) this.#editing.readopt(volume, opened);
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
-      this.#ui.tools.set({ range: example?.range ?? [...volume.window] });
-      this.#ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
+      this.ui.tools.set({ range: example?.range ?? [...volume.window] });
+      this.ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
     }
-    this.#applyTool(this.#ui.tools.value);
+    this.#applyTool(this.ui.tools.value);
     this.#showAll(opened);
   }
 
   /** Opens a label map of the open volume in place of the present one. */
   async #openLabels(files: File[]): Promise<void> {
     const volume = this.#volume;
-    if (!volume || !this.#states.canChange) return;
+    if (!volume || !this.states.canChange) return;
     const name = nameOf(files);
-    this.#states.load(text('labs.opening', { name }));
+    this.states.load(text('labs.opening', { name }));
     try {
-      const opened = await this.#client.request('openLabels', { files: await readFiles(files) });
-      this.#ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
+      const opened = await this.client.request('openLabels', { files: await readFiles(files) });
+      this.ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
-      this.#applyTool(this.#ui.tools.value);
-      this.#ui.data.showMap(opened.labelFile ?? name);
+      this.#applyTool(this.ui.tools.value);
+      this.ui.data.setFact(MAP_FACT, opened.labelFile ?? name);
       this.#showAll(opened);
     } catch (error) {
-      this.#states.fail(text('labs.openFailed', { name }), error);
+      this.states.fail(text('labs.openFailed', { name }), error);
     }
   }
 
@@ -210,9 +203,9 @@ export class SegmentLab implements Lab {
   #take(update: SurfaceUpdate, smooth: boolean): void {
     this.#show(update);
     const released = this.#released;
-    if (smooth) this.#ui.view.afterDrawing(() => this.#settle());
+    if (smooth) this.ui.view.afterDrawing(() => this.#settle());
     else if (update.surfaces.length > 0 && released !== undefined)
-      this.#ui.view.afterDrawing(() => {
+      this.ui.view.afterDrawing(() => {
         this.#latency = { first: performance.now() - released };
       });
   }
@@ -223,12 +216,12 @@ export class SegmentLab implements Lab {
     if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
     this.#released = undefined;
     this.#showMeasures();
-    if (this.#states.setModelState('done')) this.#ui.status.say(this.#describe());
+    if (this.states.setModelState('done')) this.ui.status.say(this.describe());
   }
 
   #show({ surfaces }: SurfaceUpdate): void {
     if (surfaces.length > 0) this.#updates += 1;
-    this.#ui.view.showSurfaces(surfaces);
+    this.ui.view.showSurfaces(surfaces);
     for (const { value, voxels, volume, area, surface } of surfaces) {
       const { vertices = 0, triangles = 0 } = surface ?? {};
       const version = (this.#measures.get(value)?.version ?? 0) + 1;
@@ -238,8 +231,8 @@ export class SegmentLab implements Lab {
   }
 
   #showMeasures(): void {
-    const unit = this.#opening.source?.example?.unit ?? 'mm';
-    this.#ui.measures.show(this.#editing.labels, this.#measures, unit, {
+    const unit = this.opening.source?.example?.unit ?? 'mm';
+    this.ui.measures.show(this.#editing.labels, this.#measures, unit, {
       latency: this.#latency,
       updates: this.#updates,
     });
@@ -249,10 +242,10 @@ export class SegmentLab implements Lab {
   #showLabels(): void {
     const { labels, active, hidden } = this.#editing;
     const visible = labels.filter(({ value }) => !hidden.has(value));
-    this.#ui.labels.show(labels, active, hidden);
-    this.#ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
+    this.ui.labels.show(labels, active, hidden);
+    this.ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
     const painted = labels.find(({ value }) => value === active);
-    this.#ui.view.showLabels({
+    this.ui.view.showLabels({
       colors: new Map(visible.map((label) => [label.value, rgbOf(label)])),
       names: new Map(labels.map(({ value, name }) => [value, name])),
       ...(painted && { paint: rgbOf(painted) }),
@@ -261,9 +254,9 @@ export class SegmentLab implements Lab {
   }
 
   #press(at: Parameters<PartEvents['press']>[0], axis: Parameters<PartEvents['press']>[1]) {
-    if (!this.#states.canChange) return undefined;
+    if (!this.states.canChange) return undefined;
     this.#isUnfilled = false;
-    const grip = this.#editing.press(at, axis, this.#ui.tools.value);
+    const grip = this.#editing.press(at, axis, this.ui.tools.value);
     if (!grip || this.#isUnfilled) return grip;
     this.#released = undefined;
     this.#latency = {};
@@ -271,16 +264,16 @@ export class SegmentLab implements Lab {
       this.#released = performance.now();
       grip.drop();
       // The surfaces may have followed before the pointer was released.
-      if (!this.#editing.isBusy) this.#ui.view.afterDrawing(() => this.#settle());
+      if (!this.#editing.isBusy) this.ui.view.afterDrawing(() => this.#settle());
     };
     return { move: grip.move, drop };
   }
 
   /** Applies the tool in use at the crosshair: the alternative to the pointer for the keyboard. */
   #apply(): void {
-    const { view, tools } = this.#ui;
-    if (!this.#states.canChange) return;
-    if (tools.value.tool === 'navigate') this.#ui.status.say(text('segment.applyNothing'));
+    const { view, tools } = this.ui;
+    if (!this.states.canChange) return;
+    if (tools.value.tool === 'navigate') this.ui.status.say(text('segment.applyNothing'));
     else {
       this.#latency = {};
       this.#released = performance.now();
@@ -289,11 +282,11 @@ export class SegmentLab implements Lab {
   }
 
   #addLabel(): void {
-    if (this.#states.canChange && !this.#editing.add()) this.#ui.labels.showError(text('segment.noRoom'));
+    if (this.states.canChange && !this.#editing.add()) this.ui.labels.showError(text('segment.noRoom'));
   }
 
   #travel(direction: 'undo' | 'redo'): void {
-    if (!this.#states.canChange) return;
+    if (!this.states.canChange) return;
     this.#latency = {};
     this.#released = performance.now();
     this.#editing.travel(direction);
@@ -304,19 +297,19 @@ export class SegmentLab implements Lab {
     const voxel = Math.min(...(this.#volume?.spacing ?? [1]));
     const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
     // Half a voxel more, as the brush covers.
-    this.#ui?.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
-    this.#root.dataset.tool = tool;
+    this.ui?.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
+    this.root.dataset.tool = tool;
     this.#followRange(settings);
   }
 
   /** Asks the worker which voxels are in the range of intensities, if the tool in use needs that, and it is another one. */
   #followRange(settings: ToolSettings): void {
-    if (!this.#editing || !this.#states.ready) return;
+    if (!this.#editing || !this.states.ready) return;
     const { range } = settings;
     const wanted = range.join(' ');
     const isKnown = wanted === this.#maskRange;
     const isUsed = usesRange(settings);
-    this.#ui.view.showLabels({ mask: isUsed && isKnown ? this.#editing.mask : undefined });
+    this.ui.view.showLabels({ mask: isUsed && isKnown ? this.#editing.mask : undefined });
     if (!isUsed || isKnown) return;
     this.#forgetMask();
     this.#maskTimer = window.setTimeout(() => void this.#requestMask(range, wanted), MASK_DELAY);
@@ -324,13 +317,13 @@ export class SegmentLab implements Lab {
 
   async #requestMask([low, high]: [number, number], wanted: string): Promise<void> {
     try {
-      const mask = await this.#client.request('mask', { low, high });
+      const mask = await this.client.request('mask', { low, high });
       if (mask.length !== this.#editing.voxels?.length) return;
       this.#maskRange = wanted;
       this.#editing.mask = mask;
-      this.#followRange(this.#ui.tools.value);
+      this.#followRange(this.ui.tools.value);
     } catch (error) {
-      this.#states.fail(text('labs.requestFailed'), error);
+      this.states.fail(text('labs.requestFailed'), error);
     }
   }
 
@@ -341,29 +334,29 @@ export class SegmentLab implements Lab {
   }
 
   #setParam(name: string, value: unknown): Promise<void> {
-    return this.#states.enqueue(async () => {
-      if (!this.#states.canChange) return;
+    return this.states.enqueue(async () => {
+      if (!this.states.canChange) return;
       try {
-        const params = await this.#client.request('setParams', { [name]: value });
-        this.#sharing.params = params;
-        this.#ui.showParams(params);
+        const params = await this.client.request('setParams', { [name]: value });
+        this.#params = params;
+        this.ui.showParams(params);
         this.#released = undefined;
         this.#latency = {};
         this.#editing.follow();
       } catch (error) {
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
-        this.#ui.showParams(this.#sharing.params);
-        this.#ui.refuseParam(name, message);
+        if (code === 'internal') this.states.fail(text('labs.requestFailed'), error);
+        this.ui.showParams(this.#params);
+        this.ui.refuseParam(name, message);
       }
     });
   }
 
   #optionsChanged(): void {
-    if (this.#states?.ready) this.#sharing.updateAddress();
+    if (this.states?.ready) this.updateAddress();
   }
 
-  #describe(): string {
+  protected describe(): string {
     const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
     const labels = plural('segment.surfaces', present.length);
     const { smooth } = this.#latency;
@@ -372,24 +365,31 @@ export class SegmentLab implements Lab {
   }
 
   #onEvent({ failure }: WorkerEvent): void {
-    this.#states.fail(text('labs.requestFailed'), new RequestError(failure));
+    this.states.fail(text('labs.requestFailed'), new RequestError(failure));
   }
 
-  #showState(state: LabState): void {
-    const { modelState, ready } = this.#states;
-    this.#root.dataset.state = state;
-    this.#ui.showState(modelState, ready);
-    if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
+  protected showControls(state: LabState): void {
+    this.ui.showState(state, this.states.ready);
+  }
+
+  protected address({ example, name: file }: SegmentSource): string {
+    const { defaults } = this.opening;
+    return toHash(linkOf({ example, file, params: this.#params, defaults, view: this.ui.options.value }));
+  }
+
+  protected override linkLacks(): string[] {
+    return [text('segment.linkLacksLabels')];
+  }
+
+  #saveSurfaces(format: SurfaceFormat): void {
+    const saving = saveSurfaces(format, this.client, this.ui.saving, this.#editing.labels, this.ui.view.surfaces());
+    this.ask(saving, text('segment.saveFailed'));
   }
 
   /** Opens volume and label map again; after a failure of the engine, with the present labels. */
   async #reset(): Promise<void> {
-    const { source } = this.#opening;
-    if (this.#states.engineBroken) await this.#opening.reopen();
-    else if (this.#states.canChange && source) await this.#opening.again();
-  }
-
-  #dismiss(): void {
-    if (this.#states.dismiss()) this.#ui.status.say(this.#describe());
+    const { source } = this.opening;
+    if (this.states.engineBroken) await this.opening.reopen();
+    else if (this.states.canChange && source) await this.opening.again();
   }
 }

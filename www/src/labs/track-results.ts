@@ -164,7 +164,8 @@ export class TrackResults {
     this.showCurve();
     this.showFigures();
     this.#ui.transport.showReport(this.#history.reports.at(-1));
-    this.#ui.showState(this.#states.modelState, this.#states.ready, this.#frames.length, tracked !== undefined);
+    const { value, modelState, ready } = this.#states;
+    this.#ui.showState(value, modelState, ready, this.#frames.length, tracked !== undefined);
     this.#root.dataset.frame = String(this.#frame + 1);
   }
 

@@ -36,6 +36,16 @@ export function section(title: string, ...children: (Node | string)[]): HTMLElem
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
 }
 
+/** Creates a titled section for a column of a lab's page that is collapsed until the user opens it. */
+export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
+  return h('details', { class: 'panel' }, h('summary', {}, h('h2', {}, title)), ...children);
+}
+
+/** Creates a button as wide as its column; `action` identifies it in the page. */
+export function wideButton(text: string, action: string, onclick: () => void): HTMLButtonElement {
+  return h('button', { type: 'button', class: 'wide', 'data-action': action, onclick }, text);
+}
+
 /**
  * Creates an element that shows a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the
  * part after an underscore.

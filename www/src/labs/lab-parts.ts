@@ -1,0 +1,210 @@
+import type { MeshFormat, ParamSpec, ParamValues } from '../protocol';
+import type { LabState } from '../state';
+import { text } from '../texts';
+import { folded, h, section, wideButton } from '../ui/dom';
+import { ExportButtons } from '../ui/exports';
+import { acceptDrops } from '../ui/files';
+import type { History } from '../ui/history';
+import { ParamControls } from '../ui/params';
+import { ErrorBanner, StatusLine } from '../ui/status';
+import { Transport, type TransportEvents } from '../ui/transport';
+import type { ExamplePanel, Listed } from './example-panel';
+import { Saving } from './saving';
+
+/** The user's actions that all labs have. */
+export interface LabEvents<Example> {
+  onFiles: (files: File[]) => void;
+  onExample: (example: Example) => void;
+  onExampleId: (id: string) => void;
+  onParam: (name: string, value: unknown) => void;
+  onCancel: () => void;
+  onDismiss: () => void;
+  onCopyLink: () => void;
+  onError: (title: string, error: unknown) => void;
+}
+
+/** The user's actions in a lab whose model runs. */
+export interface RunEvents<Example> extends LabEvents<Example>, TransportEvents {}
+
+/** Contents that differ between the labs. */
+interface PartsOptions<Example extends Listed> {
+  /** Name of the 3D view, for screen readers. */
+  viewLabel: string;
+  /** Text shown while files are dragged over the page. */
+  drop: string;
+  /** Called when a folder is dropped; without it, folders are not accepted. */
+  onFolder?: (folder: FileSystemDirectoryHandle) => void;
+  data: ExamplePanel<Example>;
+  /** Names of parameters that have controls of their own. */
+  ownControls?: string[];
+}
+
+interface RunPartsOptions<Example extends Listed> extends PartsOptions<Example> {
+  history: History;
+  /** Returns the present surface as a file. */
+  fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  /** Heading of the column of residuals in the data of the plots. */
+  residual?: string;
+}
+
+/** Arrangement of a lab's elements on its page. */
+interface Layout {
+  /** Class of the lab's page, besides `lab`. */
+  name: string;
+  options: HTMLElement;
+  /** Elements over the 3D view. */
+  over?: HTMLElement[];
+  /** Elements beside the 3D view. */
+  beside?: HTMLElement[];
+  /** Returns the contents of the middle of the page, among them the view and the status line. */
+  stage: (view: HTMLElement, status: HTMLElement) => HTMLElement[];
+  setup: HTMLElement[];
+  results: HTMLElement[];
+}
+
+/**
+ * Controls and views of a lab, laid out: here those that all labs have. They display what they are given and report the
+ * user's actions as events.
+ */
+export abstract class LabParts<Example extends Listed> {
+  readonly status = new StatusLine();
+  readonly banner: ErrorBanner;
+  readonly data: ExamplePanel<Example>;
+  readonly saving = new Saving((message) => this.status.say(message));
+  protected readonly root: HTMLElement;
+  protected readonly canvas: HTMLCanvasElement;
+  readonly #link: HTMLButtonElement;
+  protected readonly cancel: HTMLButtonElement;
+  readonly #paramsHolder = h('div');
+  readonly #drop: HTMLElement;
+  readonly #ownControls: string[];
+  readonly #onParam: LabEvents<Example>['onParam'];
+  #params: ParamControls | undefined;
+
+  /** Files dropped on the page are accepted until `signal` is aborted. */
+  constructor(
+    root: HTMLElement,
+    signal: AbortSignal,
+    events: LabEvents<Example>,
+    { viewLabel, drop, onFolder, data, ownControls = [] }: PartsOptions<Example>,
+  ) {
+    this.root = root;
+    this.data = data;
+    this.#ownControls = ownControls;
+    this.#onParam = events.onParam;
+    this.canvas = h('canvas', { tabindex: 0, role: 'application', 'aria-label': viewLabel });
+    this.banner = new ErrorBanner(events.onDismiss);
+    this.#link = wideButton(text('labs.copyLink'), 'link', events.onCopyLink);
+    this.cancel = h(
+      'button',
+      { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
+      text('labs.cancel'),
+    );
+    this.#drop = h('div', { class: 'drop', hidden: true }, drop);
+    acceptDrops(this.#drop, events.onFiles, signal, onFolder);
+  }
+
+  protected layOut({ name, options, over = [], beside = [], stage, setup, results }: Layout): void {
+    this.root.className = `lab ${name}`;
+    const scene = h('div', { class: 'scene' }, this.canvas, ...over);
+    const pictures = h('div', { class: 'pictures' }, scene, ...beside);
+    const view = h('div', { class: 'view' }, options, pictures, this.banner.element, this.#drop);
+    const status = h('div', { class: 'saying' }, this.status.element, this.cancel);
+    this.root.replaceChildren(
+      h('div', { class: 'stage' }, ...stage(view, status)),
+      h('div', { class: 'column setup' }, ...setup),
+      h('div', { class: 'column results' }, ...results),
+    );
+  }
+
+  /** Makes the controls of the method's parameters, once these are known. */
+  makeParams(specs: ParamSpec[]): void {
+    if (this.#params) return;
+    this.#params = new ParamControls(specs, this.#ownControls, this.#onParam);
+    this.#paramsHolder.replaceWith(this.#params.element);
+  }
+
+  labelOf(param: string): string {
+    return this.#params?.labelOf(param) ?? param;
+  }
+
+  /** Displays the parameters in force. */
+  protected displayParams(params: ParamValues): void {
+    this.#params?.show(params);
+  }
+
+  protected hideParams(hidden: Record<string, boolean>): void {
+    this.#params?.hide(hidden);
+  }
+
+  /** Shows why a value was refused, beside its control, which displays the value in force again. */
+  refuseParam(name: string, message: string, inForce?: ParamValues): void {
+    if (inForce) this.#params?.show(inForce);
+    this.#params?.showError(name, message);
+  }
+
+  /** Creates the section of the method's parameters, which is open on a wide page if `isOpen`. */
+  protected paramsSection(isOpen = false): HTMLElement {
+    const panel = folded(text('labs.parameters'), this.#paramsHolder);
+    panel.open = isOpen && matchMedia('(min-width: 700px)').matches;
+    return panel;
+  }
+
+  /** Creates the section that saves and shares results. */
+  protected saveSection(...elements: HTMLElement[]): HTMLElement {
+    return section(text('labs.sectionSave'), ...elements, this.#link);
+  }
+
+  /** Shows the button that cancels loading; returns whether nothing is being loaded. */
+  protected showLoading(state: LabState, ready: boolean): boolean {
+    this.cancel.hidden = state !== 'loading' || !ready;
+    return ready && state !== 'loading';
+  }
+
+  abstract dispose(): void;
+}
+
+/** Controls and views of a lab whose model runs. */
+export abstract class RunParts<Example extends Listed> extends LabParts<Example> {
+  readonly transport: Transport;
+  protected readonly exports: ExportButtons;
+  readonly csv: HTMLButtonElement;
+  protected readonly history: History;
+
+  constructor(
+    root: HTMLElement,
+    signal: AbortSignal,
+    events: RunEvents<Example>,
+    { history, fetchMesh, residual, ...options }: RunPartsOptions<Example>,
+  ) {
+    super(root, signal, events, options);
+    this.history = history;
+    this.transport = new Transport(events);
+    this.exports = new ExportButtons((format, type) => {
+      fetchMesh(format)
+        .then((bytes) => this.saving.bytes(format, bytes, type, this.suffix))
+        .catch((error) => events.onError(text('labs.saveFailed'), error));
+    });
+    this.csv = h(
+      'button',
+      { type: 'button', disabled: true, onclick: () => this.saving.plots(history, residual) },
+      text('labs.plotData'),
+    );
+  }
+
+  /**
+   * Enables and disables controls according to the lab's state, and that of the model `beneath` an error. Returns
+   * whether nothing is being loaded.
+   */
+  protected showRunState(state: LabState, beneath: LabState, ready: boolean): boolean {
+    const idle = this.showLoading(state, ready);
+    this.transport.showState(beneath, ready);
+    this.exports.enabled = idle;
+    return idle;
+  }
+
+  /** Added to the names of saved surfaces, to distinguish several of the same data. */
+  protected get suffix(): string {
+    return '';
+  }
+}

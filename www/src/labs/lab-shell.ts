@@ -1,0 +1,237 @@
+import { RequestError } from '../channel';
+import { GUIDES } from '../guides';
+import type { Failure } from '../protocol';
+import type { LabState } from '../state';
+import { plural, text } from '../texts';
+import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
+import type { Listed } from './example-panel';
+import type { LabEvents, LabParts, RunEvents, RunParts } from './lab-parts';
+import type { LabStates } from './lab-states';
+import type { Handoff, Lab, OpenInLab } from './labs';
+import type { Opening, Source } from './opening';
+
+/** Events that the workers of all labs send. */
+type EngineEvent = { event: 'failure'; failure: Failure } | { event: 'state'; state: 'running' | 'paused' | 'done' };
+
+/** The lab's worker, as the shell uses it. */
+interface Engine {
+  close(): void;
+}
+
+/** The worker of a lab whose model runs. */
+interface RunEngine extends Engine {
+  request(kind: 'play' | 'pause', body: undefined): Promise<unknown>;
+  request(kind: 'step', body: { count: number }): Promise<unknown>;
+}
+
+type AnySource<Example> = Source<Example, unknown, unknown>;
+
+/**
+ * The common part of all labs: opening, states and failures, links and shortcuts. A lab extends it and calls
+ * {@link begin} at the end of its constructor.
+ */
+export abstract class LabShell<Example extends Listed> implements Lab {
+  protected readonly root: HTMLElement;
+  protected readonly passOn: OpenInLab;
+  /** Aborted when the lab is closed, which removes all event listeners. */
+  protected readonly closing = new AbortController();
+  readonly #help: HTMLElement;
+
+  protected abstract readonly id: keyof typeof GUIDES;
+  protected abstract readonly client: Engine;
+  protected abstract readonly ui: LabParts<Example>;
+  protected abstract readonly states: LabStates;
+  // biome-ignore lint/suspicious/noExplicitAny: the shell does not look into links, data and models
+  protected abstract readonly opening: Opening<Example, any, any, any>;
+
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    this.root = root;
+    this.#help = help;
+    this.passOn = passOn;
+  }
+
+  /** Returns the text for the status line in the present state. */
+  protected abstract describe(): string;
+
+  /** Returns the hash of an address that restores what is open and the settings in force. */
+  protected abstract address(source: AnySource<Example>): string;
+
+  /** Enables and disables controls according to the lab's state. */
+  protected abstract showControls(state: LabState): void;
+
+  /** Returns what a copied link does not contain, as sentences; false: none. */
+  protected linkLacks(): (string | false)[] {
+    return [];
+  }
+
+  /** Releases what the lab has besides worker and views. */
+  protected closed(): void {}
+
+  /** Begins to follow the lab's state and to listen to the keyboard. */
+  protected begin(shortcuts: Shortcut[]): void {
+    this.states.subscribe((state) => this.#showState(state));
+    const onEscape = {
+      key: 'Escape',
+      shown: text('labs.keyEscape'),
+      text: this.escapeText,
+      act: () => this.escape(),
+    };
+    offerShortcuts([...shortcuts, onEscape], this.#help, GUIDES[this.id], this.closing.signal);
+  }
+
+  /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
+  async start(passedOn?: Handoff): Promise<void> {
+    const open = passedOn && (() => this.opening.passedOn(passedOn));
+    await this.opening.start(this.closing.signal, () => this.updateAddress(), open);
+  }
+
+  close(): void {
+    this.closing.abort();
+    this.opening.close();
+    this.client.close();
+    this.closed();
+    this.ui.dispose();
+    this.root.replaceChildren();
+  }
+
+  protected labEvents(): Omit<LabEvents<Example>, 'onParam'> {
+    return {
+      onFiles: (files) => void this.opening.files(files),
+      onExample: (example) => void this.opening.example(example),
+      onExampleId: (id) => this.opening.byId(id),
+      onCancel: () => void this.opening.cancel(),
+      onDismiss: () => this.dismiss(),
+      onCopyLink: () => void this.#copyLink(),
+      onError: (title, error) => this.states.fail(title, error),
+    };
+  }
+
+  /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
+  protected updateAddress(): void {
+    const { source } = this.opening;
+    if (source && (this.states.value !== 'loading' || this.states.ready)) showAddress(this.address(source));
+  }
+
+  /** Shows an error message if a request fails, without waiting for the reply. */
+  protected ask(request: Promise<unknown>, title = text('labs.requestFailed')): void {
+    request.catch((error) => this.states.fail(title, error));
+  }
+
+  protected dismiss(): void {
+    if (this.states.dismiss()) this.ui.status.say(this.describe());
+  }
+
+  /** Called for the Escape key; by default, it dismisses the error message. */
+  protected escape(): void {
+    this.dismiss();
+  }
+
+  protected get escapeText(): string {
+    return text('labs.dismissKey');
+  }
+
+  async #copyLink(): Promise<void> {
+    this.updateAddress();
+    await copyAddress(this.ui.status, [!this.opening.source?.example && FILE_NOTE, ...this.linkLacks()]);
+  }
+
+  #showState(state: LabState): void {
+    this.root.dataset.state = state;
+    this.showControls(state);
+    if (state === 'done' || state === 'paused') this.updateAddress();
+  }
+}
+
+/** The common part of labs whose model runs: play, pause, step and reset. */
+export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
+  protected abstract override readonly client: RunEngine;
+  protected abstract override readonly ui: RunParts<Example>;
+
+  /** Undoes or redoes a change. */
+  protected abstract travel(way: 'undo' | 'redo'): Promise<void>;
+
+  /** Builds the model again with the same settings, without running it, and clears the results. */
+  protected abstract startOver(): Promise<void>;
+
+  /** Called when the model's state has become that of the lab. */
+  protected abstract settled(state: 'running' | 'paused' | 'done'): void;
+
+  /** Called before the model runs or steps; `change` names that for undo. */
+  protected beforeRun(_change: string, _isStep: boolean): void {}
+
+  /** Whether the model can run now. */
+  protected get canPlay(): boolean {
+    return this.states.canRun;
+  }
+
+  /** Whether the model can do single steps now. */
+  protected get canStep(): boolean {
+    return this.states.canRun;
+  }
+
+  protected runEvents(): Omit<RunEvents<Example>, 'onParam'> {
+    return {
+      ...this.labEvents(),
+      onToggle: () => this.#toggle(),
+      onStep: (steps) => this.#step(steps),
+      onReset: () => void this.#reset(),
+      onUndo: () => void this.travel('undo'),
+      onRedo: () => void this.travel('redo'),
+    };
+  }
+
+  protected beginRuns(own: Shortcut[] = [], toggleText?: string): void {
+    this.begin(labShortcuts(this.runEvents(), own, toggleText));
+  }
+
+  /** Takes the events that the workers of all labs send; returns whether this was one of them. */
+  protected isTaken(event: { event: string }): event is EngineEvent {
+    const sent = event as EngineEvent;
+    if (sent.event === 'failure') this.states.fail(text('labs.runFailed'), new RequestError(sent.failure));
+    else if (sent.event !== 'state') return false;
+    else if (this.states.setModelState(sent.state)) this.settled(sent.state);
+    return true;
+  }
+
+  /** Opens the present surface in the Sculpt lab, as a mesh to deform. */
+  protected toSculpt(mesh: Promise<Uint8Array>, name = text('labs.surfaceName', { name: this.ui.saving.name })): void {
+    this.ask(
+      mesh.then((bytes) => this.passOn({ lab: 'sculpt', name, bytes, params: {} })),
+      text('labs.toSculptFailed'),
+    );
+  }
+
+  #toggle(): void {
+    const running = this.states.value === 'running';
+    if (!running && !this.canPlay) return;
+    this.ui.banner.hide();
+    if (!running) this.beforeRun(text('labs.play'), false);
+    this.ask(this.client.request(running ? 'pause' : 'play', undefined));
+  }
+
+  #step(steps: number): void {
+    if (!this.canStep || this.states.value === 'running') return;
+    this.ui.banner.hide();
+    this.beforeRun(plural('counts.step', steps), true);
+    this.ask(this.client.request('step', { count: steps }));
+  }
+
+  /** Enters the loading state while `work` builds a model; then the model is ready to start. */
+  protected async building(work: () => Promise<void>): Promise<void> {
+    this.states.load(text('labs.resetting'));
+    try {
+      await work();
+      this.states.idle(text('labs.readyToStart'));
+    } catch (error) {
+      this.states.fail(text('labs.buildFailed'), error);
+    }
+  }
+
+  /** Starts over; after a failure of the engine, opens the data again. */
+  async #reset(): Promise<void> {
+    const { ready, value, engineBroken } = this.states;
+    if (!ready || value === 'loading') return;
+    await (engineBroken ? this.opening.reopen() : this.startOver());
+  }
+}

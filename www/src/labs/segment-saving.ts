@@ -1,0 +1,50 @@
+/** Saves label map and surfaces of the Segment lab as files. */
+
+import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { SegmentClient } from '../segment/client';
+import type { Label } from '../segment/labels';
+import type { VolumeFormat } from '../segment/protocol';
+import type { SegmentView } from '../view/segmentation';
+import type { Saving } from './saving';
+import type { SurfaceFormat } from './segment-parts';
+
+/** Extension and media type of the files of label maps. */
+const MAPS: Record<VolumeFormat, [string, string]> = {
+  nifti: ['nii.gz', 'application/gzip'],
+  nrrd: ['seg.nrrd', 'application/octet-stream'],
+  mha: ['mha', 'application/octet-stream'],
+};
+
+export async function saveMap(
+  format: VolumeFormat,
+  client: SegmentClient,
+  saving: Saving,
+  labels: readonly Label[],
+): Promise<void> {
+  const [extension, type] = MAPS[format];
+  saving.bytes(extension, await client.request('exportMap', { format, labels }), type, '-labels');
+}
+
+/**
+ * Saves the surfaces: as one GLB, with a node for each label that has its name and colour, or else as files of the same
+ * format, one a label, in a ZIP archive.
+ */
+export async function saveSurfaces(
+  format: SurfaceFormat,
+  client: SegmentClient,
+  saving: Saving,
+  labels: readonly Label[],
+  surfaces: ReturnType<SegmentView['surfaces']>,
+): Promise<void> {
+  if (format === 'glb') {
+    const { toGlb } = await import('../segment/glb');
+    return saving.bytes('glb', await toGlb(labels, surfaces), 'model/gltf-binary', '-labels');
+  }
+  const files: Record<string, Uint8Array> = {};
+  for (const { value, name } of labels) {
+    if (!surfaces.has(value)) continue;
+    const stem = `${value}-${name.replace(/[^\p{L}\p{N}]+/gu, '-')}`;
+    files[`${stem}.${format}`] = await client.request('exportMesh', { value, format });
+  }
+  saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip', `-${format}`);
+}

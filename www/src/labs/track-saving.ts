@@ -1,0 +1,31 @@
+import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { TrackClient } from '../track/client';
+import type { Saving } from './saving';
+import { framesCsv } from './track-measures';
+import type { TrackResults } from './track-results';
+
+/**
+ * Saves all tracked frames: their surfaces as PLY files in one ZIP archive, as one animation, or their measures as a
+ * table.
+ */
+export async function saveTrack(
+  what: 'frames' | 'animation' | 'table',
+  client: TrackClient,
+  saving: Saving,
+  { frames, truth }: TrackResults,
+): Promise<void> {
+  if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth)), 'text/csv');
+  else if (what === 'animation') saving.bytes('glb', await client.request('animation', undefined), 'model/gltf-binary');
+  else saving.bytes('zip', await archive(frames.length, client), 'application/zip');
+}
+
+async function archive(frames: number, client: TrackClient): Promise<Uint8Array> {
+  const files: Record<string, Uint8Array> = {};
+  const digits = String(frames).length;
+  for (let frame = 0; frame < frames; frame++) {
+    const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
+    files[name] = await client.request('export', { frame, format: 'ply' });
+  }
+  // Fast compression: coordinates hardly compress anyway.
+  return zipSync(files, { level: 1 });
+}
