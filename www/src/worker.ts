@@ -1,9 +1,8 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 
-import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
+import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
 import type {
   Attractor,
-  Coverage,
   DataEvent,
   ImageSource,
   LargeSource,
@@ -15,12 +14,11 @@ import type {
   ParamValues,
   Plane,
   Ready,
-  RequestKind,
   Requests,
+  ReturnMessage,
   SavedRun,
   Setup,
   SurfaceBuffers,
-  ToWorker,
   VertexQuantity,
   WorkerEvent,
 } from './protocol';
@@ -29,7 +27,7 @@ import { compare } from './worker/compare';
 import type { LargeVolume } from './worker/large';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
-import { buffersOf, reply, stop, type Task, withTransfer } from './worker/serving';
+import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
@@ -55,13 +53,7 @@ const MOST_REPORTS = 50;
 /** The contents of a snapshot besides the surface: none, its measures, or measures and mesh checks. */
 type Detail = 'plain' | 'measured' | 'checked';
 
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
-
-function send(event: WorkerEvent, transfer: Transferable[] = []): void {
-  self.postMessage(event, { transfer });
-}
+const send = sender<WorkerEvent>();
 
 class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
@@ -84,15 +76,11 @@ class Session {
   #data: Omit<DataEvent, 'event'> | undefined;
   /** Aborts the opening of a volume larger than memory. */
   #opening: AbortController | undefined;
-  #run: Task | undefined;
-  #comparison: Task | undefined;
-  #coverageRun: Task | undefined;
+  readonly #run = new Work();
+  readonly #comparison = new Work();
+  readonly #coverageRun = new Work();
 
-  readonly handlers: Handlers = {
-    hello: async () => {
-      await starting;
-      return { version: version(), specs: paramSpecs('deformable') };
-    },
+  readonly handlers: Handlers<Requests> = {
     load: ({ name, source, setup }) => this.#load(name, source, setup),
     cancelLoad: () => {
       this.#opening?.abort();
@@ -111,9 +99,9 @@ class Session {
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     compare: (setup) => this.#compare(setup),
-    cancelCompare: () => this.#cancelCompare(),
+    cancelCompare: () => this.#comparison.stop(),
     coverage: () => this.#coverage(),
-    cancelCoverage: () => stop(this.#coverageRun),
+    cancelCoverage: () => this.#coverageRun.stop(),
     seed: () => this.#seed(),
   };
 
@@ -174,7 +162,7 @@ class Session {
   }
 
   #replaceModel(model: DeformableModel, detail: Detail = 'checked'): Ready {
-    this.#coverageRun?.abort.abort();
+    this.#coverageRun.abort();
     this.#model?.free();
     this.#model = model;
     this.#levels = model.level;
@@ -198,18 +186,14 @@ class Session {
   }
 
   async #play(): Promise<undefined> {
-    await this.#cancelCompare();
+    await this.#comparison.stop();
     const model = this.#current();
-    if (!this.#run) this.#begin(model);
+    if (!this.#run.isUnderWay) void this.#begin(model);
   }
 
-  /** Starts a run, unless one is in progress. */
-  #begin(model: DeformableModel, maxIterations = Number.MAX_SAFE_INTEGER): Task {
-    const abort = new AbortController();
-    const run = { abort, ended: this.#runToEnd(model, abort.signal, maxIterations) };
-    this.#run = run;
+  #begin(model: DeformableModel, maxIterations = Number.MAX_SAFE_INTEGER): Promise<void> {
     send({ event: 'state', state: 'running' });
-    return run;
+    return this.#run.begin((signal) => this.#runToEnd(model, signal, maxIterations));
   }
 
   async #runToEnd(model: DeformableModel, signal: AbortSignal, maxIterations: number): Promise<void> {
@@ -225,7 +209,6 @@ class Session {
     }
     // Nothing is read any more, whatever was to come.
     if (this.#data) send({ event: 'data', ...this.#data, waiting: 0 });
-    this.#run = undefined;
     this.#reportStopped();
   }
 
@@ -260,9 +243,8 @@ class Session {
   }
 
   async #pause(): Promise<undefined> {
-    await this.#cancelCompare();
-    // Another may begin before this goes on.
-    while (this.#run) await stop(this.#run);
+    await this.#comparison.stop();
+    return this.#run.stop();
   }
 
   async #step(count: number): Promise<undefined> {
@@ -270,7 +252,7 @@ class Session {
     const model = this.#current();
     if (this.#large) {
       // A step may have to wait for data.
-      await this.#begin(model, count).ended;
+      await this.#begin(model, count);
       return;
     }
     for (let i = 0; i < count && !this.#done; i++) this.#stepped(model.step(1));
@@ -309,7 +291,7 @@ class Session {
 
   #setQuantity(quantity: VertexQuantity | undefined): undefined {
     this.#quantity = quantity;
-    if (this.#model && !this.#run) this.#snapshot('checked');
+    if (this.#model && !this.#run.isUnderWay) this.#snapshot('checked');
   }
 
   #save(): SavedRun {
@@ -346,50 +328,38 @@ class Session {
       model.free();
       throw error;
     }
-    this.#coverageRun?.abort.abort();
+    this.#coverageRun.abort();
     this.#model?.free();
     this.#model = model;
   }
 
   async #compare(setup: Setup): Promise<Requests['compare']['reply']> {
     await this.#pause();
-    const abort = new AbortController();
-    const result = compare(this.#image(), setup, abort.signal, (run, report) =>
-      send({ event: 'comparing', run, report }),
+    const image = this.#image();
+    return this.#comparison.begin((signal) =>
+      compare(image, setup, signal, (run, report) => send({ event: 'comparing', run, report })),
     );
-    this.#comparison = { abort, ended: result };
-    try {
-      return await result;
-    } finally {
-      this.#comparison = undefined;
-    }
-  }
-
-  async #cancelCompare(): Promise<undefined> {
-    await stop(this.#comparison);
   }
 
   async #coverage(): Promise<MeasuredCoverage | undefined> {
     this.#image();
-    await stop(this.#coverageRun);
+    await this.#coverageRun.stop();
+    const model = this.#current();
     const iteration = this.#iteration;
-    const abort = new AbortController();
     let reportedAt = 0;
     const onProgress = (share: number) => {
       if (performance.now() - reportedAt < TELL_EVERY) return;
       reportedAt = performance.now();
       send({ event: 'covering', share });
     };
-    const work: Task = { abort, ended: this.#current().coverage({ signal: abort.signal, onProgress }) };
-    this.#coverageRun = work;
-    try {
-      return { ...((await work.ended) as Coverage), iteration };
-    } catch (error) {
-      if (abort.signal.aborted) return undefined;
-      throw error;
-    } finally {
-      if (this.#coverageRun === work) this.#coverageRun = undefined;
-    }
+    return this.#coverageRun.begin(async (signal) => {
+      try {
+        return { ...(await model.coverage({ signal, onProgress })), iteration };
+      } catch (error) {
+        if (signal.aborted) return undefined;
+        throw error;
+      }
+    });
   }
 
   async #seed(): Promise<number> {
@@ -402,7 +372,7 @@ class Session {
 
   #setPlanes(planes: Plane[]): undefined {
     this.#planes = planes;
-    if (this.#model && !this.#run) {
+    if (this.#model && !this.#run.isUnderWay) {
       const sections = this.#sections(this.#model.mesh);
       send({ event: 'sections', sections }, buffersOf(sections));
     }
@@ -434,13 +404,5 @@ class Session {
   }
 }
 
-// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
-const starting = init();
-starting.catch(() => undefined);
-
 const session = new Session();
-
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  if (data.kind === 'return') session.takeBack(data.buffers);
-  else void reply(session.handlers, data);
-};
+serve('deformable', session.handlers, ({ buffers }: ReturnMessage) => session.takeBack(buffers));

@@ -1,10 +1,10 @@
 /** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
 
-import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
+import type { ImplicitSurface, StepReport } from 'vesicle';
 import type { Surface } from '../protocol';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { buffersOf, reply, stop, type Task } from '../worker/serving';
+import { buffersOf, type Handlers, sender, serve, Work } from '../worker/serving';
 import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
 import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
@@ -15,10 +15,8 @@ import type {
   ParamValues,
   PointQuantity,
   Ready,
-  RequestKind,
   Requests,
   Setup,
-  ToWorker,
   WorkerEvent,
 } from './protocol';
 import { timeSolves } from './timing';
@@ -28,13 +26,7 @@ const PREVIEW_EVERY = 100;
 /** Least milliseconds between two progress events during a run. */
 const REPORT_EVERY = 50;
 
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
-
-function send(event: WorkerEvent, transfer: Transferable[] = []): void {
-  self.postMessage(event, { transfer });
-}
+const send = sender<WorkerEvent>();
 
 class Session {
   #cloud: Cloud | undefined;
@@ -55,14 +47,10 @@ class Session {
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
-  #run: Task | undefined;
-  #timing: Task | undefined;
+  readonly #run = new Work();
+  readonly #timing = new Work();
 
-  readonly handlers: Handlers = {
-    hello: async () => {
-      await starting;
-      return { version: version(), specs: paramSpecs('implicit') };
-    },
+  readonly handlers: Handlers<Requests> = {
     load: (body) => this.#load(body),
     rebuild: (setup) => this.#rebuild(setup),
     play: () => this.#play(),
@@ -74,7 +62,7 @@ class Session {
     volume: ({ size }) => this.#volume(size),
     quantity: (quantity) => this.#setQuantity(quantity),
     timing: (body) => this.#time(body),
-    cancelTiming: () => stop(this.#timing),
+    cancelTiming: () => this.#timing.stop(),
   };
 
   shown(): void {
@@ -133,12 +121,11 @@ class Session {
   }
 
   async #play(): Promise<undefined> {
-    await stop(this.#timing);
+    await this.#timing.stop();
     const model = this.#current();
-    if (this.#run) return;
-    const abort = new AbortController();
-    this.#run = { abort, ended: this.#runToEnd(model, abort.signal) };
+    if (this.#run.isUnderWay) return;
     send({ event: 'state', state: 'running' });
+    void this.#run.begin((signal) => this.#runToEnd(model, signal));
   }
 
   async #runToEnd(model: ImplicitSurface, signal: AbortSignal): Promise<void> {
@@ -148,7 +135,6 @@ class Session {
       // After the state event, so that the page shows the failure on top of that state.
       if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
-    this.#run = undefined;
     this.#reportStopped();
   }
 
@@ -177,8 +163,8 @@ class Session {
   }
 
   async #pause(): Promise<undefined> {
-    await stop(this.#timing);
-    await stop(this.#run);
+    await this.#timing.stop();
+    return this.#run.stop();
   }
 
   async #step(count: number): Promise<undefined> {
@@ -215,7 +201,7 @@ class Session {
   #setQuantity(quantity: PointQuantity | undefined): undefined {
     this.#quantity = quantity;
     this.#sent = '';
-    if (!this.#run) this.#showSurface();
+    if (!this.#run.isUnderWay) this.#showSurface();
   }
 
   /**
@@ -271,27 +257,12 @@ class Session {
   async #time(body: Requests['timing']['body']): Promise<Requests['timing']['reply']> {
     await this.#pause();
     const { params } = this.#current();
-    const abort = new AbortController();
     const setup = { ...this.#setup, params } as Setup;
-    const result = timeSolves(this.#points(), this.#cameras, setup, body, abort.signal, (timing) =>
-      send({ event: 'timed', timing }),
+    return this.#timing.begin((signal) =>
+      timeSolves(this.#points(), this.#cameras, setup, body, signal, (timing) => send({ event: 'timed', timing })),
     );
-    this.#timing = { abort, ended: result };
-    try {
-      return await result;
-    } finally {
-      this.#timing = undefined;
-    }
   }
 }
 
-// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
-const starting = init();
-starting.catch(() => undefined);
-
 const session = new Session();
-
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  if (data.kind === 'shown') session.shown();
-  else void reply(session.handlers, data);
-};
+serve('implicit', session.handlers, () => session.shown());

@@ -1,9 +1,9 @@
 /** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
 
-import init, { paramSpecs, type StepReport, version } from 'vesicle';
+import type { StepReport } from 'vesicle';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { reply, stop, type Task } from '../worker/serving';
+import { type Handlers, sender, serve, Work } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
 import {
   buildModel,
@@ -25,12 +25,10 @@ import type {
   Pose,
   PoseMessage,
   Ready,
-  RequestKind,
   Requests,
   SavedPose,
   Setup,
   ShownMessage,
-  ToWorker,
   WorkerEvent,
 } from './protocol';
 import { recorded } from './recording';
@@ -38,13 +36,7 @@ import { levelsOf, stagesOf } from './stages';
 import { TargetPath } from './target-path';
 
 type Model = ReturnType<typeof buildModel>;
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
-
-function send(event: WorkerEvent, transfer: Transferable[] = []): void {
-  self.postMessage(event, { transfer });
-}
+const send = sender<WorkerEvent>();
 
 class Session {
   #scene: Scene = { detail: undefined, base: undefined };
@@ -63,16 +55,12 @@ class Session {
   #sentSerial = 0;
   /** Serial number of the last frame that the page has drawn; the next step waits until it is that of the last sent. */
   #shownSerial = 0;
-  #run: Task | undefined;
-  #recording: Task | undefined;
+  readonly #run = new Work();
+  readonly #recording = new Work();
   /** Resumes a run that waits until the page has drawn a frame or sends a new pose. */
   #wake: () => void = () => undefined;
 
-  readonly handlers: Handlers = {
-    hello: async () => {
-      await starting;
-      return { version: version(), specs: paramSpecs('multires') };
-    },
+  readonly handlers: Handlers<Requests> = {
     open: (body) => this.#open(body),
     rebuild: (setup) => this.#rebuild(setup),
     film: ({ film, frame }) => {
@@ -81,7 +69,7 @@ class Session {
     },
     play: () => this.#play(),
     settle: () => this.#settle(),
-    pause: () => stop(this.#run),
+    pause: () => this.#run.stop(),
     step: ({ count }) => this.#steps(count),
     setParams: (params) => this.#setParams(params),
     show: (view) => this.#show(view),
@@ -90,7 +78,7 @@ class Session {
     restore: (saved) => this.#restore(saved),
     stages: (kind) => stagesOf(kind),
     record: (body) => this.#record(body.frameSeconds),
-    cancelRecord: () => stop(this.#recording),
+    cancelRecord: () => this.#recording.stop(),
     export: ({ format }) => this.#current().mesh.toBytes(format),
   };
 
@@ -111,13 +99,13 @@ class Session {
     this.#poseId = poseId;
     this.#dragging = dragging;
     this.#last = undefined;
-    if (this.#run) this.#wake();
+    if (this.#run.isUnderWay) this.#wake();
     else this.#begin();
   }
 
   async #open({ source, setup }: Requests['open']['body']): Promise<OpenedScene> {
-    await stop(this.#run);
-    await stop(this.#recording);
+    await this.#run.stop();
+    await this.#recording.stop();
     const scene = await sceneFrom(source);
     const began = performance.now();
     try {
@@ -136,7 +124,7 @@ class Session {
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
-    await stop(this.#run);
+    await this.#run.stop();
     const start = setup.start ?? this.#start;
     return this.#adopt(buildModel(this.#scene, start, setup), start, setup.pose);
   }
@@ -179,13 +167,12 @@ class Session {
   }
 
   #begin(): void {
-    if (this.#run) return;
-    const abort = new AbortController();
-    abort.signal.addEventListener('abort', () => this.#wake());
-    this.#run = { abort, ended: this.#runToRest(abort.signal) };
+    if (this.#run.isUnderWay) return;
+    void this.#run.begin((signal) => this.#runToRest(signal));
   }
 
   async #runToRest(signal: AbortSignal): Promise<void> {
+    signal.addEventListener('abort', () => this.#wake());
     send({ event: 'state', state: 'running' });
     try {
       await this.#frames(signal);
@@ -193,7 +180,6 @@ class Session {
       // After the state event, so that the page shows the failure on top of that state.
       queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
-    this.#run = undefined;
     this.#path.stop();
     this.#standStill();
   }
@@ -243,7 +229,7 @@ class Session {
   }
 
   async #steps(count: number): Promise<undefined> {
-    await stop(this.#run);
+    await this.#run.stop();
     for (let i = 0; i < count; i++) {
       this.#path.playOne();
       if (this.#isAtRest()) break;
@@ -274,7 +260,7 @@ class Session {
 
   #show(view: FrameContents): undefined {
     this.#view = view;
-    if (!this.#run && this.#model) this.#sendFrame();
+    if (!this.#run.isUnderWay && this.#model) this.#sendFrame();
   }
 
   #sendFrame(): void {
@@ -314,23 +300,16 @@ class Session {
 
   /** Records the film as an animated GLB, then restores the model to its previous state; undefined if cancelled. */
   async #record(frameSeconds: number): Promise<Requests['record']['reply']> {
-    await stop(this.#run);
-    await stop(this.#recording);
+    await this.#run.stop();
+    await this.#recording.stop();
     const model = this.#current();
     const { film } = this.#path;
     if (!film) throw new Refusal('invalid-argument', text('sculpt.noFilm'));
     const before = model.save();
-    const abort = new AbortController();
-    const result = recorded(model, film, frameSeconds, abort.signal, (progress) =>
-      send({ event: 'recorded', progress }),
-    );
-    this.#recording = { abort, ended: result };
-    try {
-      return await result;
-    } finally {
-      this.#recording = undefined;
-      model.restore(before);
-    }
+    const tell = (progress: number) => send({ event: 'recorded', progress });
+    return this.#recording
+      .begin((signal) => recorded(model, film, frameSeconds, signal, tell))
+      .finally(() => model.restore(before));
   }
 
   #save(): SavedPose {
@@ -339,7 +318,7 @@ class Session {
   }
 
   async #restore({ state, frame }: SavedPose): Promise<Ready> {
-    await stop(this.#run);
+    await this.#run.stop();
     const model = this.#current();
     model.restore(state);
     this.#preview = new Preview();
@@ -349,14 +328,8 @@ class Session {
   }
 }
 
-// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
-const starting = init();
-starting.catch(() => undefined);
-
 const session = new Session();
-
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
-  if (data.kind === 'shown') session.shown(data);
-  else if (data.kind === 'pose') session.pose(data);
-  else void reply(session.handlers, data);
-};
+serve('multires', session.handlers, (message: ShownMessage | PoseMessage) => {
+  if (message.kind === 'shown') session.shown(message);
+  else session.pose(message);
+});

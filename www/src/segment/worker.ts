@@ -1,10 +1,10 @@
 /** Worker of the Segment lab: holds one volume, its label map and their surfaces, and serves the page's requests. */
 
-import init, { LabelSurfaces, paramSpecs, type Volume, version } from 'vesicle';
+import { LabelSurfaces, type Volume } from 'vesicle';
 import { quantize } from '../quantize';
 import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
-import { reply, withTransfer } from '../worker/serving';
+import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
 import { viewOf } from '../worker/volumes';
 import type {
@@ -14,20 +14,14 @@ import type {
   OpenedImage,
   OpenedLabels,
   ParamValues,
-  RequestKind,
   Requests,
   StepUpdate,
   Surface,
   SurfaceUpdate,
-  ToWorker,
 } from './protocol';
 import { forEachRow } from './region';
 import { withLabels } from './slicer';
 import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
-
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
 
 let maps = 0;
 
@@ -113,11 +107,7 @@ class Session {
   #open: Pick<OpenVolume, 'volume' | 'unit'> | undefined;
   #live: LiveMap | undefined;
 
-  readonly handlers: Handlers = {
-    hello: async () => {
-      await starting;
-      return { version: version(), specs: paramSpecs('labels') };
-    },
+  readonly handlers: Handlers<Requests> = {
     open: (body) => this.#openImage(body),
     openLabels: ({ files }) => this.#openLabels(files),
     edit: ({ map, block }) => this.#step(map, block),
@@ -245,10 +235,4 @@ function determinant(affine: ArrayLike<number>): number {
   );
 }
 
-// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
-const starting = init();
-starting.catch(() => undefined);
-
-const session = new Session();
-
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => void reply(session.handlers, data);
+serve('labels', new Session().handlers);

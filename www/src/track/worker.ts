@@ -1,9 +1,9 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
 
-import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
+import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { reply, stop, type Task, withTransfer } from '../worker/serving';
+import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
 import { viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
@@ -17,19 +17,13 @@ import type {
   ParamValues,
   Preparation,
   Ready,
-  RequestKind,
   Requests,
   SavedTrack,
   Setup,
-  ToWorker,
   VolumeView,
   WorkerEvent,
 } from './protocol';
 import { buildTracker, openImage, prepare } from './source';
-
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
 
 /**
  * Parameters that the boundary depends on. If only others change, the boundary found in all frames is kept, provided
@@ -37,9 +31,7 @@ type Handlers = {
  */
 const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
-function send(event: WorkerEvent, transfer: Transferable[] = []): void {
-  self.postMessage(event, { transfer });
-}
+const send = sender<WorkerEvent>();
 
 /** A 4D image as opened, and as prepared for tracking. */
 interface LoadedImage {
@@ -64,14 +56,10 @@ class Session {
    * a change of parameters; undefined until then.
    */
   #boundaryState: { state: Uint8Array; iteration: number } | undefined;
-  #run: Task | undefined;
-  #comparison: Task | undefined;
+  readonly #run = new Work();
+  readonly #comparison = new Work();
 
-  readonly handlers: Handlers = {
-    hello: async () => {
-      await starting;
-      return { version: version(), specs: paramSpecs('tracking') };
-    },
+  readonly handlers: Handlers<Requests> = {
     open: (body) => this.#open(body),
     rebuild: (setup) => this.#rebuild(setup),
     play: () => this.#play(),
@@ -87,7 +75,7 @@ class Session {
     export: ({ frame, format }) => this.#export(frame, format),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
-    cancelCompare: () => stop(this.#comparison),
+    cancelCompare: () => this.#comparison.stop(),
   };
 
   async #open({ name, source, setup }: Requests['open']['body']): Promise<OpenedImage> {
@@ -182,13 +170,12 @@ class Session {
   }
 
   async #play(): Promise<undefined> {
-    await stop(this.#comparison);
+    await this.#comparison.stop();
     const tracker = this.#current();
-    if (this.#run || this.#done) return;
-    const abort = new AbortController();
+    if (this.#run.isUnderWay || this.#done) return;
     // Before the run starts, since its first step may already end it.
     send({ event: 'state', state: 'running' });
-    this.#run = { abort, ended: this.#runToEnd(tracker, abort.signal) };
+    void this.#run.begin((signal) => this.#runToEnd(tracker, signal));
   }
 
   async #runToEnd(tracker: SurfaceTracker, signal: AbortSignal): Promise<void> {
@@ -197,7 +184,6 @@ class Session {
     } catch (error) {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
-    this.#run = undefined;
     this.#reportStopped();
   }
 
@@ -216,8 +202,8 @@ class Session {
   }
 
   async #pause(): Promise<undefined> {
-    await stop(this.#comparison);
-    await stop(this.#run);
+    await this.#comparison.stop();
+    return this.#run.stop();
   }
 
   async #step(count: number): Promise<undefined> {
@@ -305,15 +291,8 @@ class Session {
   async #compare(setup: Setup): Promise<ComparedTrack | undefined> {
     await this.#pause();
     const { original, spec } = this.#image();
-    const abort = new AbortController();
     const tell = (part: number, phase: string) => send({ event: 'comparing', part, phase });
-    const result = trackForComparison(original, spec, setup, abort.signal, tell);
-    this.#comparison = { abort, ended: result };
-    try {
-      return await result;
-    } finally {
-      this.#comparison = undefined;
-    }
+    return this.#comparison.begin((signal) => trackForComparison(original, spec, setup, signal, tell));
   }
 }
 
@@ -321,10 +300,4 @@ function same(one: unknown, other: unknown): boolean {
   return JSON.stringify(one) === JSON.stringify(other);
 }
 
-// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
-const starting = init();
-starting.catch(() => undefined);
-
-const session = new Session();
-
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => void reply(session.handlers, data);
+serve('tracking', new Session().handlers);

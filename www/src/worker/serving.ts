@@ -1,16 +1,74 @@
-/** Common parts of the app's workers: replies to requests, and cancellation of running work. */
+/** Common parts of the app's workers: loading the engine, replies to requests, and work that can be cancelled. */
+import init, { paramSpecs, version } from 'vesicle';
 import { toFailure } from './refusal';
 
-/** Work in progress in a worker, which a later request of the page can abort. */
-export interface Task {
-  abort: AbortController;
-  ended: Promise<unknown>;
+/** Work of a session that takes long, which a later request of the page can abort. */
+export class Work {
+  #abort: AbortController | undefined;
+  #ended: Promise<unknown> = Promise.resolve();
+
+  get isUnderWay(): boolean {
+    return this.#abort !== undefined;
+  }
+
+  /** Aborts without waiting. */
+  abort(): void {
+    this.#abort?.abort();
+  }
+
+  /** Aborts the work, if any, and waits for its end; its result or error is left to the caller who started it. */
+  async stop(): Promise<undefined> {
+    // Other work may begin before this goes on.
+    while (this.#abort) {
+      this.#abort.abort();
+      await this.#ended.catch(() => undefined);
+    }
+  }
+
+  /** Begins work; returns its result. */
+  async begin<Result>(work: (signal: AbortSignal) => Promise<Result>): Promise<Result> {
+    const abort = new AbortController();
+    this.#abort = abort;
+    const ended = work(abort.signal).finally(() => {
+      if (this.#abort === abort) this.#abort = undefined;
+    });
+    this.#ended = ended;
+    return ended;
+  }
 }
 
-/** Aborts running work, if any, and waits for its end; its result or error is left to the caller who started it. */
-export async function stop(work: Task | undefined): Promise<undefined> {
-  work?.abort.abort();
-  await work?.ended.catch(() => undefined);
+/** Handlers of the requests in a lab's table. */
+export type Handlers<Requests extends { [K in keyof Requests]: { body: unknown; reply: unknown } }> = {
+  [K in Exclude<keyof Requests, 'hello'>]: (
+    body: Requests[K]['body'],
+  ) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
+};
+
+/** Returns a function that sends events to the page. */
+export const sender =
+  <Event>() =>
+  (event: Event, transfer: Transferable[] = []): void =>
+    self.postMessage(event, { transfer });
+
+/**
+ * Loads the engine at once, while the page still loads, and serves the page's requests with `handlers`; a failure to
+ * load is reported when the page asks for the parameters of `method` (`hello`). Messages without reply go to `onMessage`.
+ */
+export function serve<Message extends { kind: string }>(
+  method: Parameters<typeof paramSpecs>[0],
+  handlers: object,
+  onMessage?: (message: Message) => void,
+): void {
+  const starting = init();
+  starting.catch(() => undefined);
+  const hello = async () => {
+    await starting;
+    return { version: version(), specs: paramSpecs(method) };
+  };
+  self.onmessage = ({ data }: MessageEvent<Message | { id: number; kind: string; body: unknown }>) => {
+    if ('id' in data) void reply({ ...handlers, hello }, data);
+    else onMessage?.(data);
+  };
 }
 
 export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
@@ -27,7 +85,7 @@ export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBu
 }
 
 /** Runs the handler for a request of the page, and replies with the handler's result, or with its failure. */
-export async function reply(
+async function reply(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },
 ): Promise<void> {
