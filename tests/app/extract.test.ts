@@ -85,6 +85,11 @@ describe('the built-in example', () => {
     await field.press('Enter');
     await app.page.waitForFunction(() => document.querySelector('[data-param=damping] .field-error')?.textContent);
     expect(await field.inputValue()).toBe(before);
+    expect(await field.getAttribute('aria-invalid')).toBe('true');
+    await field.press('Enter');
+    await field.fill(String(Number(before) / 2));
+    await field.press('Enter');
+    await expect.poll(() => field.getAttribute('aria-invalid')).toBe(null);
   });
 });
 

@@ -1,6 +1,7 @@
 import type { Attractor, Vec3 } from '../protocol';
 import { text } from '../texts';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { labelFor } from './field';
 import { figure } from './format';
 
 const STRENGTH = 0.1;
@@ -166,9 +167,8 @@ export class AttractorControls {
     range: Record<string, number>;
   }): HTMLElement {
     const { attractor, index, key, label, shown, range } = given;
-    const id = uniqueId('attractor');
     const value = attractor[key];
-    const input = h('input', { type: 'number', id, step: 'any', value, ...range, 'aria-label': label });
+    const input = h('input', { type: 'number', step: 'any', value, ...range, 'aria-label': label });
     input.addEventListener('change', () => {
       const number = input.valueAsNumber;
       if (!Number.isFinite(number) || (key === 'radius' && number <= 0)) {
@@ -182,6 +182,6 @@ export class AttractorControls {
       this.#error.textContent = '';
       this.#events.onChange(next, text(FIELDS[key].change, { number: index + 1 }), true);
     });
-    return h('span', { class: 'value' }, h('label', { for: id }, shown), input);
+    return h('span', { class: 'value' }, labelFor(input, shown), input);
   }
 }

@@ -2,6 +2,7 @@ import type { ComparisonProgressEvent, ExtractionRun, Requests } from '../protoc
 import { text } from '../texts';
 import { h } from './dom';
 import { count, figure, levelSymbol } from './format';
+import { TaskControls } from './task';
 import { addTimes, seconds, TIME_NOTE, TIME_ROWS, timeOf } from './times';
 
 type Result = NonNullable<Requests['compare']['reply']>;
@@ -19,74 +20,53 @@ export interface CompareEvents {
  */
 export class ComparePanel {
   readonly element: HTMLElement;
-  readonly #start: HTMLButtonElement;
-  readonly #cancel: HTMLButtonElement;
-  readonly #progress = h('progress', {
-    max: 2,
-    value: 0,
-    'aria-label': text('controls.comparisonProgress'),
-    hidden: true,
-  });
-  readonly #status = h('p', { class: 'help', role: 'status' });
+  readonly #task: TaskControls;
   readonly #tables = h('div', { 'data-comparison': '{}' });
 
   constructor({ onStart, onCancel }: CompareEvents) {
-    this.#start = h('button', { type: 'button', onclick: onStart, 'data-compare': 'start' }, text('controls.compare'));
-    this.#cancel = h(
-      'button',
-      { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true },
-      text('controls.cancel'),
-    );
-    const help = text('extractPanels.compareHelp');
-    this.element = h(
-      'div',
-      { class: 'compare' },
-      h('p', { class: 'help' }, help),
-      h('div', { class: 'buttons' }, this.#start, this.#cancel),
-      this.#progress,
-      this.#status,
-      this.#tables,
-    );
+    this.#task = new TaskControls({
+      name: 'compare',
+      start: text('controls.compare'),
+      progress: text('controls.comparisonProgress'),
+      max: 2,
+      onStart,
+      onCancel,
+    });
+    const help = h('p', { class: 'help' }, text('extractPanels.compareHelp'));
+    this.element = h('div', { class: 'compare' }, help, ...this.#task.elements, this.#tables);
   }
 
   /** Whether there is a volume, so that a comparison can be started. */
   set enabled(enabled: boolean) {
-    this.#start.disabled = !enabled;
+    this.#task.enabled = enabled;
   }
 
   /** Removes the results of the last comparison. */
   clear(): void {
     this.#tables.replaceChildren();
     this.#tables.dataset.comparison = '{}';
-    this.#end('');
+    this.#task.end('');
   }
 
   begin(): void {
     this.clear();
-    this.#start.hidden = true;
-    this.#cancel.hidden = false;
-    this.#cancel.focus();
-    this.#progress.hidden = false;
-    this.#progress.value = 0;
-    this.#status.textContent = text('controls.comparing');
+    this.#task.begin(text('controls.comparing'));
   }
 
   /** Shows the progress of a comparison, without announcing it to screen readers. */
   showProgress({ run, report }: ComparisonProgressEvent): void {
-    this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
-    this.#cancel.textContent = text('extractPanels.compareCancel', {
-      run: NAMES[run],
-      iteration: count(report.iteration),
-    });
+    const value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
+    const iteration = count(report.iteration);
+    this.#task.showProgress(value, text('extractPanels.compareCancel', { run: NAMES[run], iteration }));
   }
 
   reject(message: string): void {
-    this.#end(message);
+    this.#task.end(message);
   }
 
   finish(result: Result | undefined): void {
     if (result) this.#show(result);
-    else this.#end(text('controls.cancelled'));
+    else this.#task.end(text('controls.cancelled'));
   }
 
   #show(result: Result): void {
@@ -96,23 +76,13 @@ export class ComparePanel {
       factor >= 1
         ? (['extractPanels.compareFaster', factor] as const)
         : (['extractPanels.compareSlower', 1 / factor] as const);
-    this.#end(text(key, { factor: figure(round(times)), difference: difference(result) }));
+    this.#task.end(text(key, { factor: figure(round(times)), difference: difference(result) }));
     this.#tables.dataset.comparison = JSON.stringify({ direct: summary(direct), coarseToFine: summary(coarseToFine) });
     this.#tables.replaceChildren(
       scrolling(text('extractPanels.compareTimes'), timeTable(coarseToFine, direct)),
       h('p', { class: 'help' }, TIME_NOTE),
       scrolling(text('controls.compareResults'), outcomeTable(coarseToFine, direct)),
     );
-  }
-
-  #end(message: string): void {
-    const hadFocus = document.activeElement === this.#cancel;
-    this.#start.hidden = false;
-    this.#cancel.hidden = true;
-    this.#cancel.textContent = text('controls.cancel');
-    this.#progress.hidden = true;
-    this.#status.textContent = message;
-    if (hadFocus) this.#start.focus();
   }
 }
 

@@ -2,6 +2,7 @@ import type { CoverageProgressEvent, MeasuredCoverage, UncoveredRegion, Vec3 } f
 import { plural, text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
+import { TaskControls } from './task';
 
 /**
  * Largest number of uncovered regions listed in the panel and marked in the views; the sentence above the list counts
@@ -33,45 +34,30 @@ export class CoveragePanel {
   /** Unit of length in the volume's world space, for areas; empty if unknown. */
   unit = '';
   readonly #events: CoverageEvents;
-  readonly #start: HTMLButtonElement;
-  readonly #cancel: HTMLButtonElement;
-  readonly #seed: HTMLButtonElement;
-  readonly #progress = h('progress', {
-    max: 1,
-    value: 0,
-    'aria-label': text('controls.measurementProgress'),
-    hidden: true,
-  });
-  readonly #status = h('p', { class: 'help', role: 'status' });
+  readonly #task: TaskControls;
   readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
   readonly #list = h('ol', { class: 'uncovered', 'aria-label': text('extractPanels.uncoveredList') });
 
   /** `guide` is the address of the documentation that explains coverage. */
   constructor(guide: string, events: CoverageEvents) {
     this.#events = events;
-    this.#start = h(
-      'button',
-      { type: 'button', onclick: events.onStart, 'data-coverage-action': 'start' },
-      text('extractPanels.measureCoverage'),
-    );
-    this.#cancel = h(
-      'button',
-      { type: 'button', onclick: events.onCancel, 'data-coverage-action': 'cancel', hidden: true },
-      text('controls.cancel'),
-    );
-    this.#seed = h(
+    const seed = h(
       'button',
       { type: 'button', onclick: events.onSeed, 'data-coverage-action': 'seed' },
       text('extractPanels.seedMissing'),
     );
+    this.#task = new TaskControls({
+      ...{ name: 'coverage-action', start: text('extractPanels.measureCoverage'), others: [seed] },
+      progress: text('controls.measurementProgress'),
+      onStart: events.onStart,
+      onCancel: events.onCancel,
+    });
     const why = h('a', { href: guide, target: '_blank', rel: 'noopener' }, text('extractPanels.coverageGuide'));
     this.element = h(
       'div',
       { class: 'coverage' },
       h('p', { class: 'help' }, text('extractPanels.coverageHelp'), why),
-      h('div', { class: 'buttons' }, this.#start, this.#cancel, this.#seed),
-      this.#progress,
-      this.#status,
+      ...this.#task.elements,
       this.#figures,
       this.#list,
     );
@@ -79,47 +65,41 @@ export class CoveragePanel {
 
   /** Whether there is a surface whose coverage can be measured. */
   set enabled(enabled: boolean) {
-    this.#start.disabled = !enabled;
-    this.#seed.disabled = !enabled;
+    this.#task.enabled = enabled;
   }
 
   /** Removes the results of the last coverage measurement. */
   clear(): void {
     this.#show(undefined);
-    this.#end('');
+    this.#task.end('');
   }
 
   begin(): void {
     this.clear();
-    this.#start.hidden = true;
-    this.#seed.hidden = true;
-    this.#cancel.hidden = false;
-    this.#cancel.focus();
-    this.#progress.hidden = false;
-    this.#progress.value = 0;
-    this.#status.textContent = text('controls.measuring');
+    this.#task.begin(text('controls.measuring'));
   }
 
   showProgress({ share }: CoverageProgressEvent): void {
-    this.#progress.value = share;
+    this.#task.showProgress(share);
   }
 
   /** Shows a message beside the buttons and ends a measurement; results shown before are kept. */
   say(message: string): void {
-    this.#end(message);
+    this.#task.end(message);
   }
 
   finish(coverage: MeasuredCoverage | undefined): void {
     if (!coverage) {
-      this.#end(text('controls.cancelled'));
+      this.#task.end(text('controls.cancelled'));
       return;
     }
     this.#show(coverage);
     const { iteration, uncovered } = coverage;
     const values = { iteration: count(iteration), listed: MOST_PARTS };
-    if (uncovered.length === 0) this.#end(text('extractPanels.uncoveredNone', values));
-    else if (uncovered.length <= MOST_PARTS) this.#end(plural('extractPanels.uncoveredAll', uncovered.length, values));
-    else this.#end(plural('extractPanels.uncoveredMost', uncovered.length, values));
+    if (uncovered.length === 0) this.#task.end(text('extractPanels.uncoveredNone', values));
+    else if (uncovered.length <= MOST_PARTS)
+      this.#task.end(plural('extractPanels.uncoveredAll', uncovered.length, values));
+    else this.#task.end(plural('extractPanels.uncoveredMost', uncovered.length, values));
   }
 
   #show(coverage: MeasuredCoverage | undefined): void {
@@ -152,16 +132,6 @@ export class CoveragePanel {
       h('span', { class: 'where' }, where),
     );
     return h('li', {}, goTo);
-  }
-
-  #end(message: string): void {
-    const hadFocus = document.activeElement === this.#cancel;
-    this.#start.hidden = false;
-    this.#seed.hidden = false;
-    this.#cancel.hidden = true;
-    this.#progress.hidden = true;
-    this.#status.textContent = message;
-    if (hadFocus) this.#start.focus();
   }
 }
 

@@ -1,6 +1,7 @@
 import type { ParamSpec } from '../protocol';
 import { text } from '../texts';
-import { h, symbol, uniqueId } from './dom';
+import { h } from './dom';
+import { Field } from './field';
 import { figure } from './format';
 
 /**
@@ -15,12 +16,12 @@ const NOISE_FACTOR = 2.5;
  */
 export class EdgeThreshold {
   readonly element: HTMLElement;
-  readonly #number: HTMLInputElement;
+  readonly #field: Field;
+  readonly #number = h('input', { type: 'number', step: 'any', min: 0, inputmode: 'decimal' });
   readonly #slider: HTMLInputElement;
   readonly #suggest: HTMLButtonElement;
   readonly #noise = h('p', { class: 'help' });
   readonly #warning = h('p', { class: 'warning', role: 'status' });
-  readonly #error = h('p', { class: 'field-error', role: 'alert' });
   #suggested = 0;
 
   /**
@@ -28,19 +29,10 @@ export class EdgeThreshold {
    * `onChange` with each threshold that is to take effect: released, entered or suggested.
    */
   constructor(
-    { label, symbol: letter, help }: ParamSpec,
+    { label, symbol, help }: ParamSpec,
     onChange: (threshold: number) => void,
     onTry: (threshold: number | undefined) => void,
   ) {
-    const id = uniqueId('threshold');
-    this.#number = h('input', {
-      type: 'number',
-      id,
-      step: 'any',
-      min: 0,
-      inputmode: 'decimal',
-      'aria-describedby': `${id}-help`,
-    });
     this.#slider = h('input', {
       type: 'range',
       min: 0,
@@ -63,18 +55,10 @@ export class EdgeThreshold {
       'data-threshold': 'suggest',
       onclick: () => onChange(this.#suggested),
     });
-    this.element = h(
-      'div',
-      { class: 'param', 'data-param': 'threshold' },
-      h('label', { for: id }, label, ' ', ...(letter ? [symbol(letter)] : [])),
-      h('span', { class: 'value' }, this.#number),
-      this.#slider,
-      h('p', { class: 'help', id: `${id}-help` }, help),
-      this.#noise,
-      h('div', { class: 'buttons' }, this.#suggest),
-      this.#warning,
-      this.#error,
-    );
+    const parts = { label, symbol, help, extra: [this.#slider], attributes: { 'data-param': 'threshold' } };
+    this.#field = new Field(this.#number, parts);
+    this.element = this.#field.element;
+    this.element.append(this.#noise, h('div', { class: 'buttons' }, this.#suggest), this.#warning);
   }
 
   /**
@@ -98,11 +82,11 @@ export class EdgeThreshold {
     const low = threshold < NOISE_FACTOR * noise;
     const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(NOISE_FACTOR * noise)) }) : '';
     if (this.#warning.textContent !== warning) this.#warning.textContent = warning;
-    this.#error.textContent = '';
+    this.#field.showError(undefined);
   }
 
   showError(message: string): void {
-    this.#error.textContent = message;
+    this.#field.showError(message);
   }
 }
 

@@ -1,5 +1,6 @@
 import { plural, text } from '../texts';
 import { h, uniqueId } from './dom';
+import { Field } from './field';
 
 /**
  * Effect of a click in the Reconstruct lab's 3D view: none, or a point is added, removed, or added as an exterior
@@ -40,8 +41,10 @@ export class EditTools {
   readonly #help = h('p', { class: 'help' });
   readonly #counts = h('p', { class: 'help', role: 'status' });
   readonly #clear: HTMLButtonElement;
-  readonly #distance: HTMLInputElement;
-  readonly #error: HTMLElement;
+  readonly #distance = new Field(
+    h('input', { type: 'number', value: DISTANCE, min: -50, max: 50, step: 'any', required: true }),
+    { label: text('pointPanels.distance'), unit: text('pointPanels.distanceUnit'), row: 'row' },
+  );
   readonly #radios: HTMLInputElement[] = [];
   readonly #onTool: (tool: EditTool) => void;
   #tool: EditTool = 'none';
@@ -55,19 +58,7 @@ export class EditTools {
       this.#radios.push(radio);
       return h('label', { class: 'check' }, radio, label);
     });
-    const id = uniqueId('distance');
-    this.#error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
-    this.#distance = h('input', {
-      type: 'number',
-      id,
-      value: DISTANCE,
-      min: -50,
-      max: 50,
-      step: 'any',
-      required: true,
-    });
-    this.#distance.setAttribute('aria-describedby', `${id}-error`);
-    this.#distance.addEventListener('change', () => this.#checkDistance());
+    this.#distance.control.addEventListener('change', () => this.#checkDistance());
     this.#clear = h(
       'button',
       { type: 'button', onclick: onClear, 'data-edit': 'clear' },
@@ -77,13 +68,7 @@ export class EditTools {
       'div',
       { class: 'edit-tools' },
       h('div', { class: 'tools', role: 'radiogroup', 'aria-label': text('pointPanels.clickAction') }, ...radios),
-      h(
-        'div',
-        { class: 'row' },
-        h('label', { for: id }, text('pointPanels.distance')),
-        h('span', { class: 'value' }, this.#distance, h('span', { class: 'unit' }, text('pointPanels.distanceUnit'))),
-      ),
-      this.#error,
+      this.#distance.element,
       this.#help,
       h('p', { class: 'help' }, text('pointPanels.editKeyboardHelp')),
       this.#counts,
@@ -102,7 +87,8 @@ export class EditTools {
    * contains most points; the default if the input is invalid.
    */
   get distance(): number {
-    return (this.#distance.checkValidity() ? this.#distance.valueAsNumber : DISTANCE) / 100;
+    const { control } = this.#distance;
+    return (control.checkValidity() ? control.valueAsNumber : DISTANCE) / 100;
   }
 
   /** Deselects the tool, so that clicks in the 3D view do not edit the points. */
@@ -129,9 +115,9 @@ export class EditTools {
   }
 
   #checkDistance(): void {
-    const valid = this.#distance.checkValidity();
-    this.#error.textContent = valid ? '' : text('pointPanels.distanceError', { distance: DISTANCE });
-    if (!valid) this.#distance.valueAsNumber = DISTANCE;
+    const valid = this.#distance.control.checkValidity();
+    this.#distance.showError(valid ? undefined : text('pointPanels.distanceError', { distance: DISTANCE }));
+    if (!valid) this.#distance.control.valueAsNumber = DISTANCE;
   }
 
   #showHelp(): void {

@@ -13,7 +13,8 @@ import {
   voxelIn,
 } from '../view/figure-images';
 import type { ContentBelow } from '../view/track';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { labelFor } from './field';
 
 /**
  * Default settings of Canny's edge detector for greys of 0 to 255; for its image, the paper used a deviation of 1.5,
@@ -156,14 +157,13 @@ export class FigureRow {
 
   #cannyFields(): HTMLElement {
     const fields = CANNY_FIELDS.map(({ name, label, min }) => {
-      const id = uniqueId('canny');
-      const input = h('input', { type: 'number', id, min, step: 'any', value: CANNY[name], 'data-canny': name });
+      const input = h('input', { type: 'number', min, step: 'any', value: CANNY[name], 'data-canny': name });
       input.addEventListener('change', () => {
         if (!input.checkValidity() || input.value === '') input.valueAsNumber = this.#settings[name];
         this.#settings[name] = input.valueAsNumber;
         this.#drawCanny();
       });
-      return h('span', { class: 'value' }, h('label', { for: id }, label), input);
+      return h('span', { class: 'value' }, labelFor(input, label), input);
     });
     return h(
       'div',

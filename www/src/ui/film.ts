@@ -1,6 +1,7 @@
 import { type Film, lastFrame } from '../sculpt/film';
 import { plural, text } from '../texts';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { Field, labelFor } from './field';
 
 /** Default number of frames from one keyframe of a film to the next. */
 export const FRAMES_BETWEEN = 24;
@@ -26,9 +27,12 @@ export class FilmControls {
   readonly #events: FilmEvents;
   readonly #keys = h('div', { class: 'buttons chips', role: 'group', 'aria-label': text('sculptPanels.keyframes') });
   readonly #status = h('p', { class: 'help', role: 'status' });
-  readonly #between: HTMLInputElement;
-  readonly #loop: HTMLInputElement;
-  readonly #seek: HTMLInputElement;
+  readonly #between = new Field(
+    h('input', { type: 'number', min: 1, max: MOST_BETWEEN, step: 1, value: FRAMES_BETWEEN, required: true }),
+    { label: text('sculptPanels.framesBetween'), row: 'row' },
+  );
+  readonly #loop = h('input', { type: 'checkbox', 'data-film': 'loop' });
+  readonly #seek = h('input', { type: 'range', min: 0, max: 1, value: 0, step: 1 });
   readonly #at = h('output', { 'aria-live': 'off' });
   readonly #record: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
@@ -38,26 +42,14 @@ export class FilmControls {
     hidden: true,
     'aria-label': text('sculptPanels.recordingProgress'),
   });
-  readonly #error = h('p', { class: 'field-error', role: 'alert' });
   readonly #remove: HTMLButtonElement;
   #film: Film | undefined;
   #frame = 0;
 
   constructor(events: FilmEvents) {
     this.#events = events;
-    const [between, seek] = [uniqueId('between'), uniqueId('frame')];
-    this.#between = h('input', {
-      type: 'number',
-      id: between,
-      min: 1,
-      max: MOST_BETWEEN,
-      step: 1,
-      value: FRAMES_BETWEEN,
-    });
-    this.#between.addEventListener('change', () => this.#setBetween());
-    this.#loop = h('input', { type: 'checkbox', 'data-film': 'loop' });
+    this.#between.control.addEventListener('change', () => this.#setBetween());
     this.#loop.addEventListener('change', () => events.onLoop(this.#loop.checked));
-    this.#seek = h('input', { type: 'range', id: seek, min: 0, max: 1, value: 0, step: 1 });
     this.#seek.addEventListener('input', () => events.onSeek(this.#seek.valueAsNumber));
     this.#remove = filmButton('remove', text('sculptPanels.removeKeyframe'), () => this.#removeKey());
     this.#record = filmButton('record', text('sculptPanels.recordGlb'), events.onRecord);
@@ -74,20 +66,20 @@ export class FilmControls {
         filmButton('add', text('sculptPanels.addKeyframe'), events.onAddKey),
         this.#remove,
       ),
-      h('div', { class: 'row' }, h('label', { for: seek }, text('controls.frame')), this.#at),
+      h('div', { class: 'row' }, labelFor(this.#seek, text('controls.frame')), this.#at),
       this.#seek,
-      h('div', { class: 'row' }, h('label', { for: between }, text('sculptPanels.framesBetween')), this.#between),
+      this.#between.element,
       h('label', { class: 'check' }, this.#loop, text('sculptPanels.filmLoop')),
       h('div', { class: 'buttons' }, this.#record, this.#cancel),
       this.#progress,
-      this.#error,
       this.#status,
     );
     this.show(undefined, 0);
   }
 
   get between(): number {
-    return this.#between.checkValidity() ? this.#between.valueAsNumber : FRAMES_BETWEEN;
+    const { control } = this.#between;
+    return control.checkValidity() ? control.valueAsNumber : FRAMES_BETWEEN;
   }
 
   show(film: Film | undefined, frame: number): void {
@@ -101,9 +93,9 @@ export class FilmControls {
     this.#at.value = film ? text('controls.frameOf', { frame, last }) : '–';
     this.#loop.checked = film?.loop ?? false;
     this.#loop.disabled = !film;
-    this.#between.disabled = film !== undefined && 'motion' in film;
-    if (film && 'keys' in film) this.#between.valueAsNumber = film.between;
-    this.#error.textContent = '';
+    this.#between.control.disabled = film !== undefined && 'motion' in film;
+    if (film && 'keys' in film) this.#between.control.valueAsNumber = film.between;
+    this.#between.showError(undefined);
     this.#showKeys(film);
   }
 
@@ -157,10 +149,11 @@ export class FilmControls {
   }
 
   #setBetween(): void {
-    const valid = this.#between.checkValidity() && this.#between.value !== '';
-    this.#error.textContent = valid ? '' : text('sculptPanels.framesBetweenError', { most: MOST_BETWEEN });
-    if (valid) this.#events.onBetween(this.#between.valueAsNumber);
-    else this.#between.valueAsNumber = this.#film && 'keys' in this.#film ? this.#film.between : FRAMES_BETWEEN;
+    const { control } = this.#between;
+    const valid = control.checkValidity();
+    this.#between.showError(valid ? undefined : text('sculptPanels.framesBetweenError', { most: MOST_BETWEEN }));
+    if (valid) this.#events.onBetween(control.valueAsNumber);
+    else control.valueAsNumber = this.#film && 'keys' in this.#film ? this.#film.between : FRAMES_BETWEEN;
   }
 }
 

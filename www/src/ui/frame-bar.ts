@@ -1,5 +1,6 @@
 import { text } from '../texts';
-import { h, icon, uniqueId } from './dom';
+import { h, icon } from './dom';
+import { labelFor } from './field';
 import { count } from './format';
 
 const PLAY = 'M7 4.5v15l12-7.5z';
@@ -32,8 +33,7 @@ export class FrameBar {
   /** `onFrame` is called with the frame to show, when the user or playback selects another one. */
   constructor(onFrame: (frame: number) => void) {
     this.#onFrame = onFrame;
-    const id = uniqueId('frame');
-    this.#slider = h('input', { type: 'range', id, min: 0, max: 1, step: 1, value: 0 });
+    this.#slider = h('input', { type: 'range', min: 0, max: 1, step: 1, value: 0 });
     this.#slider.addEventListener('input', () => this.#byHand(this.#slider.valueAsNumber));
     this.#play = h(
       'button',
@@ -48,7 +48,7 @@ export class FrameBar {
       'div',
       { class: 'frames', role: 'group', 'aria-label': text('trackPanels.frames') },
       h('div', { class: 'buttons' }, previous, this.#play, next),
-      h('label', { for: id }, text('controls.frame')),
+      labelFor(this.#slider, text('controls.frame')),
       this.#slider,
       this.#at,
     );

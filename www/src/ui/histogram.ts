@@ -1,6 +1,7 @@
 import type { VolumeView } from '../protocol';
 import { text } from '../texts';
-import { context2d, h, onSchemeChange, symbol, token, uniqueId } from './dom';
+import { context2d, h, onSchemeChange, token } from './dom';
+import { Field } from './field';
 import { figure } from './format';
 
 /**
@@ -10,30 +11,28 @@ import { figure } from './format';
 export class Histogram {
   readonly element: HTMLElement;
   readonly #canvas = h('canvas', { role: 'img' });
-  readonly #slider: HTMLInputElement;
-  readonly #number: HTMLInputElement;
+  readonly #slider = h('input', { type: 'range', 'aria-label': text('extractPanels.isoSlider'), disabled: true });
+  readonly #number = h('input', { type: 'number', step: 'any', disabled: true });
   readonly #ends = [h('span'), h('span')] as const;
-  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #field: Field;
   readonly #observer = new ResizeObserver(() => this.#draw());
   #volume: Pick<VolumeView, 'histogram' | 'range'> | undefined;
 
   constructor(onIso: (iso: number) => void) {
-    const id = uniqueId('iso');
-    this.#slider = h('input', { type: 'range', 'aria-label': text('extractPanels.isoSlider'), disabled: true });
-    this.#number = h('input', { type: 'number', id, step: 'any', disabled: true, 'aria-describedby': `${id}-help` });
     this.#slider.addEventListener('input', () => this.#changed(this.#slider.valueAsNumber, onIso));
     this.#number.addEventListener('change', () => this.#changed(this.#number.valueAsNumber, onIso));
-    const label = h('label', { for: id }, text('extractPanels.isoValue'), symbol('πI'));
-    const help = text('extractPanels.isoHelp');
-    this.element = h(
-      'div',
-      { class: 'histogram', 'data-param': 'iso' },
-      h('div', { class: 'row' }, label, h('span', { class: 'value' }, this.#number)),
-      h('div', { class: 'bars' }, this.#canvas, this.#slider),
-      h('div', { class: 'ends', 'aria-hidden': 'true' }, ...this.#ends),
-      h('p', { class: 'help', id: `${id}-help` }, help),
-      this.#error,
-    );
+    this.#field = new Field(this.#number, {
+      label: text('extractPanels.isoValue'),
+      symbol: 'πI',
+      help: text('extractPanels.isoHelp'),
+      row: 'row',
+      extra: [
+        h('div', { class: 'bars' }, this.#canvas, this.#slider),
+        h('div', { class: 'ends', 'aria-hidden': 'true' }, ...this.#ends),
+      ],
+      attributes: { class: 'histogram', 'data-param': 'iso' },
+    });
+    this.element = this.#field.element;
     this.#observer.observe(this.#canvas);
     onSchemeChange(() => this.#draw());
   }
@@ -57,12 +56,12 @@ export class Histogram {
     this.#slider.valueAsNumber = iso;
     this.#slider.setAttribute('aria-valuetext', figure(iso));
     this.#number.value = String(Number(iso.toPrecision(6)));
-    this.#error.textContent = '';
+    this.#field.showError(undefined);
     this.#draw();
   }
 
   showError(message: string): void {
-    this.#error.textContent = message;
+    this.#field.showError(message);
   }
 
   #changed(iso: number, onIso: (iso: number) => void): void {

@@ -1,6 +1,7 @@
 import type { ParamSpec, ParamValues } from '../protocol';
 import { text } from '../texts';
-import { h, symbol, uniqueId } from './dom';
+import { h } from './dom';
+import { Field, type FormControl, selectFrom } from './field';
 import { figure } from './format';
 
 /**
@@ -21,9 +22,8 @@ const SMALL_POWER = 4;
 const NUMBER = 'number';
 
 interface Control {
-  element: HTMLElement;
+  field: Field<FormControl>;
   show(value: unknown): void;
-  showError(message: string | undefined): void;
 }
 
 /** Controls for a method's parameters, generated from their specifications. */
@@ -42,7 +42,7 @@ export class ParamControls {
           controlFor(spec, (value) => onChange(spec.name, value)),
         );
     }
-    this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map((control) => control.element));
+    this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map(({ field }) => field.element));
   }
 
   /**
@@ -56,7 +56,7 @@ export class ParamControls {
   show(values: ParamValues): void {
     for (const [name, control] of this.#controls) {
       if (name in values) control.show(values[name]);
-      control.showError(undefined);
+      control.field.showError(undefined);
     }
   }
 
@@ -64,59 +64,42 @@ export class ParamControls {
   hide(names: Record<string, boolean>): void {
     for (const [name, hidden] of Object.entries(names)) {
       const control = this.#controls.get(name);
-      if (control) control.element.hidden = hidden;
+      if (control) control.field.element.hidden = hidden;
     }
   }
 
   /** Shows, beside the control of the parameter `name`, why its value was rejected. */
   showError(name: string, message: string): void {
-    this.#controls.get(name)?.showError(message);
+    this.#controls.get(name)?.field.showError(message);
   }
 }
 
 function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Control {
-  const id = uniqueId(`param-${spec.name}`);
-  const input = inputFor(spec, id, onChange);
-  const error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
-  const help = h('p', { class: 'help', id: `${id}-help` }, spec.help);
-  const label = h('label', { for: id }, spec.label, ' ', ...(spec.symbol ? [symbol(spec.symbol)] : []));
-  const unit = spec.type === 'choice' ? [] : unitOf(spec);
-  const value = h('span', { class: 'value' }, input.main, ...unit);
-  const element = h('div', { class: 'param', 'data-param': spec.name }, label, value, ...input.extra, help, error);
-  const showError = (message: string | undefined) => {
-    error.textContent = message ?? '';
-    input.main.toggleAttribute('aria-invalid', message !== undefined);
-  };
-  return { element, show: input.show, showError };
-}
-
-function unitOf({ unit }: ParamSpec): HTMLElement[] {
-  return unit ? [h('span', { class: 'unit' }, unit)] : [];
+  const { main, extra, show } = inputFor(spec, onChange);
+  const { label, symbol, help, name } = spec;
+  const unit = spec.type === 'choice' ? undefined : spec.unit;
+  return { field: new Field(main, { label, symbol, help, unit, extra, attributes: { 'data-param': name } }), show };
 }
 
 interface Input {
-  main: HTMLInputElement | HTMLSelectElement;
+  main: FormControl;
   extra: HTMLElement[];
   show(value: unknown): void;
 }
 
-function inputFor(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
+function inputFor(spec: ParamSpec, onChange: (value: unknown) => void): Input {
   switch (spec.type) {
     case 'boolean':
-      return checkbox(id, onChange);
+      return checkbox(onChange);
     case 'choice':
-      return choice(spec, id, onChange);
+      return choice(spec, onChange);
     default:
-      return numberInput(spec, id, onChange);
+      return numberInput(spec, onChange);
   }
 }
 
-function describedBy(id: string): Record<string, string> {
-  return { id, 'aria-describedby': `${id}-help ${id}-error` };
-}
-
-function checkbox(id: string, onChange: (value: unknown) => void): Input {
-  const main = h('input', { type: 'checkbox', ...describedBy(id) });
+function checkbox(onChange: (value: unknown) => void): Input {
+  const main = h('input', { type: 'checkbox' });
   main.addEventListener('change', () => onChange(main.checked));
   const show = (value: unknown) => {
     main.checked = value === true;
@@ -124,9 +107,8 @@ function checkbox(id: string, onChange: (value: unknown) => void): Input {
   return { main, extra: [], show };
 }
 
-function choice(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
-  const options = (spec.choices ?? []).map((name) => h('option', { value: name }, name));
-  const main = h('select', describedBy(id), ...options);
+function choice(spec: ParamSpec, onChange: (value: unknown) => void): Input {
+  const main = selectFrom((spec.choices ?? []).map((name) => ({ value: name, label: name })));
   main.addEventListener('change', () => {
     if (main.value !== NUMBER) onChange(main.value);
   });
@@ -144,7 +126,12 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
   const { label, min, max, unit } = spec;
   const name = [label, unit].filter(Boolean).join(', ');
   const field = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal', 'aria-label': name });
-  const row = h('span', { class: 'value own', hidden: true }, field, ...unitOf(spec));
+  const row = h(
+    'span',
+    { class: 'value own', hidden: true },
+    field,
+    ...(unit ? [h('span', { class: 'unit' }, unit)] : []),
+  );
   main.append(h('option', { value: NUMBER }, text('controls.customValue')));
   main.addEventListener('change', () => {
     row.hidden = main.value !== NUMBER;
@@ -161,9 +148,9 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
 }
 
 /** Creates a number field for a parameter, with a slider beside it if the parameter's range is bounded. */
-function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
+function numberInput(spec: ParamSpec, onChange: (value: unknown) => void): Input {
   const { min, max } = spec;
-  const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
+  const main = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal' });
   const slider = min !== undefined && max !== undefined && max < ENDLESS ? new Slider(spec, min, max) : undefined;
   const show = (value: unknown) => {
     main.value = typeof value === 'number' ? typed(value) : String(value);

@@ -1,8 +1,13 @@
 import { text } from '../texts';
 import type { Enrichment, Preparation } from '../track/protocol';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { type Choice, Field, selectFrom } from './field';
 
-const KINDS: { value: Enrichment; label: string }[] = [
+const BINNINGS: Choice[] = [
+  { value: '1', label: '×1' },
+  { value: '2', label: '×2' },
+];
+const KINDS: Choice<Enrichment>[] = [
   { value: 'none', label: text('trackPanels.enrichNone') },
   { value: 'linear', label: text('trackPanels.enrichLinear') },
   { value: 'flow', label: text('trackPanels.enrichFlow') },
@@ -13,74 +18,50 @@ const MAX_FACTOR = 16;
 /** Controls of the Track lab for the preprocessing of the image before tracking: binning and in-between slices. */
 export class PreparationControls {
   readonly element: HTMLElement;
-  readonly #binning: HTMLSelectElement;
-  readonly #kind: HTMLSelectElement;
-  readonly #factor: HTMLInputElement;
-  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #binning = new Field(selectFrom(BINNINGS, { 'data-prepare': 'binning' }), {
+    label: text('trackPanels.binning'),
+    help: text('trackPanels.binningHelp'),
+  });
+  readonly #kind = new Field(selectFrom(KINDS, { 'data-prepare': 'enrichment' }), {
+    label: text('trackPanels.inBetweenSlices'),
+    help: text('trackPanels.inBetweenSlicesHelp'),
+  });
+  readonly #factor = new Field(
+    h('input', {
+      ...{ type: 'number', min: 0, max: MAX_FACTOR, step: 1, inputmode: 'numeric', 'data-prepare': 'factor' },
+      placeholder: text('controls.auto'),
+    }),
+    { label: text('trackPanels.inBetweenFactor'), help: text('trackPanels.inBetweenFactorHelp') },
+  );
   #value: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
 
   constructor(onChange: (preparation: Preparation, what: string) => void) {
-    const [binning, kind, factor] = ['binning', 'enrichment', 'factor'].map(uniqueId) as [string, string, string];
-    this.#binning = h(
-      'select',
-      { id: binning, 'data-prepare': 'binning' },
-      h('option', { value: '1' }, '×1'),
-      h('option', { value: '2' }, '×2'),
+    const [binning, kind, factor] = [this.#binning.control, this.#kind.control, this.#factor.control];
+    binning.addEventListener('change', () =>
+      onChange({ ...this.#value, binning: binning.value === '2' ? 2 : 1 }, text('trackPanels.binningChange')),
     );
-    this.#binning.addEventListener('change', () =>
-      onChange({ ...this.#value, binning: this.#binning.value === '2' ? 2 : 1 }, text('trackPanels.binningChange')),
+    kind.addEventListener('change', () =>
+      onChange({ ...this.#value, enrichment: kind.value as Enrichment }, text('trackPanels.inBetweenSlicesChange')),
     );
-    const options = KINDS.map(({ value, label }) => h('option', { value }, label));
-    this.#kind = h('select', { id: kind, 'data-prepare': 'enrichment' }, ...options);
-    this.#kind.addEventListener('change', () =>
-      onChange(
-        { ...this.#value, enrichment: this.#kind.value as Enrichment },
-        text('trackPanels.inBetweenSlicesChange'),
-      ),
-    );
-    this.#factor = h('input', {
-      type: 'number',
-      id: factor,
-      min: 0,
-      max: MAX_FACTOR,
-      step: 1,
-      placeholder: text('controls.auto'),
-      inputmode: 'numeric',
-      'data-prepare': 'factor',
-    });
-    this.#factor.addEventListener('change', () => {
-      const given = this.#factor.value === '' && !this.#factor.validity.badInput ? 0 : this.#factor.valueAsNumber;
-      const valid = Number.isInteger(given) && given >= 0 && given <= MAX_FACTOR;
-      this.#error.textContent = valid ? '' : text('trackPanels.inBetweenFactorError', { most: MAX_FACTOR });
+    factor.addEventListener('change', () => {
+      const valid = factor.checkValidity();
+      this.#factor.showError(valid ? undefined : text('trackPanels.inBetweenFactorError', { most: MAX_FACTOR }));
+      const given = factor.value === '' ? 0 : factor.valueAsNumber;
       if (valid) onChange({ ...this.#value, factor: given }, text('trackPanels.inBetweenFactorChange'));
     });
     this.element = h(
       'div',
       { class: 'preparation' },
-      row(text('trackPanels.binning'), binning, this.#binning, text('trackPanels.binningHelp')),
-      row(text('trackPanels.inBetweenSlices'), kind, this.#kind, text('trackPanels.inBetweenSlicesHelp')),
-      row(text('trackPanels.inBetweenFactor'), factor, this.#factor, text('trackPanels.inBetweenFactorHelp')),
-      this.#error,
+      ...[this.#binning, this.#kind, this.#factor].map((field) => field.element),
     );
   }
 
   show(preparation: Preparation): void {
     this.#value = preparation;
-    this.#binning.value = String(preparation.binning);
-    this.#kind.value = preparation.enrichment;
-    this.#factor.value = preparation.factor > 0 ? String(preparation.factor) : '';
-    this.#factor.disabled = preparation.enrichment === 'none';
-    this.#error.textContent = '';
+    this.#binning.control.value = String(preparation.binning);
+    this.#kind.control.value = preparation.enrichment;
+    this.#factor.control.value = preparation.factor > 0 ? String(preparation.factor) : '';
+    this.#factor.control.disabled = preparation.enrichment === 'none';
+    this.#factor.showError(undefined);
   }
-}
-
-function row(label: string, id: string, control: HTMLElement, help: string): HTMLElement {
-  control.setAttribute('aria-describedby', `${id}-help`);
-  return h(
-    'div',
-    { class: 'param' },
-    h('label', { for: id }, label),
-    h('span', { class: 'value' }, control),
-    h('p', { class: 'help', id: `${id}-help` }, help),
-  );
 }

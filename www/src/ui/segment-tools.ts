@@ -1,5 +1,7 @@
 import { text } from '../texts';
 import { h, icon, uniqueId } from './dom';
+import { Field, labelFor, selectFrom } from './field';
+import { showUndoable } from './transport';
 
 /** Effect of pressing a slice: the crosshair moves, or labels change. */
 export type Tool = 'navigate' | 'brush' | 'threshold' | 'eraser' | 'fill';
@@ -59,21 +61,27 @@ export class SegmentTools {
   readonly #events: ToolEvents;
   readonly #radios = new Map<Tool, HTMLInputElement>();
   readonly #help = h('p', { class: 'help', 'data-tool-help': '' });
-  readonly #radius: HTMLInputElement;
-  readonly #output: HTMLOutputElement;
-  readonly #radiusRow: HTMLElement;
-  readonly #shape: HTMLSelectElement;
-  readonly #shapeRow: HTMLElement;
-  readonly #extent: HTMLSelectElement;
-  readonly #extentRow: HTMLElement;
-  readonly #reach: HTMLInputElement;
-  readonly #reachRow: HTMLElement;
-  readonly #inRange = h('input', { type: 'checkbox', 'data-tool-setting': 'in-range' });
+  readonly #radius = setting('radius', { type: 'range', min: 0, max: MOST_RADIUS, step: 1 });
+  readonly #output = h('output', { 'aria-live': 'off' });
+  readonly #shape = choice('shape', text('segment.shape'), { ball: text('segment.ball'), disc: text('segment.disc') });
+  readonly #extent = choice('extent', text('segment.extent'), {
+    slice: text('segment.extentSlice'),
+    box: text('segment.extentBox'),
+  });
+  readonly #reach = new Field(setting('reach', { type: 'number', min: 1, max: MOST_REACH, step: 1 }), {
+    label: text('segment.reach'),
+    row: 'row',
+    attributes: { title: text('segment.reachHelp') },
+  });
+  readonly #inRange = setting('in-range', { type: 'checkbox' });
   readonly #inRangeRow = h('label', { class: 'check' }, this.#inRange, text('segment.inRange'));
-  readonly #ends: [HTMLInputElement, HTMLInputElement];
+  readonly #ends = (['low', 'high'] as const).map((end) => {
+    const label = text(end === 'low' ? 'segment.rangeLow' : 'segment.rangeHigh');
+    return setting(end, { type: 'number', step: 'any', required: true, 'aria-label': label });
+  });
   readonly #rangeRow: HTMLElement;
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
-  readonly #protect = h('input', { type: 'checkbox', 'data-tool-setting': 'protect' });
+  readonly #protect = setting('protect', { type: 'checkbox' });
   readonly #apply: HTMLButtonElement;
   readonly #undo: HTMLButtonElement;
   readonly #redo: HTMLButtonElement;
@@ -91,13 +99,14 @@ export class SegmentTools {
       this.#radios.set(tool, radio);
       return h('label', { title: text('segment.toolTitle', { help, key: key.toUpperCase() }) }, radio, label);
     });
-    [this.#radiusRow, this.#radius, this.#output] = this.#buildRadius();
-    [this.#shapeRow, this.#shape] = this.#buildShape();
-    [this.#extentRow, this.#extent] = this.#buildExtent();
-    [this.#reachRow, this.#reach] = this.#buildReach();
-    [this.#rangeRow, this.#ends] = this.#buildRange();
-    this.#inRange.addEventListener('change', () => this.set({ inRange: this.#inRange.checked }));
-    this.#protect.addEventListener('change', () => this.set({ protect: this.#protect.checked }));
+    this.#listen();
+    const [low = '', high = ''] = this.#ends;
+    this.#rangeRow = h(
+      'div',
+      { class: 'row stacked' },
+      h('span', {}, text('segment.range')),
+      h('span', { class: 'value' }, low, '–', high),
+    );
     this.#apply = h(
       'button',
       { type: 'button', class: 'wide', 'data-action': 'apply', onclick: events.onApply },
@@ -105,20 +114,22 @@ export class SegmentTools {
     );
     this.#undo = h('button', { type: 'button', 'data-transport': 'undo', onclick: events.onUndo }, icon(UNDO));
     this.#redo = h('button', { type: 'button', 'data-transport': 'redo', onclick: events.onRedo }, icon(REDO));
+    const radiusLabel = labelFor(this.#radius, text('segment.radius'));
+    this.#output.htmlFor.add(this.#radius.id);
     this.bar = h(
       'div',
       { class: 'tool-bar', role: 'group', 'aria-label': text('segment.sectionTool') },
       h('div', { class: 'tool-choice', role: 'radiogroup', 'aria-label': text('segment.toolGroup') }, ...radios),
-      this.#radiusRow,
+      h('div', { class: 'radius', title: text('segment.radiusHelp') }, radiusLabel, this.#radius, this.#output),
       h('div', { class: 'buttons' }, this.#undo, this.#redo),
     );
     this.settings = h(
       'div',
       { class: 'tool-settings' },
       this.#help,
-      this.#shapeRow,
-      this.#extentRow,
-      this.#reachRow,
+      this.#shape.element,
+      this.#extent.element,
+      this.#reach.element,
       this.#inRangeRow,
       this.#rangeRow,
       this.#error,
@@ -156,78 +167,21 @@ export class SegmentTools {
 
   /** Sets the names of the changes that undo and redo would affect; undefined disables the button. */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
-    for (const [button, verb, what] of [
-      [this.#undo, text('controls.undo'), undoable],
-      [this.#redo, text('controls.redo'), redoable],
-    ] as const) {
-      button.disabled = what === undefined;
-      const title =
-        what === undefined ? text('controls.nothingTo', { verb }) : text('controls.doAction', { verb, action: what });
-      button.title = title;
-      button.setAttribute('aria-label', title);
-    }
+    showUndoable(this.#undo, text('controls.undo'), undoable);
+    showUndoable(this.#redo, text('controls.redo'), redoable);
   }
 
-  #buildRadius(): [HTMLElement, HTMLInputElement, HTMLOutputElement] {
-    const id = uniqueId('radius');
-    const slider = h('input', { type: 'range', id, min: 0, max: MOST_RADIUS, step: 1, 'data-tool-setting': 'radius' });
-    slider.addEventListener('input', () => this.set({ radius: slider.valueAsNumber }));
-    const output = h('output', { for: id, 'aria-live': 'off' });
-    const title = text('segment.radiusHelp');
-    return [
-      h('div', { class: 'radius', title }, h('label', { for: id }, text('segment.radius')), slider, output),
-      slider,
-      output,
-    ];
-  }
-
-  #buildShape(): [HTMLElement, HTMLSelectElement] {
-    const id = uniqueId('shape');
-    const select = h(
-      'select',
-      { id, 'data-tool-setting': 'shape' },
-      h('option', { value: 'ball' }, text('segment.ball')),
-      h('option', { value: 'disc' }, text('segment.disc')),
-    );
-    select.addEventListener('change', () => this.set({ shape: select.value as BrushShape }));
-    return [h('div', { class: 'row' }, h('label', { for: id }, text('segment.shape')), select), select];
-  }
-
-  #buildExtent(): [HTMLElement, HTMLSelectElement] {
-    const id = uniqueId('extent');
-    const select = h(
-      'select',
-      { id, 'data-tool-setting': 'extent' },
-      h('option', { value: 'slice' }, text('segment.extentSlice')),
-      h('option', { value: 'box' }, text('segment.extentBox')),
-    );
-    select.addEventListener('change', () => this.set({ extent: select.value as FillExtent }));
-    return [h('div', { class: 'row' }, h('label', { for: id }, text('segment.extent')), select), select];
-  }
-
-  #buildReach(): [HTMLElement, HTMLInputElement] {
-    const id = uniqueId('reach');
-    const input = h('input', { type: 'number', id, min: 1, max: MOST_REACH, step: 1, 'data-tool-setting': 'reach' });
-    input.addEventListener('change', () => this.set({ reach: input.valueAsNumber }));
-    const title = text('segment.reachHelp');
-    return [h('div', { class: 'row', title }, h('label', { for: id }, text('segment.reach')), input), input];
-  }
-
-  #buildRange(): [HTMLElement, [HTMLInputElement, HTMLInputElement]] {
-    const ends = (['low', 'high'] as const).map((end) => {
-      const label = text(end === 'low' ? 'segment.rangeLow' : 'segment.rangeHigh');
-      const input = h('input', { type: 'number', step: 'any', required: true, 'aria-label': label });
-      input.dataset.toolSetting = end;
-      input.addEventListener('change', () => this.#changeRange());
-      return input;
-    }) as [HTMLInputElement, HTMLInputElement];
-    const row = h(
-      'div',
-      { class: 'row stacked' },
-      h('span', {}, text('segment.range')),
-      h('span', { class: 'value' }, ends[0], '–', ends[1]),
-    );
-    return [row, ends];
+  #listen(): void {
+    const onChange = (control: HTMLElement, read: () => Partial<ToolSettings>) =>
+      control.addEventListener('change', () => this.set(read()));
+    const [shape, extent, reach] = [this.#shape.control, this.#extent.control, this.#reach.control];
+    this.#radius.addEventListener('input', () => this.set({ radius: this.#radius.valueAsNumber }));
+    onChange(shape, () => ({ shape: shape.value as BrushShape }));
+    onChange(extent, () => ({ extent: extent.value as FillExtent }));
+    onChange(reach, () => ({ reach: reach.valueAsNumber }));
+    onChange(this.#inRange, () => ({ inRange: this.#inRange.checked }));
+    onChange(this.#protect, () => ({ protect: this.#protect.checked }));
+    for (const input of this.#ends) input.addEventListener('change', () => this.#changeRange());
   }
 
   #changeRange(): void {
@@ -244,16 +198,25 @@ export class SegmentTools {
     this.#radius.valueAsNumber = radius;
     this.#output.value = String(radius);
     this.#radius.disabled = !hasBrush;
-    this.#shape.value = shape;
-    this.#shapeRow.hidden = !hasBrush;
-    this.#extent.value = extent;
-    this.#extentRow.hidden = tool !== 'fill';
-    this.#reach.valueAsNumber = reach;
+    this.#shape.control.value = shape;
+    this.#shape.element.hidden = !hasBrush;
+    this.#extent.control.value = extent;
+    this.#extent.element.hidden = tool !== 'fill';
+    this.#reach.control.valueAsNumber = reach;
     this.#inRange.checked = inRange;
-    for (const row of [this.#reachRow, this.#inRangeRow]) row.hidden = tool !== 'fill' || extent === 'slice';
+    for (const row of [this.#reach.element, this.#inRangeRow]) row.hidden = tool !== 'fill' || extent === 'slice';
     this.#rangeRow.hidden = !usesRange(this.#value);
     for (const [side, input] of this.#ends.entries()) input.valueAsNumber = range[side] ?? 0;
     this.#error.textContent = '';
     this.#protect.checked = protect;
   }
+}
+
+function setting(name: string, attributes: Record<string, unknown>): HTMLInputElement {
+  return h('input', { 'data-tool-setting': name, ...attributes });
+}
+
+function choice(name: string, label: string, choices: Record<string, string>): Field<HTMLSelectElement> {
+  const entries = Object.entries(choices).map(([value, label]) => ({ value, label }));
+  return new Field(selectFrom(entries, { 'data-tool-setting': name }), { label, row: 'row' });
 }

@@ -1,28 +1,29 @@
 import type { StartShape } from '../protocol';
 import { text } from '../texts';
-import { h, symbol, uniqueId } from './dom';
+import { h } from './dom';
+import { Field, type FormControl, selectFrom } from './field';
 
 type Kind = StartShape['kind'];
 
 export function isStartKind(text: string | undefined): text is Kind {
-  return SHAPES.some(({ kind }) => kind === text);
+  return SHAPES.some(({ value }) => value === text);
 }
 
-const SHAPES: { kind: Kind; label: string; help: string }[] = [
+const SHAPES: { value: Kind; label: string; help: string }[] = [
   {
-    kind: 'contour',
+    value: 'contour',
     label: text('extractPanels.startContour'),
     help: text('extractPanels.startContourHelp'),
   },
   {
-    kind: 'enclosing',
+    value: 'enclosing',
     label: text('extractPanels.startEnclosing'),
     help: text('extractPanels.startEnclosingHelp'),
   },
-  { kind: 'bubbles', label: text('extractPanels.startBubbles'), help: text('extractPanels.startBubblesHelp') },
-  { kind: 'sphere', label: text('extractPanels.startSphere'), help: text('extractPanels.startSphereHelp') },
+  { value: 'bubbles', label: text('extractPanels.startBubbles'), help: text('extractPanels.startBubblesHelp') },
+  { value: 'sphere', label: text('extractPanels.startSphere'), help: text('extractPanels.startSphereHelp') },
   {
-    kind: 'isosurface',
+    value: 'isosurface',
     label: text('extractPanels.startIsosurface'),
     help: text('extractPanels.startIsosurfaceHelp'),
   },
@@ -46,33 +47,37 @@ export interface StartChoice {
  */
 export class StartControls {
   readonly element: HTMLElement;
-  readonly #shape = new Field(text('extractPanels.startShape'), h('select', {}, ...SHAPES.map(optionFor)), '', '');
-  readonly #bubbles = new Field(
-    text('extractPanels.bubblesPerAxis'),
-    integer(2, MOST_BUBBLES, DEFAULT_BUBBLES),
-    text('extractPanels.bubblesPerAxisHelp'),
-    text('extractPanels.bubblesPerAxisError', { most: MOST_BUBBLES }),
-  );
-  readonly #levels = new Field(
-    [text('extractPanels.pyramidLevelCount'), symbol('m')],
-    integer(0, MOST_LEVELS, DEFAULT_LEVELS),
-    text('extractPanels.pyramidLevelCountHelp'),
-    text('extractPanels.pyramidLevelCountError', { most: MOST_LEVELS }),
-  );
+  readonly #shape = new Field(selectFrom(SHAPES), { label: text('extractPanels.startShape'), help: '', row: 'row' });
+  readonly #bubbles = new Field(integer(2, MOST_BUBBLES, DEFAULT_BUBBLES), {
+    label: text('extractPanels.bubblesPerAxis'),
+    help: text('extractPanels.bubblesPerAxisHelp'),
+    row: 'row',
+  });
+  readonly #levels = new Field(integer(0, MOST_LEVELS, DEFAULT_LEVELS), {
+    label: text('extractPanels.pyramidLevelCount'),
+    symbol: 'm',
+    help: text('extractPanels.pyramidLevelCountHelp'),
+    row: 'row',
+  });
   readonly #edge = new Field(
-    text('extractPanels.meanEdgeLength'),
     h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: text('controls.auto') }),
-    text('extractPanels.meanEdgeLengthHelp'),
-    text('extractPanels.meanEdgeLengthError'),
+    { label: text('extractPanels.meanEdgeLength'), help: text('extractPanels.meanEdgeLengthHelp'), row: 'row' },
   );
-  readonly #fields = [this.#shape, this.#bubbles, this.#levels, this.#edge];
+  /** The fields, each with the error message for an invalid value. */
+  readonly #needs = new Map<Field<FormControl>, string>([
+    [this.#shape, ''],
+    [this.#bubbles, text('extractPanels.bubblesPerAxisError', { most: MOST_BUBBLES })],
+    [this.#levels, text('extractPanels.pyramidLevelCountError', { most: MOST_LEVELS })],
+    [this.#edge, text('extractPanels.meanEdgeLengthError')],
+  ]);
   /** The field that was changed last, which shows the error if no model can be created. */
-  #changed: Field = this.#shape;
+  #changed: Field<FormControl> = this.#shape;
   #inForce: StartChoice;
 
   constructor(onChange: () => void) {
-    for (const field of this.#fields) field.control.addEventListener('change', () => this.#onChange(field, onChange));
-    this.element = h('div', { class: 'start' }, ...this.#fields.map((field) => field.element));
+    for (const field of this.#needs.keys())
+      field.control.addEventListener('change', () => this.#onChange(field, onChange));
+    this.element = h('div', { class: 'start' }, ...[...this.#needs.keys()].map((field) => field.element));
     this.#explain();
     this.#inForce = this.value;
   }
@@ -104,7 +109,7 @@ export class StartControls {
     this.#bubbles.control.valueAsNumber = choice.bubbles;
     this.#levels.control.valueAsNumber = choice.levels;
     this.#edge.control.value = choice.edge === undefined ? '' : String(choice.edge);
-    for (const field of this.#fields) field.showError(undefined);
+    for (const field of this.#needs.keys()) field.showError(undefined);
     this.#explain();
   }
 
@@ -117,59 +122,19 @@ export class StartControls {
     this.#changed.showError(message);
   }
 
-  #onChange(field: Field, onChange: () => void): void {
+  #onChange(field: Field<FormControl>, onChange: () => void): void {
     this.#changed = field;
-    for (const each of this.#fields) each.showError(undefined);
+    for (const each of this.#needs.keys()) each.showError(undefined);
     this.#explain();
     if (field.control.checkValidity()) onChange();
-    else this.reject(field.need);
+    else this.reject(this.#needs.get(field) ?? '');
   }
 
   #explain(): void {
     const kind = this.#shape.control.value;
     this.#bubbles.element.hidden = kind !== 'bubbles';
-    this.#shape.help = SHAPES.find((shape) => shape.kind === kind)?.help ?? '';
+    this.#shape.help = SHAPES.find(({ value }) => value === kind)?.help ?? '';
   }
-}
-
-/** A form control with its label, help text and error message. */
-class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElement | HTMLSelectElement> {
-  readonly element: HTMLElement;
-  readonly control: Control;
-  /** Error message for an invalid value. */
-  readonly need: string;
-  readonly #help: HTMLElement;
-  readonly #error: HTMLElement;
-
-  constructor(label: string | (string | Node)[], control: Control, help: string, need: string) {
-    const id = uniqueId('start');
-    this.control = control;
-    this.need = need;
-    this.#help = h('p', { class: 'help', id: `${id}-help` }, help);
-    this.#error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
-    control.id = id;
-    control.setAttribute('aria-describedby', `${id}-help ${id}-error`);
-    const row = h(
-      'div',
-      { class: 'row' },
-      h('label', { for: id }, ...[label].flat()),
-      h('span', { class: 'value' }, control),
-    );
-    this.element = h('div', {}, row, this.#help, this.#error);
-  }
-
-  set help(text: string) {
-    this.#help.textContent = text;
-  }
-
-  showError(message: string | undefined): void {
-    this.#error.textContent = message ?? '';
-    this.control.toggleAttribute('aria-invalid', message !== undefined);
-  }
-}
-
-function optionFor({ kind, label }: (typeof SHAPES)[number]): HTMLOptionElement {
-  return h('option', { value: kind }, label);
 }
 
 function integer(min: number, max: number, value: number): HTMLInputElement {

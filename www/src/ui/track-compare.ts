@@ -1,10 +1,12 @@
 import { text } from '../texts';
 import { beatOf } from '../track/curve';
 import type { Alternative, ComparedTrack, FrameStatistics, Preparation, SurfaceError } from '../track/protocol';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { type Choice, labelFor, selectFrom } from './field';
 import { count, figure, milliseconds } from './format';
+import { TaskControls } from './task';
 
-const ALTERNATIVES: { value: Alternative; label: string }[] = [
+const ALTERNATIVES: Choice<Alternative>[] = [
   { value: 'prediction', label: text('trackPanels.otherPrediction') },
   { value: 'none', label: text('trackPanels.otherNone') },
   { value: 'linear', label: text('trackPanels.otherLinear') },
@@ -32,55 +34,32 @@ export interface TrackCompareEvents {
  */
 export class TrackComparePanel {
   readonly element: HTMLElement;
-  readonly #select: HTMLSelectElement;
-  readonly #start: HTMLButtonElement;
-  readonly #cancel: HTMLButtonElement;
-  readonly #progress = h('progress', {
-    max: 1,
-    value: 0,
-    'aria-label': text('controls.comparisonProgress'),
-    hidden: true,
-  });
-  readonly #status = h('p', { class: 'help', role: 'status' });
+  readonly #select = selectFrom(ALTERNATIVES, { 'data-compare': 'with' });
+  readonly #task: TaskControls;
   readonly #table = h('div', { 'data-comparison': '{}' });
 
   constructor({ onStart, onCancel }: TrackCompareEvents) {
-    const id = uniqueId('compare');
-    this.#select = h(
-      'select',
-      { id, 'data-compare': 'with' },
-      ...ALTERNATIVES.map(({ value, label }) => h('option', { value }, label)),
-    );
-    this.#start = h(
-      'button',
-      {
-        type: 'button',
-        disabled: true,
-        'data-compare': 'start',
-        onclick: () => onStart(this.#select.value as Alternative),
-      },
-      text('controls.compare'),
-    );
-    this.#cancel = h(
-      'button',
-      { type: 'button', onclick: onCancel, 'data-compare': 'cancel', hidden: true },
-      text('controls.cancel'),
-    );
+    this.#task = new TaskControls({
+      name: 'compare',
+      start: text('controls.compare'),
+      progress: text('controls.comparisonProgress'),
+      onStart: () => onStart(this.#select.value as Alternative),
+      onCancel,
+    });
+    this.#task.enabled = false;
     this.element = h(
       'div',
       { class: 'compare' },
       h('p', { class: 'help' }, text('trackPanels.compareHelp')),
-      h('div', { class: 'row stacked' }, h('label', { for: id }, text('trackPanels.changedSetting')), this.#select),
-      h('div', { class: 'buttons' }, this.#start, this.#cancel),
-      this.#progress,
-      this.#status,
+      h('div', { class: 'row stacked' }, labelFor(this.#select, text('trackPanels.changedSetting')), this.#select),
+      ...this.#task.elements,
       this.#table,
     );
   }
 
   /** Whether the current tracking run is finished, so that it can be compared with another. */
   set enabled(enabled: boolean) {
-    this.#start.disabled = !enabled;
+    this.#task.enabled = enabled;
   }
 
   /** Updates the choice of alternative settings for the second run; the current setting is not offered. */
@@ -96,43 +75,27 @@ export class TrackComparePanel {
   clear(): void {
     this.#table.replaceChildren();
     this.#table.dataset.comparison = '{}';
-    this.#end('');
+    this.#task.end('');
   }
 
   begin(): void {
     this.clear();
-    this.#start.hidden = true;
-    this.#cancel.hidden = false;
-    this.#cancel.focus();
-    this.#progress.hidden = false;
-    this.#progress.value = 0;
-    this.#status.textContent = text('controls.comparing');
+    this.#task.begin(text('controls.comparing'));
   }
 
   /** Shows the progress of the second run, 0 to 1, and its phase, without announcing them to screen readers. */
   showProgress(part: number, phase: string): void {
-    this.#progress.value = Number.isFinite(part) ? part : 0;
-    this.#cancel.textContent = text('trackPanels.cancelPhase', { phase });
+    this.#task.showProgress(part, text('trackPanels.cancelPhase', { phase }));
   }
 
   reject(message: string): void {
-    this.#end(message);
+    this.#task.end(message);
   }
 
   finish(runs: [TrackingRun, TrackingRun]): void {
-    this.#end(describeResult(runs));
+    this.#task.end(describeResult(runs));
     this.#table.dataset.comparison = JSON.stringify(runs.map(summary));
     this.#table.replaceChildren(tableOf(runs));
-  }
-
-  #end(message: string): void {
-    const hadFocus = document.activeElement === this.#cancel;
-    this.#start.hidden = false;
-    this.#cancel.hidden = true;
-    this.#cancel.textContent = text('controls.cancel');
-    this.#progress.hidden = true;
-    this.#status.textContent = message;
-    if (hadFocus) this.#start.focus();
   }
 }
 

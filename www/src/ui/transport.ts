@@ -77,16 +77,8 @@ export class Transport {
    * button.
    */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
-    for (const [button, verb, what] of [
-      [this.#undo, text('controls.undo'), undoable],
-      [this.#redo, text('controls.redo'), redoable],
-    ] as const) {
-      button.disabled = what === undefined;
-      const title =
-        what === undefined ? text('controls.nothingTo', { verb }) : text('controls.doAction', { verb, action: what });
-      button.title = title;
-      button.setAttribute('aria-label', title);
-    }
+    showUndoable(this.#undo, text('controls.undo'), undoable);
+    showUndoable(this.#redo, text('controls.redo'), redoable);
   }
 
   /**
@@ -118,6 +110,14 @@ export class Transport {
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }
+}
+
+/** Labels a button for undo or redo (`verb`) with the change that it affects; undefined disables the button. */
+export function showUndoable(button: HTMLButtonElement, verb: string, action: string | undefined): void {
+  button.disabled = action === undefined;
+  button.title =
+    action === undefined ? text('controls.nothingTo', { verb }) : text('controls.doAction', { verb, action });
+  button.setAttribute('aria-label', button.title);
 }
 
 /** Creates the text of a button with an icon; it is hidden where space is limited. */

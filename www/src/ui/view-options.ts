@@ -1,6 +1,7 @@
 import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
-import { h, uniqueId } from './dom';
+import { h } from './dom';
+import { type Choice, type FormControl, labelFor, selectFrom } from './field';
 
 /**
  * Placement of the slices in the 3D view: on the walls behind the surface, at their positions in the volume, or hidden.
@@ -17,17 +18,13 @@ export interface ViewOptions {
   slices: SlicePlacement;
 }
 
-const SWITCHES = [
-  { name: 'surface', label: text('controls.viewSurface') },
-  { name: 'edges', label: text('controls.viewWireframe') },
-] as const;
-export const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
+export const PLACEMENTS: Choice<SlicePlacement>[] = [
   { value: 'walls', label: text('controls.placementWalls') },
   { value: 'in place', label: text('controls.placementInPlace') },
   { value: 'hidden', label: text('controls.placementHidden') },
 ];
 
-export const COLOR_MODES: { value: ColorMode; label: string }[] = [
+const COLOR_MODES: Choice<ColorMode>[] = [
   { value: 'plain', label: text('controls.colorPlain') },
   { value: 'component', label: text('controls.colorComponent') },
   { value: 'speed', label: text('controls.colorSpeed') },
@@ -35,64 +32,100 @@ export const COLOR_MODES: { value: ColorMode; label: string }[] = [
   { value: 'gaussian curvature', label: text('controls.colorGaussianCurvature') },
 ];
 
-/** Controls for the view options of the Extract lab: what is shown, and the surface's colouring. */
-export class ViewOptionControls {
-  readonly element: HTMLElement;
-  readonly #color: HTMLSelectElement;
-  readonly #value: ViewOptions;
-  readonly #onChange: (options: ViewOptions) => void;
+/** An option of a view: a switch, with `choices` a selection list, or with `step` a number from 0 to 1. */
+export interface ViewOption<Options> {
+  name: keyof Options & string;
+  label: string;
+  choices?: readonly Choice[];
+  step?: number;
+}
 
-  constructor(initial: ViewOptions, onChange: (options: ViewOptions) => void) {
+/** Controls over a 3D view for its options, one for each entry of a list. */
+export class OptionControls<Options extends object> {
+  readonly element: HTMLElement;
+  readonly #list: readonly ViewOption<Options>[];
+  readonly #controls = new Map<keyof Options, FormControl>();
+  readonly #initial: Options;
+  readonly #value: Options;
+  readonly #onChange: (options: Options) => void;
+
+  constructor(list: readonly ViewOption<Options>[], initial: Options, onChange: (options: Options) => void) {
+    this.#list = list;
+    this.#initial = initial;
     this.#value = { ...initial };
     this.#onChange = onChange;
-    const switches = SWITCHES.map(({ name, label }) => {
-      const box = h('input', { type: 'checkbox', checked: initial[name], 'data-view': name });
-      box.addEventListener('change', () => this.#change({ [name]: box.checked }));
-      return h('label', {}, box, label);
-    });
-    const color = choice(text('controls.color'), 'color', COLOR_MODES, initial.color, (color) =>
-      this.#change({ color }),
-    );
-    const slices = choice(text('controls.slices'), 'slices', PLACEMENTS, initial.slices, (slices) =>
-      this.#change({ slices }),
-    );
-    this.#color = color.select;
-    this.element = h(
-      'div',
-      { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') },
-      ...switches,
-      color.element,
-      slices.element,
-    );
+    const attributes = { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') };
+    this.element = h('div', attributes, ...list.map((option) => this.#build(option)));
+    this.#show();
   }
 
-  get value(): ViewOptions {
+  get value(): Options {
     return this.#value;
+  }
+
+  /** Changes options and reports all of them to the lab; an unknown value is replaced by the initial one. */
+  set(changed: Partial<Options>): void {
+    Object.assign(this.#value, changed);
+    for (const option of this.#list)
+      if (!isPossible(option, this.#value[option.name])) this.#value[option.name] = this.#initial[option.name];
+    this.#show();
+    this.#onChange({ ...this.#value });
+  }
+
+  /** Returns the control of an option, with its label. */
+  protected elementOf(name: keyof Options): HTMLElement | undefined {
+    return this.#controls.get(name)?.parentElement ?? undefined;
+  }
+
+  /** Returns an entry of an option's selection list. */
+  protected entryOf(name: keyof Options, value: string): HTMLOptionElement | null | undefined {
+    return this.#controls.get(name)?.querySelector<HTMLOptionElement>(`[value="${value}"]`);
+  }
+
+  #build({ name, label, choices, step }: ViewOption<Options>): HTMLElement {
+    const range = { type: 'range', min: 0, max: 1, step };
+    const control = choices ? selectFrom(choices) : h('input', step ? range : { type: 'checkbox' });
+    control.dataset.view = name;
+    this.#controls.set(name, control);
+    control.addEventListener(step ? 'input' : 'change', () => this.set({ [name]: read(control) } as Partial<Options>));
+    if (!choices && !step) return h('label', {}, control, label);
+    return h('span', { class: 'placement' }, labelFor(control, label), control);
+  }
+
+  #show(): void {
+    for (const [name, control] of this.#controls) {
+      const value = this.#value[name];
+      if (typeof value === 'boolean') (control as HTMLInputElement).checked = value;
+      else control.value = String(value);
+    }
+  }
+}
+
+function read(control: FormControl): unknown {
+  if (control.type === 'checkbox') return (control as HTMLInputElement).checked;
+  return control.type === 'range' ? Number(control.value) : control.value;
+}
+
+function isPossible<Options>({ choices, step }: ViewOption<Options>, value: unknown): boolean {
+  if (choices) return choices.some((choice) => choice.value === value);
+  return step === undefined || (typeof value === 'number' && value >= 0 && value <= 1);
+}
+
+/** Controls for the view options of the Extract lab: what is shown, and the surface's colouring. */
+export class ViewOptionControls extends OptionControls<ViewOptions> {
+  constructor(initial: ViewOptions, onChange: (options: ViewOptions) => void) {
+    super(EXTRACT_OPTIONS, initial, onChange);
   }
 
   /** Sets the colouring of the surface and reports it to the lab; an unknown name counts as plain. */
   set color(color: ColorMode) {
-    const known = COLOR_MODES.some(({ value }) => value === color) ? color : 'plain';
-    this.#color.value = known;
-    this.#change({ color: known });
-  }
-
-  #change(changed: Partial<ViewOptions>): void {
-    this.#onChange({ ...Object.assign(this.#value, changed) });
+    this.set({ color });
   }
 }
 
-/** Creates a labelled selection list for a view option. */
-export function choice<Value extends string>(
-  label: string,
-  name: string,
-  choices: { value: Value; label: string }[],
-  initial: Value,
-  onChange: (value: Value) => void,
-): { element: HTMLElement; select: HTMLSelectElement } {
-  const id = uniqueId(name);
-  const options = choices.map(({ value, label }) => h('option', { value, selected: value === initial }, label));
-  const select = h('select', { id, 'data-view': name }, ...options);
-  select.addEventListener('change', () => onChange(select.value as Value));
-  return { element: h('span', { class: 'placement' }, h('label', { for: id }, label), select), select };
-}
+const EXTRACT_OPTIONS: ViewOption<ViewOptions>[] = [
+  { name: 'surface', label: text('controls.viewSurface') },
+  { name: 'edges', label: text('controls.viewWireframe') },
+  { name: 'color', label: text('controls.color'), choices: COLOR_MODES },
+  { name: 'slices', label: text('controls.slices'), choices: PLACEMENTS },
+];
