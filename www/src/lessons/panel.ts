@@ -24,7 +24,7 @@ export class LessonPanel {
     this.#root = root;
     this.#lab = lab;
     const hide = h('button', { type: 'button', class: 'quiet', onclick: onHide }, text('lessons.hide'));
-    root.replaceChildren(h('div', { class: 'lesson-head' }, this.#title, this.#back, hide), this.#error, this.#body);
+    root.replaceChildren(h('div', { class: 'lesson-head' }, this.#back, hide), this.#title, this.#error, this.#body);
     root.setAttribute('aria-label', text('lessons.title'));
     this.#acceptFiles();
   }
@@ -69,7 +69,7 @@ export class LessonPanel {
       plural('lessons.minutes', lesson.minutes),
       text('lessons.progress', { done, steps: lesson.steps.length }),
     ];
-    const open = h('button', { type: 'button', onclick: () => this.#show(lesson, address) }, text('lessons.open'));
+    const open = h('button', { type: 'button', onclick: () => this.#choose(lesson, address) }, text('lessons.open'));
     const id = uniqueId('lesson');
     open.setAttribute('aria-labelledby', `${id}-open ${id}`);
     open.id = `${id}-open`;
@@ -77,7 +77,7 @@ export class LessonPanel {
       'li',
       { lang: lesson.language },
       h('h3', { id }, lesson.title),
-      prose(lesson.intro),
+      prose(lesson.intro.split('\n\n')[0] ?? ''),
       h('p', { class: 'help' }, facts.join(' · ')),
       open,
     );
@@ -91,6 +91,11 @@ export class LessonPanel {
     this.#back.hidden = false;
     this.#view = new LessonView(lesson, this.#lab, address);
     this.#body.replaceChildren(this.#view.element);
+  }
+
+  /** Shows a lesson at the user's request, with the focus on its title. */
+  #choose(lesson: Lesson, address: string): void {
+    this.#show(lesson, address);
     this.#title.focus();
   }
 
@@ -104,7 +109,7 @@ export class LessonPanel {
       const content = await readLessonFiles(files);
       const lesson = parseLesson(content, LANGUAGE);
       sessionStorage.setItem(OPENED_FILES, JSON.stringify(content));
-      this.#show(lesson, OPENED_FILES);
+      this.#choose(lesson, OPENED_FILES);
     });
   }
 
