@@ -20,7 +20,7 @@ export type Check = { [name: string]: unknown };
 export type Records = Record<string, Record<string, Value> | undefined>;
 
 const JOINTS = ['all', 'any', 'not'];
-/** What a condition may be about; lab, state and example are compared for equality. */
+/** Subjects of a condition; lab, state and example are compared for equality. */
 const SUBJECTS = ['lab', 'state', 'example', 'measure', 'param'];
 
 const COMPARISONS: Record<string, (value: Value, operand: Value, within: number) => boolean> = {

@@ -10,7 +10,7 @@ export type Part = (typeof PARTS)[number];
 /** Question of a step: for a number, or else for a text. */
 export type Question = { answer: Operand; within?: number } | 'text';
 
-/** What a lesson states of a step besides its text. */
+/** A step as `lesson.json` states it. */
 interface StepData {
   id: string;
   /** Address of a lab with settings, as in its link, without the number sign. */

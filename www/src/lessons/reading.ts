@@ -1,9 +1,9 @@
-/** What the open lab shows, read from the page as another program would: lessons know nothing else of the labs. */
+/** Reads the open lab from its page, as another program would: lessons know nothing else of the labs. */
 import { labOf } from '../labs/address';
 
 export type Value = number | string | boolean;
 
-/** What the open lab shows. */
+/** The open lab, as its page shows it. */
 export interface LabReading {
   /** The lab's name in addresses. */
   lab: string;
