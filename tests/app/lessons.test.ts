@@ -1,6 +1,7 @@
 /** Lessons in the browser: done by the interface, opened from files and addresses, saved, printed, and in German. */
 import { readFileSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
+import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
 import { type Lesson, parseLesson } from '../../www/src/lessons/lesson';
@@ -195,6 +196,16 @@ describe('lessons of the user', () => {
       .poll(() => panel().locator('.field-error').textContent())
       .toMatch(/step 1: .*states.*all,any,not,lab,state/);
     expect(await panel().locator('h2').textContent()).toBe('Mine');
+  });
+
+  test('are opened from a ZIP archive with a folder in it', async () => {
+    const entries = files({ id: 'zipped' }).map(({ name, bytes }) => [`folder/${name}`, new Uint8Array(bytes)]);
+    await panel().getByRole('button', { name: 'All lessons' }).click();
+    await panel().locator('.lesson-list li').nth(5).waitFor();
+    const buffer = Buffer.from(zipSync(Object.fromEntries(entries)));
+    await panel().locator('input[type=file]').setInputFiles({ name: 'mine.zip', mimeType: 'application/zip', buffer });
+    await step().getByRole('heading', { name: 'Only step' }).waitFor();
+    expect(await panel().locator('.field-error').textContent()).toBe('');
   });
 
   test('at an address that has none, the list says so', async () => {

@@ -87,7 +87,7 @@ export class LessonView {
   #show(): void {
     const step = this.#step;
     const index = this.#progress.step;
-    const parts = partsOf(step);
+    const parts = partsOf(step, 'panel');
     const link = (name: 'lessons.back' | 'lessons.next', to: number) =>
       h('button', { type: 'button', disabled: !this.#lesson.steps[to], onclick: () => this.#go(to) }, text(name));
     this.#now = undefined;

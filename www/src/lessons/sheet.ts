@@ -46,14 +46,14 @@ function teacherParts(step: Step): HTMLElement[] {
   const { open, question } = step;
   const expected = typeof question === 'object' && typeof question.answer !== 'object' ? question.answer : undefined;
   return [
-    ...Object.values(partsOf(step, true, true)),
+    ...Object.values(partsOf(step, 'teacher')),
     ...(expected === undefined ? [] : [h('p', {}, text('lessons.expected', { value: shownValue(expected) }))]),
     ...(open ? [h('p', {}, h('a', { class: 'link', href: `./#${open}` }, text('lessons.openState')))] : []),
   ];
 }
 
 function studentParts(step: Step, { ticks, answers }: Progress): HTMLElement[] {
-  const { goal, do: act, watch, check, question } = partsOf(step, true);
+  const { goal, do: act, watch, check, question } = partsOf(step, 'sheet');
   const ticked = ticks[step.id] !== undefined;
   check?.classList.add('lesson-check');
   check?.toggleAttribute('data-ticked', ticked);

@@ -55,11 +55,13 @@ const isLessonFile = (name: string) => /(^|\/)(lesson\.json|text\.[\w-]+\.md)$/.
 
 async function unpack(archive: Blob): Promise<LessonFiles> {
   if (archive.size > MOST_BYTES) throw new Error(text('lessons.archiveTooLarge'));
-  const { unzip } = await import('unzipit');
-  const { entries } = await unzip(archive);
-  const known = Object.values(entries).filter(({ name, size }) => isLessonFile(name) && size <= MOST_BYTES);
-  const files = known.map(async (entry) => [entry.name.replace(/^.*\//, ''), await entry.text()]);
-  return Object.fromEntries(await Promise.all(files));
+  const { strFromU8, unzipSync } = await import('three/addons/libs/fflate.module.js');
+  const entries = unzipSync(new Uint8Array(await archive.arrayBuffer()), {
+    filter: ({ name, originalSize }) => isLessonFile(name) && originalSize <= MOST_BYTES,
+  });
+  return Object.fromEntries(
+    Object.entries(entries).map(([name, bytes]) => [name.replace(/^.*\//, ''), strFromU8(bytes)]),
+  );
 }
 
 async function fetchText(url: URL): Promise<string> {

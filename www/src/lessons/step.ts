@@ -25,18 +25,21 @@ export function prose(source: string): HTMLElement {
 }
 
 /**
- * Returns the parts of a step as elements, by name; `unfolded` shows hint and explanation, too, and the teacher's answer
- * if `withAnswer`.
+ * Returns the parts of a step as elements, by name: for the panel, where hint and explanation are collapsed, or for a
+ * sheet, which for teachers contains the answer, too.
  */
-export function partsOf(step: Step, unfolded = false, withAnswer = false): Partial<Record<Part, HTMLElement>> {
-  const shown = PARTS.filter((part) => step.parts[part] && (part !== 'answer' || withAnswer));
-  return Object.fromEntries(shown.map((part) => [part, partOf(part, step.parts[part] ?? '', unfolded)]));
+export function partsOf(step: Step, on: 'panel' | 'sheet' | 'teacher'): Partial<Record<Part, HTMLElement>> {
+  const shown = PARTS.filter((part) => part !== 'answer' || on === 'teacher');
+  const entries = shown.flatMap((part) => {
+    const source = step.parts[part];
+    return source ? [[part, partOf(part, prose(source), on === 'panel')]] : [];
+  });
+  return Object.fromEntries(entries);
 }
 
-function partOf(part: Part, source: string, unfolded: boolean): HTMLElement {
-  const body = prose(source);
+function partOf(part: Part, body: HTMLElement, inPanel: boolean): HTMLElement {
   if (part === 'goal') return body;
-  if (FOLDED.includes(part) && !unfolded)
+  if (inPanel && FOLDED.includes(part))
     return h('details', { 'data-part': part }, h('summary', {}, TITLES[part]), body);
-  return h('div', { 'data-part': part }, h('h4', {}, TITLES[part]), body);
+  return h('div', { 'data-part': part }, h(inPanel ? 'h4' : 'h3', {}, TITLES[part]), body);
 }
