@@ -56,6 +56,23 @@ const LONG: Partial<typeof QUICK> = {
   reconstruct: 'reconstruct?maxPoints=30000',
 };
 
+test('lessons: the list, an open one with everything unfolded, and its sheets', async () => {
+  await open(app, QUICK.extract);
+  await reach(app.page, 'done');
+  await app.page.getByRole('button', { name: 'Lessons' }).click();
+  await app.page.locator('.lesson-list li').nth(5).waitFor();
+  await expectNothing('.lesson');
+  await app.page.locator('.lesson-list button').first().click();
+  await app.page.locator('.lesson-step').waitFor();
+  await unfold(app.page);
+  await expectNothing('html', LOOKS.slice(0, 3));
+  for (const view of ['sheet', 'teacher']) {
+    await app.page.goto(`${app.address}?lesson=forces&view=${view}`);
+    await app.page.locator('.lesson-sheet section').first().waitFor();
+    await expectNothing('html', LOOKS.slice(0, 2));
+  }
+});
+
 describe.each(LABS)('the %s lab', (lab) => {
   // Segment only runs for moments, after a stroke.
   test.skipIf(lab === 'segment')('has no violations while it runs', async () => {

@@ -150,19 +150,23 @@ export async function iteration(page: Page): Promise<number> {
   return Number((await page.textContent('.iteration'))?.replace(/\D/g, ''));
 }
 
-/** Drops files on the page, as from the desktop. */
-export async function drop(page: Page, files: { name: string; bytes: Uint8Array }[]): Promise<void> {
+/** Drops files on the page, as from the desktop; on the element that `target` selects, if given. */
+export async function drop(page: Page, files: { name: string; bytes: Uint8Array }[], target = ''): Promise<void> {
   const encoded = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString('base64') }));
-  await page.evaluate((list) => {
-    const transfer = new DataTransfer();
-    for (const { name, base64 } of list) {
-      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-      transfer.items.add(new File([bytes], name));
-    }
-    for (const type of ['dragover', 'drop']) {
-      window.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
-    }
-  }, encoded);
+  await page.evaluate(
+    ([list, target]) => {
+      const transfer = new DataTransfer();
+      for (const { name, base64 } of list) {
+        const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+        transfer.items.add(new File([bytes], name));
+      }
+      for (const type of ['dragover', 'drop']) {
+        const event = new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true });
+        (target ? document.querySelector(target) : window)?.dispatchEvent(event);
+      }
+    },
+    [encoded, target] as const,
+  );
 }
 
 /** Returns by how many pixels the page is wider than a window of this size. */

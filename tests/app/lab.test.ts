@@ -401,27 +401,15 @@ describe('a link', () => {
   });
 });
 
-describe('exercises', () => {
-  test('there are two, collapsed at first, that say what to do, observe and hand in', async () => {
+describe('plot data', () => {
+  test('can be saved as CSV', async () => {
     await openAt('#extract?example=figure-7');
-    const exercises = app.page.locator('[data-exercise]');
-    expect(await exercises.count()).toBe(2);
-    await app.page.locator('summary', { hasText: 'Exercises' }).click();
-    await app.page.locator('[data-exercise] summary').last().click();
-    for (const words of ['Questions:', 'Hand in:', 'Compare'])
-      expect(await exercises.last().textContent()).toContain(words);
-    await exercises.last().locator('button').click();
-    await expect.poll(() => app.page.inputValue('.data select')).toBe('figure-15-16');
-    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
     await reach(app.page, 'done');
-  });
-
-  test('the plot data can be saved as CSV', async () => {
     const [download] = await Promise.all([
       app.page.waitForEvent('download'),
       app.page.getByRole('button', { name: 'Plot data (CSV)' }).click(),
     ]);
-    expect(download.suggestedFilename()).toBe('head-phantom.csv');
+    expect(download.suggestedFilename()).toBe('chain.csv');
     const lines = (await readFile(await download.path(), 'utf8')).trim().split('\n');
     expect(lines[0]).toMatch(/^iteration,phase,energy/);
     expect(lines).toHaveLength((await iteration(app.page)) + 1);

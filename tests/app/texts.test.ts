@@ -4,16 +4,19 @@ import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { expect, test } from 'vitest';
 import { plural, type TextKey, text, textNodes } from '../../www/src/texts';
+import german from '../../www/src/texts/de.json';
 import catalogue from '../../www/src/texts/en.json';
 
 const ROOT = fileURLToPath(new URL('../../www/src/', import.meta.url));
 const FORMS = /_(zero|one|two|few|many|other)$/;
 
-const texts = new Map(
-  Object.entries(catalogue).flatMap(([section, entries]) =>
-    Object.entries(entries).map(([name, value]): [string, string] => [`${section}.${name}`, value]),
-  ),
-);
+const textsOf = (sections: Record<string, Record<string, string>>) =>
+  new Map(
+    Object.entries(sections).flatMap(([section, entries]) =>
+      Object.entries(entries).map(([name, value]): [string, string] => [`${section}.${name}`, value]),
+    ),
+  );
+const texts = textsOf(catalogue);
 const placeholders = (value: string) => new Set([...value.matchAll(/\{(\w+)\}/g)].map(([, name]) => name ?? ''));
 
 /** A call of `text`, `plural` or `textNodes`, with its key and the names of its values if these are literal. */
@@ -94,4 +97,13 @@ test('placeholders are replaced, a missing value is an error, and numbers choose
   expect(() => text(key)).toThrow('{name}');
   expect(textNodes(key, { name: 'a.nii' })).toEqual(['Opening ', 'a.nii', '.']);
   expect([plural('counts.step', 1), plural('counts.step', 1200)]).toEqual(['1 step', '1,200 steps']);
+});
+
+test('German has no other texts than English, with the same placeholders, and all plural forms', () => {
+  const translated = textsOf(german);
+  for (const [key, value] of translated)
+    expect([key, placeholders(value)]).toEqual([key, placeholders(texts.get(key) ?? '')]);
+  const forms = (names: Iterable<string>) =>
+    [...names].filter((key) => FORMS.test(key) && german[key.split('.')[0] as 'labs']);
+  expect(forms(translated.keys()).sort()).toEqual(forms(texts.keys()).sort());
 });

@@ -9,7 +9,7 @@ const HASHED = /\/assets\/[^/]+-[\w-]{8}\.\w+$/;
 
 const scope = self.registration.scope;
 // Images that are larger than memory must not fill the storage chunk by chunk: only the page's own files are kept.
-const KEPT = /^(?:(?:assets|data|dicom|docs|embed)\/.*|[^/]*)$/;
+const KEPT = /^(?:(?:assets|data|dicom|docs|embed|lessons)\/.*|[^/]*)$/;
 const isOwn = (url) => url.startsWith(scope) && KEPT.test(url.slice(scope.length).replace(/[?#].*$/, ''));
 const withoutHash = (url) => url.replace(/#.*$/, '');
 

@@ -14,3 +14,6 @@ export const GUIDES = {
 
 /** Address of the section of the documentation on what an extracted surface can miss, linked from the Extract lab. */
 export const COVERAGE_GUIDE = `${GUIDES.extract}#what-a-surface-can-miss-and-why`;
+
+/** Address of the documentation on writing lessons. */
+export const LESSON_GUIDE = `${DOCS}documents/Lessons.html`;

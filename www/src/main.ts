@@ -1,4 +1,4 @@
-import { text } from './texts';
+import { LANGUAGE, text } from './texts';
 import './style.css';
 import { preloadWorker } from './channel';
 import { spawnExtract } from './client';
@@ -9,6 +9,7 @@ import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
 import { spawnSegment } from './segment/client';
+import { chooseLanguage, LANGUAGES } from './texts/language';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
@@ -147,15 +148,57 @@ class Labs {
   }
 }
 
-const lab = document.getElementById('lab');
-const help = document.getElementById('help');
-const nav = document.getElementById('labs');
-if (lab && help && nav) {
+/** Offers the lessons: a button shows and hides their panel, whose code is fetched when it is first needed. */
+function offerLessons(lab: HTMLElement, opener: HTMLElement, panel: HTMLElement): void {
+  const address = new URL(location.href).searchParams.get('lesson');
+  const show = (shown: boolean) => {
+    panel.hidden = !shown;
+    opener.setAttribute('aria-expanded', String(shown));
+    if (!shown) opener.focus();
+  };
+  let begun = false;
+  const open = async () => {
+    show(true);
+    if (begun) return;
+    begun = true;
+    const { LessonPanel } = await import('./lessons/panel');
+    const lessons = new LessonPanel(panel, lab, () => show(false));
+    await (address ? lessons.open(address) : lessons.showList());
+  };
+  opener.textContent = text('shell.lessons');
+  opener.addEventListener('click', () => (panel.hidden ? void open() : show(false)));
+  if (address) void open();
+}
+
+function offerLanguages(select: HTMLElement): void {
+  const options = Object.entries(LANGUAGES).map(([id, name]) =>
+    h('option', { value: id, lang: id, selected: id === LANGUAGE }, name),
+  );
+  select.replaceChildren(...options);
+  select.setAttribute('aria-label', text('shell.language'));
+  select.title = text('shell.languageHelp');
+  select.addEventListener('change', () => chooseLanguage((select as HTMLSelectElement).value));
+}
+
+function openLabs(): void {
+  const element = (id: string) => document.getElementById(id) ?? document.body;
+  const [lab, help, nav] = [element('lab'), element('help'), element('labs')];
   nav.setAttribute('aria-label', text('shell.labs'));
   help.textContent = text('shell.shortcuts');
   help.setAttribute('aria-label', text('shell.shortcutsLabel'));
   const newTab = h('span', { class: 'visually-hidden' }, text('shell.newTab'));
-  document.getElementById('guide')?.replaceChildren(text('shell.guide'), newTab);
+  element('guide').replaceChildren(text('shell.guide'), newTab);
+  offerLanguages(element('language'));
+  offerLessons(lab, element('lessons'), element('lesson'));
   new Labs(lab, help, nav);
 }
+
+document.documentElement.lang = LANGUAGE;
+const { searchParams } = new URL(location.href);
+const view = searchParams.get('view');
+if (view)
+  void import('./lessons/sheet').then(({ showSheet }) =>
+    showSheet(searchParams.get('lesson') ?? '', view === 'teacher'),
+  );
+else openLabs();
 workOffline();

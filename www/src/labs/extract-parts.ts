@@ -8,7 +8,6 @@ import { AttractorControls } from '../ui/attractors';
 import { ComparePanel } from '../ui/compare';
 import { CoveragePanel } from '../ui/coverage';
 import { folded, h, section, wideButton } from '../ui/dom';
-import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { FigurePanel } from '../ui/figure';
 import { fileChooser, VOLUME_FILES } from '../ui/files';
 import { Histogram } from '../ui/histogram';
@@ -132,7 +131,6 @@ export class ExtractParts extends RunParts<Example> {
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
         this.#compareHolder,
-        folded(text('extract.sectionExercises'), exercises(EXTRACT_EXERCISES, events.onExampleId)),
       ],
     });
   }

@@ -15,7 +15,6 @@ import { Saving } from './saving';
 export interface LabEvents<Example> {
   onFiles: (files: File[]) => void;
   onExample: (example: Example) => void;
-  onExampleId: (id: string) => void;
   onParam: (name: string, value: unknown) => void;
   onCancel: () => void;
   onDismiss: () => void;

@@ -99,7 +99,6 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     return {
       onFiles: (files) => void this.opening.files(files),
       onExample: (example) => void this.opening.example(example),
-      onExampleId: (id) => this.opening.byId(id),
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),

@@ -189,12 +189,6 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
   }
 
-  /** Opens the example with the given id, if there is one. */
-  byId(id: string): void {
-    const example = this.find(id);
-    if (example) void this.example(example);
-  }
-
   /** Opens the present source again, after a failure of the engine. */
   async reopen(): Promise<void> {
     if (this.#source) await this.open(this.#source, true);

@@ -8,7 +8,6 @@ import { CloudOptionControls } from '../ui/cloud-options';
 import { type CloudChoice, CloudSetup } from '../ui/cloud-setup';
 import { folded, h, section, wideButton } from '../ui/dom';
 import { EditTools } from '../ui/edit-tools';
-import { exercises, RECONSTRUCT_EXERCISES } from '../ui/exercises';
 import { FigurePanel } from '../ui/figure';
 import { fileChooser } from '../ui/files';
 import type { History } from '../ui/history';
@@ -108,7 +107,6 @@ export class ReconstructParts extends RunParts<CloudExample> {
         this.saveSection(this.exports.element, ...this.#uses),
         section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
         folded(text('reconstruct.sectionTiming'), this.timing.element),
-        folded(text('labs.sectionExercise'), exercises(RECONSTRUCT_EXERCISES, events.onExampleId)),
       ],
     });
   }

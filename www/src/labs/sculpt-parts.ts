@@ -5,9 +5,8 @@ import { posesOf, type SculptPreset, type SculptVariant } from '../sculpt/preset
 import type { MeshTexture, OpenedScene, ParamValues } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
-import { folded, h, section } from '../ui/dom';
+import { h, section } from '../ui/dom';
 import { EllipsoidControls, type EllipsoidEvents } from '../ui/ellipsoids';
-import { exercises, SCULPT_EXERCISES } from '../ui/exercises';
 import { FigurePanel } from '../ui/figure';
 import { fileChooser } from '../ui/files';
 import { FilmControls, type FilmEvents } from '../ui/film';
@@ -83,7 +82,6 @@ export class SculptParts extends RunParts<SculptExample> {
         section(text('labs.sectionSurface'), this.measures.element),
         this.saveSection(this.exports.element),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
-        folded(text('labs.sectionExercise'), exercises(SCULPT_EXERCISES, events.onExampleId)),
       ],
     });
   }

@@ -7,7 +7,6 @@ import type { TrackPreset, TrackVariant } from '../track/presets';
 import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
 import { folded, h, section, wideButton } from '../ui/dom';
 import { EdgeThreshold } from '../ui/edge-threshold';
-import { exercises, TRACK_EXERCISES } from '../ui/exercises';
 import { FigurePanel } from '../ui/figure';
 import { FigureRow } from '../ui/figure-row';
 import { fileChooser } from '../ui/files';
@@ -126,7 +125,6 @@ export class TrackParts extends RunParts<TrackExample> {
         this.saveSection(this.exports.element, ...this.#saves, this.#sculpt),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
-        folded(text('labs.sectionExercise'), exercises(TRACK_EXERCISES, events.onExampleId)),
       ],
     });
   }

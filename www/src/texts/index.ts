@@ -1,10 +1,11 @@
 import catalogue from './en.json';
+import { chosenLanguage } from './language';
 
 /**
- * Language of the interface, for plural and number formats. All texts are in `en.json`, by the part of the app; to
- * translate the interface, translate that file and change this constant.
+ * Language of the interface, for texts, plural and number formats. All texts are in `en.json`, by the part of the app; a
+ * translation is another such file, and may lack texts, which are then shown in English.
  */
-export const LANGUAGE = 'en';
+export const LANGUAGE = chosenLanguage();
 
 type Catalogue = typeof catalogue;
 type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
@@ -15,7 +16,10 @@ export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_othe
 /** Values for the placeholders of a text of the interface, by name. */
 export type TextValues = Record<string, string | number>;
 
-const sections: Record<string, Record<string, string>> = catalogue;
+type Sections = Record<string, Record<string, string> | undefined>;
+const english: Sections = catalogue;
+/** Fetched before any text is used, and not at all for English. */
+const translated: Sections = LANGUAGE === 'de' ? (await import('./de.json')).default : {};
 const FORMS = new Intl.PluralRules(LANGUAGE);
 const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
 
@@ -64,7 +68,7 @@ function template(key: string): string {
 
 function find(key: string): string | undefined {
   const [section = '', name = ''] = key.split('.');
-  return sections[section]?.[name];
+  return translated[section]?.[name] ?? english[section]?.[name];
 }
 
 function requiredValue<Value>(values: Record<string, Value>, name: string, key: string): Value {

@@ -1,0 +1,255 @@
+/** Lessons in the browser: done by the interface, opened from files and addresses, saved, printed, and in German. */
+import { readFileSync } from 'node:fs';
+import { readFile } from 'node:fs/promises';
+import { zipSync } from 'three/addons/libs/fflate.module.js';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { at } from '../../scripts/shell.mjs';
+import { type Lesson, parseLesson } from '../../www/src/lessons/lesson';
+import { type App, drop, openApp, overflow, reach } from './browser';
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp({ width: 1400, height: 900 }, '#extract?example=linked-rings&v=2');
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+const panel = () => app.page.locator('#lesson');
+const step = () => panel().locator('.lesson-step');
+const answerField = () => step().getByRole('textbox');
+const ticked = () => step().locator('[data-ticked]').waitFor({ timeout: 240_000 });
+const next = () => step().getByRole('button', { name: 'Next' }).click();
+const complete = () => panel().locator('.lesson-steps button', { hasText: '✓' }).count();
+
+function lessonOf(id: string): Lesson {
+  const file = (name: string) => readFileSync(at(`www/public/lessons/${id}/${name}`), 'utf8');
+  return parseLesson({ 'lesson.json': file('lesson.json'), 'text.en.md': file('text.en.md') }, 'en');
+}
+
+async function goTo(address: string): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + address);
+}
+
+/** Answers the question of the step that is shown and commits the answer, as a student does. */
+async function answer(given: string): Promise<void> {
+  await answerField().fill(given);
+  await answerField().press('Tab');
+}
+
+/** Chooses an example in the open lab. */
+const choose = (id: string) => app.page.selectOption('.data select', id);
+
+describe('topology and χ, by the interface of the lab alone', () => {
+  test('the list shows six lessons, and the first opens beside the lab', async () => {
+    await app.page.getByRole('button', { name: 'Lessons' }).click();
+    await panel().locator('.lesson-list li').nth(5).waitFor();
+    expect(await panel().locator('.lesson-list li').count()).toBe(6);
+    await panel().getByRole('button', { name: 'Open Topology and χ' }).press('Enter');
+    expect(await panel().locator('h2').textContent()).toBe('Topology and χ');
+    expect(await step().locator('.katex').count()).toBeGreaterThan(0);
+    expect(new URL(app.page.url()).searchParams.get('lesson')).toBe('topology');
+  });
+
+  test('a step is ticked and announced when the lab shows what it expects, and a wrong answer is told from a right one', async () => {
+    expect(await step().locator('[data-ticked]').count()).toBe(0);
+    await choose('figure-24');
+    await ticked();
+    await expect.poll(() => panel().locator('[role=status]').allTextContents()).toContain('Step 1 is ticked.');
+    await answer('12');
+    await step().getByText('Not yet. The hint may help.').waitFor();
+    const measured = JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+    await answer(String(1.5 * measured.triangles));
+    await step().getByText('Right.').waitFor();
+    expect(await complete()).toBe(1);
+  });
+
+  test('all its steps are complete at the end', async () => {
+    await next();
+    expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2. Three parts');
+    await app.page.getByRole('button', { name: 'd: 0.75' }).click();
+    await ticked();
+    await answer('10');
+    for (const [example, given] of [
+      ['linked-rings', '2'],
+      ['figure-7', '−2'],
+      ['sponge', '81'],
+    ] as const) {
+      await next();
+      await choose(example);
+      await ticked();
+      await answer(given);
+    }
+    await next();
+    await answer('The genus is 5 and 109.');
+    expect(await complete()).toBe(6);
+  });
+
+  test('progress survives another lab and a new visit', async () => {
+    await app.page.locator('#labs [data-lab=reconstruct]').click();
+    await app.page.locator('#lab[data-state=done]').waitFor();
+    expect(await complete()).toBe(6);
+    await goTo('?lesson=topology#extract?example=linked-rings&v=2');
+    await expect.poll(complete).toBe(6);
+    expect(await answerField().inputValue()).toBe('The genus is 5 and 109.');
+  });
+
+  test('results are saved as one page that contains them as JSON', async () => {
+    await panel().getByText('Results', { exact: true }).click();
+    await panel().getByLabel('Name').fill('Ada <b>');
+    await panel().getByLabel('Name').press('Tab');
+    const [download] = await Promise.all([
+      app.page.waitForEvent('download'),
+      panel().getByRole('button', { name: 'Save results' }).click(),
+    ]);
+    expect(download.suggestedFilename()).toBe('topology-results.html');
+    const html = await readFile(await download.path(), 'utf8');
+    const viewer = await app.page.context().newPage();
+    await viewer.setContent(html);
+    const { name, steps } = JSON.parse((await viewer.textContent('#results')) ?? '');
+    const text = (await viewer.locator('body > p').allTextContents()).join();
+    await viewer.close();
+    expect([name, steps.length]).toEqual(['Ada <b>', 6]);
+    expect(steps[4]).toMatchObject({ id: 'sponge', complete: true, answer: '81', measures: { chi: -160, genus: 81 } });
+    expect(steps[4].link).toContain('?lesson=topology#extract?example=sponge');
+    expect(text).toContain('6 of 6 steps complete');
+    expect(text).toContain('Ada <b>');
+  });
+
+  test('the sheet has ticks and answers of the student, but not those for teachers; the teacher’s page has', async () => {
+    await goTo('?lesson=topology&view=sheet');
+    const sheet = app.page.locator('.lesson-sheet');
+    await sheet.locator('section').nth(5).waitFor();
+    expect(await sheet.locator('[data-ticked]').count()).toBe(5);
+    expect(await sheet.locator('.room').last().textContent()).toBe('The genus is 5 and 109.');
+    expect(await sheet.locator('[data-part=answer]').count()).toBe(0);
+    expect(await app.page.locator('#lab').count()).toBe(0);
+    await goTo('?lesson=topology&view=teacher');
+    await expect.poll(() => sheet.locator('[data-part=answer]').count()).toBe(6);
+    expect(await sheet.textContent()).toContain('Expected number: 81');
+  });
+
+  test('start again deletes ticks and answers', async () => {
+    await goTo('?lesson=topology#extract?example=linked-rings&v=2');
+    await panel().getByText('Results', { exact: true }).click();
+    await panel().getByRole('button', { name: 'Start again' }).click();
+    expect(await complete()).toBe(0);
+  });
+});
+
+describe.each(['coarse-to-fine', 'forces', 'regularisation', 'heart', 'detail'])('%s', (id) => {
+  const lesson = lessonOf(id);
+
+  test('is ticked step by step with its settings', { timeout: 900_000 }, async () => {
+    await goTo(`?lesson=${id}#extract?example=linked-rings&v=2`);
+    await reach(app.page, 'done');
+    for (const { check, open, title } of lesson.steps) {
+      await step().getByRole('heading', { name: title }).waitFor();
+      if (check) expect(await step().locator('[data-ticked]').count(), title).toBe(0);
+      if (check && open) await step().getByRole('button', { name: 'Do it for me' }).click();
+      if (check) await ticked();
+      await step()
+        .getByRole('button', { name: 'Next' })
+        .evaluate((button: HTMLButtonElement) => button.click());
+    }
+  });
+});
+
+describe('lessons of the user', () => {
+  const data = {
+    id: 'mine',
+    languages: ['en'],
+    minutes: 5,
+    steps: [{ id: 'a', check: { state: 'done' }, open: 'extract?example=linked-rings&v=2' }],
+  };
+  const files = (change = {}) => [
+    { name: 'lesson.json', bytes: Buffer.from(JSON.stringify({ ...data, ...change })) },
+    {
+      name: 'text.en.md',
+      bytes: Buffer.from(
+        '# Mine\n\n<img src=x onerror=alert(1)> [x](javascript:alert(1))\n\n## Only step\n\n### check\n\nDone: $\\href{javascript:alert(1)}{x}$\n',
+      ),
+    },
+  ];
+  const dropOnPanel = (list: { name: string; bytes: Uint8Array }[]) => drop(app.page, list, '#lesson');
+
+  test('are dropped on the panel; HTML in them is text, and the lab keeps its volume', async () => {
+    await goTo('#extract?example=linked-rings&v=2');
+    await reach(app.page, 'done');
+    await app.page.getByRole('button', { name: 'Lessons' }).click();
+    await panel().locator('.lesson-list li').nth(5).waitFor();
+    await dropOnPanel(files());
+    await step().getByRole('heading', { name: 'Only step' }).waitFor();
+    await ticked();
+    expect(await panel().locator('img, a[href^=javascript]').count()).toBe(0);
+    expect(await app.page.getAttribute('#lab', 'data-state')).toBe('done');
+    await app.page.reload();
+    await step().getByRole('heading', { name: 'Only step' }).waitFor();
+  });
+
+  test('with an error are refused with what is accepted, and the open lesson stays', async () => {
+    await dropOnPanel(files({ steps: [{ id: 'a', check: { states: 'done' } }] }));
+    await expect
+      .poll(() => panel().locator('.field-error').textContent())
+      .toMatch(/step 1: .*states.*all,any,not,lab,state/);
+    expect(await panel().locator('h2').textContent()).toBe('Mine');
+  });
+
+  test('are opened from a ZIP archive with a folder in it', async () => {
+    const entries = files({ id: 'zipped' }).map(({ name, bytes }) => [`folder/${name}`, new Uint8Array(bytes)]);
+    await panel().getByRole('button', { name: 'All lessons' }).click();
+    await panel().locator('.lesson-list li').nth(5).waitFor();
+    const buffer = Buffer.from(zipSync(Object.fromEntries(entries)));
+    await panel().locator('input[type=file]').setInputFiles({ name: 'mine.zip', mimeType: 'application/zip', buffer });
+    await step().getByRole('heading', { name: 'Only step' }).waitFor();
+    expect(await panel().locator('.field-error').textContent()).toBe('');
+  });
+
+  test('at an address that has none, the list says so', async () => {
+    await goTo('?lesson=lessons/none/#extract?example=linked-rings&v=2');
+    await expect.poll(() => panel().locator('.field-error').textContent()).toContain('404');
+    await panel().locator('.lesson-list li').nth(5).waitFor();
+    expect(app.complaints.splice(0).join()).toContain('404');
+  });
+});
+
+describe('in German', () => {
+  test('the page, the lab and the lesson are translated; the choice is kept', async () => {
+    await goTo('?lesson=topology&lang=de#extract?example=figure-24&v=2');
+    await ticked();
+    expect(await app.page.getAttribute('html', 'lang')).toBe('de');
+    expect(await panel().locator('h2').textContent()).toBe('Topologie und χ');
+    expect(await app.page.locator('dt', { hasText: 'Euler-Charakteristik' }).count()).toBe(1);
+    await app.page.selectOption('#language', 'en');
+    await expect.poll(() => app.page.getAttribute('html', 'lang')).toBe('en');
+    await app.page.selectOption('#language', 'de');
+    await panel().getByText('Topologie und χ').waitFor();
+    await goTo('#extract?example=linked-rings&v=2');
+    await app.page.getByRole('button', { name: 'Lektionen' }).waitFor();
+  });
+
+  test('English fetches no translation', async () => {
+    const fetched: string[] = [];
+    app.page.on('request', (request) => fetched.push(request.url()));
+    await goTo('?lang=en#extract?example=linked-rings&v=2');
+    await reach(app.page, 'done');
+    expect(fetched.filter((url) => /assets\/(de|panel|katex)-/i.test(url))).toEqual([]);
+    expect(fetched.length).toBeGreaterThan(5);
+  });
+});
+
+test('on a phone the panel is above the lab, nothing is wider than the page, and it can be hidden', async () => {
+  for (const language of ['de', 'en']) {
+    await goTo(`?lesson=topology&lang=${language}#extract?example=linked-rings&v=2`);
+    await step().waitFor();
+    expect(await overflow(app.page, 390, 844)).toBeLessThanOrEqual(0);
+  }
+  const [above, lab] = [await panel().boundingBox(), await app.page.locator('#lab').boundingBox()];
+  expect((above?.y ?? 0) + (above?.height ?? 0)).toBeLessThanOrEqual(lab?.y ?? 0);
+  await panel().getByRole('button', { name: 'Hide' }).click();
+  expect(await panel().isVisible()).toBe(false);
+  expect(await app.page.evaluate(() => document.activeElement?.id)).toBe('lessons');
+});

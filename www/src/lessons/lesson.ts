@@ -1,0 +1,151 @@
+/** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
+import { labOf } from '../labs/address';
+import { text } from '../texts';
+import { type Check, checkProblem, type Operand, operandProblem } from './check';
+
+/** Headings within a step, in the order in which they are shown; `answer` is for teachers only. */
+export const PARTS = ['goal', 'do', 'watch', 'check', 'question', 'hint', 'explanation', 'answer'] as const;
+export type Part = (typeof PARTS)[number];
+
+/** Question of a step: for a number, or else for a text. */
+export type Question = { answer: Operand; within?: number } | 'text';
+
+/** A step as `lesson.json` states it. */
+interface StepData {
+  id: string;
+  /** Address of a lab with settings, as in its link, without the number sign. */
+  open?: string;
+  check?: Check;
+  question?: Question;
+}
+
+export interface Step extends StepData {
+  title: string;
+  /** Texts of the step, as Markdown. */
+  parts: Partial<Record<Part, string>>;
+}
+
+export interface Lesson {
+  id: string;
+  /** Language of its text. */
+  language: string;
+  minutes: number;
+  title: string;
+  intro: string;
+  steps: Step[];
+}
+
+/** Files of a lesson: their content by name, without folders. */
+export type LessonFiles = Record<string, string>;
+
+const DATA = 'lesson.json';
+const textFile = (language: string) => `text.${language}.md`;
+
+/**
+ * Reads a lesson from its files, with the text in `language`, or else in the first language that the lesson lists.
+ *
+ * Throws an Error that says what is wrong and what is accepted.
+ */
+export function parseLesson(files: LessonFiles, language: string): Lesson {
+  const data = parseData(files[DATA]);
+  const used = chosenLanguage(data.languages, language);
+  const source = files[textFile(used)];
+  if (source === undefined) throw new Error(text('lessons.noText', { file: textFile(used) }));
+  const { title, intro, steps } = parseText(source);
+  if (steps.length !== data.steps.length)
+    throw new Error(
+      text('lessons.stepsDiffer', { file: textFile(used), headings: steps.length, steps: data.steps.length }),
+    );
+  const { id, minutes } = data;
+  return {
+    id,
+    minutes,
+    language: used,
+    title,
+    intro,
+    steps: data.steps.map((one, at) => ({ ...one, ...steps[at] })) as Step[],
+  };
+}
+
+/** Returns the names of the files that a lesson with this `lesson.json` needs in a language. */
+export function filesOf(data: string, language: string): string[] {
+  return [DATA, textFile(chosenLanguage(parseData(data).languages, language))];
+}
+
+function chosenLanguage(languages: string[], language: string): string {
+  return languages.includes(language) ? language : (languages[0] ?? language);
+}
+
+interface LessonData {
+  id: string;
+  languages: string[];
+  minutes: number;
+  steps: StepData[];
+}
+
+function parseData(source: string | undefined): LessonData {
+  if (source === undefined) throw new Error(text('lessons.noData', { file: DATA }));
+  const { id, languages, minutes, steps } = parseJson(source);
+  const strings = Array.isArray(languages) && languages.length > 0 && languages.every((one) => typeof one === 'string');
+  if (typeof id !== 'string' || !/^[\w-]+$/.test(id)) throw new Error(text('lessons.idInvalid', { file: DATA }));
+  if (!strings) throw new Error(text('lessons.languagesInvalid', { file: DATA }));
+  if (!Array.isArray(steps) || steps.length === 0) throw new Error(text('lessons.stepsInvalid', { file: DATA }));
+  const before: string[] = [];
+  for (const step of steps) {
+    const problem = stepProblem(step ?? {}, before);
+    if (problem) throw new Error(text('lessons.stepInvalid', { step: before.length + 1, problem }));
+    before.push(step.id);
+  }
+  return { id, languages, minutes: Number(minutes) || 0, steps };
+}
+
+function parseJson(source: string): Record<string, unknown> {
+  try {
+    return Object(JSON.parse(source));
+  } catch (error) {
+    throw new Error(text('lessons.jsonInvalid', { file: DATA, message: String(error) }));
+  }
+}
+
+/** Returns what is wrong with a step, undefined if nothing; `before` are the ids of the steps before it. */
+function stepProblem({ id, open, check, question }: Record<string, unknown>, before: string[]): string | undefined {
+  if (typeof id !== 'string' || before.includes(id)) return text('lessons.stepId');
+  if (open !== undefined && (typeof open !== 'string' || !labOf(`#${open}`))) return text('lessons.openInvalid');
+  if (question !== undefined && question !== 'text') {
+    const problem = operandProblem(Object(question).answer, [...before, id]);
+    if (problem) return text('lessons.questionInvalid', { problem });
+  }
+  return check === undefined ? undefined : checkProblem(check, before);
+}
+
+interface LessonText {
+  title: string;
+  intro: string;
+  steps: Pick<Step, 'title' | 'parts'>[];
+}
+
+/** Splits a text at its headings: of the lesson, its steps, and their parts. */
+function parseText(source: string): LessonText {
+  const [head = '', ...steps] = source.split(/^## /m);
+  const [title, intro] = split(head.replace(/^\s*# /, ''));
+  return { title, intro, steps: steps.map(parseStep) };
+}
+
+function parseStep(source: string): Pick<Step, 'title' | 'parts'> {
+  const [head = '', ...sections] = source.split(/^### /m);
+  const [title, goal] = split(head);
+  const parts: Partial<Record<Part, string>> = goal ? { goal } : {};
+  for (const section of sections) {
+    const [name, body] = split(section);
+    if (!(PARTS as readonly string[]).includes(name))
+      throw new Error(text('lessons.partUnknown', { name, step: title, accepted: PARTS.join() }));
+    parts[name as Part] = body;
+  }
+  return { title, parts };
+}
+
+/** Returns the first line of a section, which is its heading, and the rest. */
+function split(section: string): [heading: string, body: string] {
+  const [heading = '', ...lines] = section.split('\n');
+  return [heading.trim(), lines.join('\n').trim()];
+}

@@ -1,0 +1,27 @@
+/** The part of markdown-it that lessons use; the package has no types of its own. */
+declare module 'markdown-it' {
+  interface Token {
+    content: string;
+    block: boolean;
+    attrSet(name: string, value: string): void;
+  }
+  interface InlineState {
+    src: string;
+    pos: number;
+    push(type: string, tag: string, nesting: number): Token;
+  }
+  interface Renderer {
+    rules: Record<string, (tokens: Token[], index: number, options: object, env: unknown, self: Renderer) => string>;
+    renderToken(tokens: Token[], index: number, options: object): string;
+  }
+  export default class MarkdownIt {
+    constructor(options: { html: boolean; linkify: boolean });
+    readonly inline: {
+      ruler: { before(name: string, rule: string, apply: (state: InlineState, silent: boolean) => boolean): void };
+    };
+    readonly renderer: Renderer;
+    readonly utils: { escapeHtml(text: string): string };
+    disable(rule: string): this;
+    render(source: string): string;
+  }
+}

@@ -1,0 +1,70 @@
+/** Progress of a student in a lesson, kept by the browser. */
+
+import { operandValue, type Records } from './check';
+import type { Lesson, Step } from './lesson';
+import type { Value } from './reading';
+
+/** A step whose condition was true, with what the lab showed then. */
+export interface Tick {
+  at: string;
+  /** Link to the state of the lab. */
+  link: string;
+  measures: Record<string, Value>;
+}
+
+export interface Progress {
+  /** Index of the step that is shown. */
+  step: number;
+  name: string;
+  ticks: Record<string, Tick | undefined>;
+  answers: Record<string, string | undefined>;
+}
+
+const key = (id: string) => `vesicle.lesson.${id}`;
+const NEW: Progress = { step: 0, name: '', ticks: {}, answers: {} };
+
+/** Returns the progress in a lesson; where the browser keeps nothing, or something unreadable, a new one. */
+export function loadProgress(id: string): Progress {
+  try {
+    return { ...structuredClone(NEW), ...JSON.parse(localStorage.getItem(key(id)) ?? '{}') };
+  } catch {
+    return structuredClone(NEW);
+  }
+}
+
+/** Keeps the progress in a lesson; without permission to store anything, it lasts as long as the page. */
+export function saveProgress(id: string, progress: Progress): void {
+  try {
+    localStorage.setItem(key(id), JSON.stringify(progress));
+  } catch {
+    // Storage is full or not permitted.
+  }
+}
+
+/** Returns the measures that were recorded with each ticked step. */
+export function recordsOf({ ticks }: Progress): Records {
+  return Object.fromEntries(Object.entries(ticks).map(([id, tick]) => [id, tick?.measures]));
+}
+
+/** Parses a number as typed by a student: with a decimal point or comma, and with a minus sign of either kind. */
+export function parseNumber(typed: string): number {
+  return typed.trim() === '' ? Number.NaN : Number(typed.trim().replace('−', '-').replace(',', '.'));
+}
+
+/** Tests whether the answer to a step's question is right; any text is right as an answer in words. */
+export function isAnswered({ id, question }: Step, progress: Progress): boolean {
+  const typed = progress.answers[id]?.trim() ?? '';
+  if (!question || question === 'text') return !question || typed !== '';
+  const expected = Number(operandValue(question.answer, recordsOf(progress)));
+  return Math.abs(parseNumber(typed) - expected) <= (question.within ?? 0);
+}
+
+/** Tests whether a step is complete: its condition was true, and its question is answered. */
+export function isComplete(step: Step, progress: Progress): boolean {
+  return (!step.check || progress.ticks[step.id] !== undefined) && isAnswered(step, progress);
+}
+
+/** Returns the number of complete steps. */
+export function completeSteps({ steps }: Lesson, progress: Progress): number {
+  return steps.filter((step) => isComplete(step, progress)).length;
+}
