@@ -6,16 +6,18 @@ import type { SlicePanel } from '../view/panel';
 import { ON_BLACK, pageInks, paintScaleBar } from '../view/scale-bar';
 import type { Viewport } from '../view/viewport';
 import { context2d, h, token } from './dom';
-import { Field, labelFor, selectFrom } from './field';
+import { type Choice, Field, labelFor, selectFrom } from './field';
 import type { Legend } from './legend';
 import { TaskControls } from './task';
 
 type Size = readonly [number, number];
 
 const SLICES = Object.entries(SLICE_NAMES).map(([value, label]) => ({ value, label }));
-const FILMS = [
+type Film = 'turn' | 'run' | 'open';
+const FILMS: Choice<Film>[] = [
   { value: 'turn', label: text('pictures.turn') },
   { value: 'run', label: text('pictures.run') },
+  { value: 'open', label: text('pictures.open') },
 ];
 const DEFAULT_SIZE: Size = [1920, 1080];
 const [LEAST, MOST_SLICE] = [16, 8192];
@@ -35,8 +37,8 @@ export interface PictureEvents {
   /** Returns the unit of length of the data; empty if unknown. */
   unit: () => string;
   save: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
-  /** Called to start or continue the run, of which a film is recorded. */
-  onRun: () => void;
+  /** Called to start or continue the run, of which a film is recorded; undefined if there are no runs. */
+  onRun: (() => void) | undefined;
 }
 
 /** Panel that saves the 3D view or a slice as a picture, and the 3D view as a film. */
@@ -51,11 +53,12 @@ export class PicturePanel {
   readonly #legend = checkbox('legend', true);
   readonly #transparent = checkbox('transparent', false);
   readonly #message = h('p', { class: 'field-error', role: 'alert' });
-  readonly #film = selectFrom(FILMS, { 'data-picture': 'film' });
+  readonly #film: HTMLSelectElement;
   readonly #seconds = new Field(
     h('input', { type: 'number', min: 1, max: MOST_SECONDS, step: 'any', value: 8, required: true }),
     { label: text('pictures.seconds'), unit: 's', help: text('pictures.secondsHelp'), row: 'row' },
   );
+  readonly #save: HTMLButtonElement;
   readonly #finish: HTMLButtonElement;
   readonly #task: TaskControls;
   /** Ends the film that is being recorded; `isKept`: whether it is saved. */
@@ -65,10 +68,13 @@ export class PicturePanel {
   constructor(subject: PictureSubject, events: PictureEvents) {
     this.#subject = subject;
     this.#events = events;
+    const films = FILMS.filter(({ value }) => value !== 'run' || events.onRun);
+    this.#film = selectFrom(films, { 'data-picture': 'film' });
     const view = { value: 'view', label: text('pictures.view') };
     this.#content = selectFrom(subject.panels ? [view, ...SLICES] : [view], { 'data-picture': 'content' });
     const button = (name: string, onclick: () => void, label: string) =>
       h('button', { type: 'button', 'data-picture': name, onclick }, label);
+    this.#save = button('save', () => void this.#savePicture(), text('pictures.save'));
     this.#finish = button('finish', () => this.#end(true), text('pictures.finish'));
     this.#task = new TaskControls({
       name: 'film',
@@ -90,7 +96,7 @@ export class PicturePanel {
       h('p', { class: 'help' }, text('pictures.scaleBarHelp')),
       ...(subject.legend ? [h('label', { class: 'check' }, this.#legend, text('pictures.legend'))] : []),
       h('label', { class: 'check' }, this.#transparent, text('pictures.transparent')),
-      button('save', () => void this.#savePicture(), text('pictures.save')),
+      this.#save,
       this.#message,
       row(text('pictures.film'), this.#film),
       this.#seconds.element,
@@ -109,6 +115,12 @@ export class PicturePanel {
   /** Ends a recording without saving it. */
   dispose(): void {
     this.#end(false);
+  }
+
+  /** Whether controls are disabled that would disturb a recording. */
+  set #blocked(isBlocked: boolean) {
+    this.#save.disabled = isBlocked;
+    this.#film.disabled = isBlocked;
   }
 
   #showKind(): void {
@@ -202,37 +214,41 @@ export class PicturePanel {
 
   async #record(): Promise<void> {
     const type = filmType();
-    const { viewport } = this.#subject;
-    const size = this.#sizeUpTo(Math.min(viewport.largest, MOST_FILM));
-    const isTurn = this.#film.value === 'turn';
-    this.#seconds.showError(
-      this.#seconds.control.checkValidity() ? undefined : text('pictures.secondsError', { most: MOST_SECONDS }),
-    );
+    const size = this.#sizeUpTo(Math.min(this.#subject.viewport.largest, MOST_FILM));
+    const film = this.#film.value as Film;
+    const isTimed = film !== 'turn' || this.#seconds.control.checkValidity();
+    this.#seconds.showError(isTimed ? undefined : text('pictures.secondsError', { most: MOST_SECONDS }));
     if (!type) return this.#task.end(text('pictures.noWebm'));
-    if (!size || (isTurn && !this.#seconds.control.checkValidity())) return;
+    if (film === 'run' && !['running', 'paused'].includes(this.#state)) return this.#task.end(text('pictures.noRun'));
+    if (!size || !isTimed) return;
+    this.#message.textContent = '';
     const canvas = canvasOf(size);
     const recorder = new FilmRecorder(canvas, type);
     this.#task.begin(text('pictures.recording'));
-    this.#finish.hidden = isTurn;
+    this.#finish.hidden = film === 'turn';
+    this.#blocked = true;
     const isDrawn = this.#renderAt(size, () => {
       this.#paintView(canvas, false);
       recorder.addFrame();
     });
-    const isKept = isDrawn && (await this.#recordUntilEnd(isTurn ? 1000 * this.#seconds.control.valueAsNumber : 0));
+    const isKept = isDrawn && (await this.#recordUntilEnd(film));
     this.#release();
-    const film = await recorder.finish();
-    this.#task.end(isKept ? '' : text('controls.cancelled'));
-    if (isKept) this.#events.save('webm', film, 'video/webm', isTurn ? '-turn' : '-run');
+    const bytes = isKept ? await recorder.finish() : await recorder.cancel();
+    this.#blocked = false;
+    this.#task.end(
+      bytes?.length === 0 ? text('pictures.noFrames') : isDrawn && !bytes ? text('controls.cancelled') : '',
+    );
+    if (bytes?.length) this.#events.save('webm', bytes, 'video/webm', '');
     else if (!isDrawn) this.#reject(size);
   }
 
-  /** Waits for the end of the recording: a turn of the view in the given time, or with 0 a run; returns whether it is kept. */
-  async #recordUntilEnd(milliseconds: number): Promise<boolean> {
+  /** Waits until the turn or the run has ended, or the user has ended the film; returns whether it is kept. */
+  async #recordUntilEnd(film: Film): Promise<boolean> {
     const ended = new Promise<boolean>((resolve) => {
       this.#end = resolve;
     });
-    const stop = milliseconds > 0 ? this.#turn(milliseconds) : undefined;
-    if (!stop) this.#events.onRun();
+    const stop = film === 'turn' ? this.#turn(1000 * this.#seconds.control.valueAsNumber) : undefined;
+    if (film === 'run' && this.#state === 'paused') this.#events.onRun?.();
     const isKept = await ended;
     this.#end = () => undefined;
     stop?.();

@@ -322,7 +322,7 @@ export class Viewport {
   #resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     const [width, height] = this.#fixedSize ?? [clientWidth, clientHeight];
-    if (width === 0 || height === 0) return;
+    if (width === 0 || height === 0 || this.#disposed) return;
     this.#rendering.setSize(width, height, this.#fixedSize && 1);
     this.#camera.aspect = width / height;
     this.#adjustDistance(Math.min(1, this.#camera.aspect));
