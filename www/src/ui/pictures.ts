@@ -129,13 +129,14 @@ export class PicturePanel {
 
   /** Returns the chosen size in pixels; shows a message and returns undefined if it is not from 16 to `most`. */
   #sizeUpTo(most: number): Size | undefined {
+    if (most === 0) this.#message.textContent = text('view.noWebGl');
     const fields = [this.#width, this.#height];
     for (const field of fields) {
-      field.control.max = String(most);
+      field.control.max = String(most || MOST_FILM);
       field.showError(field.control.checkValidity() ? undefined : text('pictures.sizeError', { least: LEAST, most }));
     }
     const [width = 0, height = 0] = fields.map(({ control }) => control.valueAsNumber);
-    return fields.every(({ control }) => control.checkValidity()) ? [width, height] : undefined;
+    return most > 0 && fields.every(({ control }) => control.checkValidity()) ? [width, height] : undefined;
   }
 
   async #savePicture(): Promise<void> {
@@ -214,6 +215,7 @@ export class PicturePanel {
 
   async #record(): Promise<void> {
     const type = filmType();
+    this.#message.textContent = '';
     const size = this.#sizeUpTo(Math.min(this.#subject.viewport.largest, MOST_FILM));
     const film = this.#film.value as Film;
     const isTimed = film !== 'turn' || this.#seconds.control.checkValidity();
@@ -221,7 +223,6 @@ export class PicturePanel {
     if (!type) return this.#task.end(text('pictures.noWebm'));
     if (film === 'run' && !['running', 'paused'].includes(this.#state)) return this.#task.end(text('pictures.noRun'));
     if (!size || !isTimed) return;
-    this.#message.textContent = '';
     const canvas = canvasOf(size);
     const recorder = new FilmRecorder(canvas, type);
     this.#task.begin(text('pictures.recording'));
