@@ -25,7 +25,7 @@ const [LEAST, MOST_SLICE] = [16, 8192];
 const NOMINAL_SIDE = 480;
 const MOST_SECONDS = 120;
 
-/** What a lab shows, for pictures and films. */
+/** The views of a lab, for pictures and films. */
 export interface PictureSubject {
   viewport: Viewport;
   legend?: Legend;

@@ -50,7 +50,7 @@ export const ENERGY_PLOTS: PlotKind[] = [
   },
 ];
 
-/** What the marks in the plots stand for: the name of the mark's class, its colour and its meaning. */
+/** Kinds of marks in the plots: the name of their class, their colour and their meaning. */
 const KEYS = [
   { name: 'level', color: '--line-strong', label: text('measures.levelChange') },
   { name: 'axial', color: '--join', label: text('measures.axialEvent') },

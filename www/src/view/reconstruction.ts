@@ -131,7 +131,7 @@ export class ReconstructionView {
     this.setOptions(this.#options);
   }
 
-  /** What is shown, for pictures and films. */
+  /** The objects shown, for pictures and films. */
   get subject(): PictureSubject {
     return { viewport: this.#viewport, legend: this.legend };
   }

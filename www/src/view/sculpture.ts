@@ -176,7 +176,7 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
-  /** What is shown, for pictures and films. */
+  /** The objects shown, for pictures and films. */
   get subject(): PictureSubject {
     return { viewport: this.#viewport, legend: this.legend };
   }

@@ -121,7 +121,7 @@ export class SegmentView {
     this.#viewport.invalidate();
   }
 
-  /** What is shown, for pictures and films. */
+  /** The objects shown, for pictures and films. */
   get subject(): PictureSubject {
     return { viewport: this.#viewport, panels: () => this.#scene?.panels ?? [] };
   }

@@ -95,7 +95,7 @@ export class Stage {
     this.#viewport.invalidate();
   }
 
-  /** What is shown, for pictures and films. */
+  /** The objects shown, for pictures and films. */
   get subject(): PictureSubject {
     return { viewport: this.#viewport, legend: this.legend, panels: () => this.#scene?.panels ?? [] };
   }

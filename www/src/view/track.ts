@@ -167,7 +167,7 @@ export class TrackView {
     this.#redraw();
   }
 
-  /** What is shown, for pictures and films. */
+  /** The objects shown, for pictures and films. */
   get subject(): PictureSubject {
     return { viewport: this.#viewport, panels: () => this.#scene?.panels ?? [] };
   }
