@@ -113,7 +113,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const { volume, choice, params, setup } = opened;
     this.states.ready = true;
     this.#ui.adopt(volume, source);
-    if (source.linked?.color) this.#ui.options.color = source.linked.color;
+    if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup.attractors);
     this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);

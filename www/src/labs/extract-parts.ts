@@ -126,7 +126,7 @@ export class ExtractParts extends RunParts<Example> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
-        this.saveSection(this.exports.element, this.#sculpt),
+        this.saveSection(this.stage.subject, this.exports.element, this.#sculpt),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
@@ -141,6 +141,7 @@ export class ExtractParts extends RunParts<Example> {
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
+    this.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
     this.large.showTotal(volume.large?.bytes);

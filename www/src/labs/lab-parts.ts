@@ -1,3 +1,4 @@
+import type { Unit } from '../examples';
 import type { MeshFormat, ParamSpec, ParamValues } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
@@ -6,6 +7,7 @@ import { ExportButtons } from '../ui/exports';
 import { acceptDrops } from '../ui/files';
 import type { History } from '../ui/history';
 import { ParamControls } from '../ui/params';
+import { PicturePanel, type PictureSubject } from '../ui/pictures';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import type { ExamplePanel, Listed } from './example-panel';
@@ -70,6 +72,10 @@ export abstract class LabParts<Example extends Listed> {
   readonly banner: ErrorBanner;
   readonly data: ExamplePanel<Example>;
   readonly saving = new Saving((message) => this.status.say(message));
+  /** Unit of length of the data; empty if unknown. */
+  unit: Unit = '';
+  /** Starts or continues the run, in labs whose model runs. */
+  protected onRun: (() => void) | undefined;
   protected readonly root: HTMLElement;
   protected readonly canvas: HTMLCanvasElement;
   readonly #link: HTMLButtonElement;
@@ -79,6 +85,8 @@ export abstract class LabParts<Example extends Listed> {
   readonly #ownControls: string[];
   readonly #onParam: LabEvents<Example>['onParam'];
   #params: ParamControls | undefined;
+  #pictures: PicturePanel | undefined;
+  readonly #signal: AbortSignal;
 
   /** Files dropped on the page are accepted until `signal` is aborted. */
   constructor(
@@ -88,6 +96,7 @@ export abstract class LabParts<Example extends Listed> {
     { viewLabel, drop, onFolder, data, ownControls = [] }: PartsOptions<Example>,
   ) {
     this.root = root;
+    this.#signal = signal;
     this.data = data;
     this.#ownControls = ownControls;
     this.#onParam = events.onParam;
@@ -149,14 +158,22 @@ export abstract class LabParts<Example extends Listed> {
     return panel;
   }
 
-  /** Creates the section that saves and shares results. */
-  protected saveSection(...elements: HTMLElement[]): HTMLElement {
-    return section(text('labs.sectionSave'), ...elements, this.#link);
+  /** Creates the section that saves and shares results, with pictures and films of `subject`. */
+  protected saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
+    const pictures = new PicturePanel(subject, {
+      unit: () => this.unit,
+      save: (...file) => this.saving.bytes(...file),
+      onRun: this.onRun,
+    });
+    this.#pictures = pictures;
+    this.#signal.addEventListener('abort', () => pictures.dispose());
+    return section(text('labs.sectionSave'), ...elements, pictures.element, this.#link);
   }
 
   /** Shows the button that cancels loading; returns whether nothing is being loaded. */
   protected showLoading(state: LabState, ready: boolean): boolean {
     this.cancel.hidden = state !== 'loading' || !ready;
+    this.#pictures?.showState(state);
     return ready && state !== 'loading';
   }
 
@@ -179,6 +196,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     super(root, signal, events, options);
     this.history = history;
     this.transport = new Transport(events);
+    this.onRun = events.onToggle;
     this.exports = new ExportButtons((format, type) => {
       fetchMesh(format)
         .then((bytes) => this.saving.bytes(format, bytes, type, this.suffix))

@@ -104,7 +104,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
       results: [
         section(text('labs.sectionProgress'), this.phases.element),
         section(text('labs.sectionSurface'), this.measures.element),
-        this.saveSection(this.exports.element, ...this.#uses),
+        this.saveSection(this.view.subject, this.exports.element, ...this.#uses),
         section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
         folded(text('reconstruct.sectionTiming'), this.timing.element),
       ],

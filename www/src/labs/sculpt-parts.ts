@@ -80,7 +80,7 @@ export class SculptParts extends RunParts<SculptExample> {
       ],
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
-        this.saveSection(this.exports.element),
+        this.saveSection(this.view.subject, this.exports.element),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
       ],
     });

@@ -88,7 +88,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
         section(text('segment.sectionMeasures'), this.measures.element),
         section(text('segment.sectionMap'), exported(text('segment.mapsHelp'), ...maps)),
         section(text('segment.sectionSurfaces'), exported(text('segment.surfacesHelp'), ...surfaces)),
-        this.saveSection(),
+        this.saveSection(this.view.subject),
       ],
     });
   }

@@ -159,6 +159,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.ui.saving.name = example?.id ?? name;
     this.#params = params;
     this.ui.data.show(factsOf(opened, example), example);
+    this.ui.unit = example?.unit ?? 'mm';
     this.ui.showParams(params);
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
@@ -231,8 +232,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #showMeasures(): void {
-    const unit = this.opening.source?.example?.unit ?? 'mm';
-    this.ui.measures.show(this.#editing.labels, this.#measures, unit, {
+    this.ui.measures.show(this.#editing.labels, this.#measures, this.ui.unit, {
       latency: this.#latency,
       updates: this.#updates,
     });

@@ -122,7 +122,7 @@ export class TrackParts extends RunParts<TrackExample> {
       results: [
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
-        this.saveSection(this.exports.element, ...this.#saves, this.#sculpt),
+        this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
       ],
@@ -150,6 +150,7 @@ export class TrackParts extends RunParts<TrackExample> {
     const unit = example?.unit ?? 'mm';
     this.saving.name = example?.id ?? name;
     this.measures.unit = unit;
+    this.unit = unit;
     this.data.show(factsOf(opened, name, unit), example);
   }
 

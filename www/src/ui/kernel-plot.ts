@@ -1,9 +1,9 @@
-import uPlot from 'uplot';
 import type { ParamValues } from '../protocol';
 import { kernelParams, phi } from '../reconstruct/kernel';
 import { text } from '../texts';
-import { h, onSchemeChange, token } from './dom';
+import { h } from './dom';
 import { figure } from './format';
+import { LinePlot } from './line-plot';
 
 const HEIGHT = 132;
 /** Number of distances r at which the kernel is sampled, from 0 to 2, the side of the normalised box. */
@@ -16,27 +16,25 @@ const FARTHEST = 2;
  */
 export class KernelPlot {
   readonly element: HTMLElement;
-  readonly #plot: uPlot;
   readonly #caption = h('figcaption', { 'data-plot': 'kernel' });
-  #params: ParamValues = {};
+  readonly #plot = new LinePlot({
+    ...{ title: text('pointPanels.kernelTitle'), across: 'r', name: 'kernel', height: HEIGHT, below: [this.#caption] },
+    lines: [{ label: 'φ', color: '--curve' }],
+    x: { range: [0, FARTHEST] },
+    y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(0, high ?? 1)] },
+    yAxis: { size: 36 },
+  });
 
   constructor() {
-    const holder = h('div', { class: 'plot kernel', 'aria-hidden': 'true' });
-    this.element = h('figure', {}, h('h3', {}, text('pointPanels.kernelTitle')), holder, this.#caption);
-    this.#plot = new uPlot(options(), [[], []], holder);
-    new ResizeObserver(() => {
-      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: HEIGHT });
-    }).observe(holder);
-    onSchemeChange(() => this.show(this.#params));
+    this.element = this.#plot.element;
   }
 
   show(params: ParamValues): void {
-    this.#params = params;
     const kernel = kernelParams(params);
     const distances = Array.from({ length: SAMPLES }, (_, i) => (FARTHEST * i) / (SAMPLES - 1));
     const values = distances.map((r) => phi(kernel, r));
     const most = Math.max(...values.map(Math.abs));
-    this.#plot.setData([distances, values.map((value) => value / most)]);
+    this.#plot.show([distances, values.map((value) => value / most)]);
     this.#caption.textContent = describeKernel(kernel.kernel, (r) => phi(kernel, r));
   }
 }
@@ -62,30 +60,4 @@ function bisect(f: (r: number) => number): number {
     else high = middle;
   }
   return low;
-}
-
-function options(): uPlot.Options {
-  const axis: uPlot.Axis = {
-    stroke: () => token('--muted'),
-    grid: { stroke: () => token('--line'), width: 1 },
-    ticks: { show: false },
-    font: '11px system-ui, sans-serif',
-  };
-  const range = (_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax => [
-    Math.min(0, low ?? 0),
-    Math.max(0, high ?? 1),
-  ];
-  return {
-    width: 280,
-    height: HEIGHT,
-    legend: { show: false },
-    cursor: { y: false, drag: { x: false, y: false } },
-    padding: [8, 8, 0, 0],
-    scales: { x: { time: false, range: [0, FARTHEST] }, y: { range } },
-    axes: [
-      { ...axis, size: 24 },
-      { ...axis, size: 36 },
-    ],
-    series: [{}, { label: 'φ', stroke: () => token('--curve'), width: 1.5, points: { show: false } }],
-  };
 }

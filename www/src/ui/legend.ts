@@ -1,8 +1,11 @@
 import { text } from '../texts';
+import { type Inks, paintText } from '../view/scale-bar';
 import { context2d, h } from './dom';
 import { figure } from './format';
 
 const STEPS = 64;
+/** Width of the colour bar in pictures, and its distance from their edges, in CSS pixels. */
+const [BAR_WIDTH, MARGIN] = [190, 16];
 
 /** Texts of a colour legend: title of the scale, and labels of its lower and upper end. */
 export interface LegendText {
@@ -58,5 +61,22 @@ export class Legend {
 
   hide(): void {
     this.element.hidden = true;
+  }
+
+  /** Draws the legend, if it is shown, over a picture that is `width` wide, in the upper right corner. */
+  paint(context: CanvasRenderingContext2D, width: number, inks: Inks): void {
+    if (this.element.hidden) return;
+    const [left, right] = [width - BAR_WIDTH - MARGIN, width - MARGIN];
+    const write = (element: HTMLElement, x: number, y: number, align: CanvasTextAlign) =>
+      paintText(context, element.textContent ?? '', x, y, align, inks);
+    write(this.#title, left, MARGIN + 10, 'left');
+    context.drawImage(this.#bar, left, MARGIN + 18, BAR_WIDTH, 10);
+    const [low, middle, high] = this.#ends;
+    const [below, above] = this.#words;
+    write(low, left, MARGIN + 44, 'left');
+    write(middle, (left + right) / 2, MARGIN + 44, 'center');
+    write(high, right, MARGIN + 44, 'right');
+    write(below, left, MARGIN + 60, 'left');
+    write(above, right, MARGIN + 60, 'right');
   }
 }

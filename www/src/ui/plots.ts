@@ -1,23 +1,18 @@
-import uPlot from 'uplot';
-import { type TextKey, text } from '../texts';
-import 'uplot/dist/uPlot.min.css';
+import type uPlot from 'uplot';
 import type { StepReport } from '../protocol';
-import { h, onSchemeChange, token } from './dom';
+import { type TextKey, text } from '../texts';
+import { h } from './dom';
 import { count, figure } from './format';
 import type { History } from './history';
+import { LinePlot, type PlotLine } from './line-plot';
 import { totals } from './log';
+import type { PlotMark } from './plot-svg';
 import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
 /** Space above a plot for the names of the levels, CSS pixels. */
 const MARK_HEIGHT = 16;
-/** Height of the tick marks of one type of topology event, CSS pixels. */
-const MARK_LANE = 6;
-
-export interface Curve {
-  label: string;
-  color: string;
-  dash?: number[];
+export interface Curve extends PlotLine {
   of: (report: StepReport) => number;
 }
 
@@ -55,6 +50,15 @@ export const ENERGY_PLOTS: PlotKind[] = [
   },
 ];
 
+/** Kinds of marks in the plots: the name of their class, their colour and their meaning. */
+const KEYS = [
+  { name: 'level', color: '--line-strong', label: text('measures.levelChange') },
+  { name: 'axial', color: '--join', label: text('measures.axialEvent') },
+  { name: 'annular', color: '--cut', label: text('measures.annularEvent') },
+  { name: 'vanished', color: '--vanished', label: text('measures.vanishedEvent') },
+  { name: 'seeds', color: '--seed', label: text('measures.seededEvent') },
+];
+
 /** Live plots of a run over its iterations, with level changes and topology events marked. */
 export class Plots {
   readonly element: HTMLElement;
@@ -68,26 +72,11 @@ export class Plots {
   /** `events`: whether a legend and a description of the topology events are shown. */
   constructor(history: History, kinds: PlotKind[], events: boolean) {
     this.#history = history;
-    this.#plots = kinds.map((kind) => new Plot(kind, history));
+    this.#plots = kinds.map((kind) => new Plot(kind, history, events ? KEYS : KEYS.slice(0, 1)));
     this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element));
     this.#table = new PlotTable(kinds.flatMap(({ curves }) => curves));
-    if (events) this.element.append(this.#legend(), this.#events);
+    if (events) this.element.append(legendOf(KEYS), this.#events);
     this.element.append(this.#table.element);
-    onSchemeChange(() => this.update());
-  }
-
-  #legend(): HTMLElement {
-    const key = (name: string, text: string) =>
-      h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
-    return h(
-      'p',
-      { class: 'legend' },
-      key('level', text('measures.levelChange')),
-      key('axial', text('measures.axialEvent')),
-      key('annular', text('measures.annularEvent')),
-      key('vanished', text('measures.vanishedEvent')),
-      key('seeds', text('measures.seededEvent')),
-    );
   }
 
   /** Redraws the plots in the next animation frames, one plot in each: all at once would delay other rendering. */
@@ -112,30 +101,45 @@ export class Plots {
   }
 }
 
+/** Creates the legend of a plot; the name of each key is the class of its mark. */
+export function legendOf(keys: { name: string; label: string }[]): HTMLElement {
+  const key = ({ name, label }: (typeof keys)[number]) =>
+    h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), label);
+  return h('p', { class: 'legend' }, ...keys.map(key));
+}
+
 class Plot {
   readonly element: HTMLElement;
   readonly #kind: PlotKind;
-  readonly #plot: uPlot;
+  readonly #plot: LinePlot;
   readonly #caption = h('figcaption');
   /** Plotted data: iterations, followed by the values of each curve, for the reports of the current run so far. */
   #columns: (number | null)[][] = [];
   #run: readonly StepReport[] | undefined;
 
-  constructor(kind: PlotKind, history: History) {
+  constructor(kind: PlotKind, history: History, keys: PlotLine[]) {
     this.#kind = kind;
-    const holder = h('div', { class: 'plot', 'aria-hidden': 'true' });
-    this.element = h('figure', {}, h('h3', {}, kind.title), holder, this.#caption);
-    const mark = (plot: uPlot) => drawMarks(plot, history);
-    this.#plot = new uPlot(optionsFor(kind, mark), emptyData(kind), holder);
-    new ResizeObserver(() => {
-      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: PLOT_HEIGHT });
-    }).observe(holder);
+    const { title, curves, log } = kind;
+    this.#plot = new LinePlot({
+      ...{ title, lines: curves, height: PLOT_HEIGHT, top: MARK_HEIGHT, keys, below: [this.#caption] },
+      across: text('measures.columnIteration'),
+      x: { range: iterationRange },
+      y: log ? { distr: 3, range: logRange } : { range: valueRange },
+      yAxis: {
+        size: 52,
+        values: (_, ticks) => ticks.map((tick) => tickLabel(tick, log)),
+        // uPlot would omit the labels of some powers of ten.
+        ...(log && { splits: decades, filter: (_: uPlot, ticks: number[]) => ticks }),
+      },
+      marks: () => marksOf(history),
+    });
+    this.element = this.#plot.element;
   }
 
   update(history: History): void {
     const { reports } = history;
     this.#extend(reports);
-    this.#plot.setData(this.#columns as uPlot.AlignedData);
+    this.#plot.show(this.#columns);
     this.#caption.textContent = reports.length > 0 ? this.#kind.describe(history) : text('measures.noSteps');
   }
 
@@ -152,49 +156,9 @@ class Plot {
   }
 }
 
-function emptyData(kind: PlotKind): uPlot.AlignedData {
-  return [[], ...kind.curves.map(() => [])] as uPlot.AlignedData;
-}
-
 /** Returns a value to plot, or null if it cannot be drawn: not finite or, on a logarithmic axis, zero or below. */
 function plottable(value: number, log: boolean): number | null {
   return Number.isFinite(value) && (!log || value > 0) ? value : null;
-}
-
-function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options {
-  const axis: uPlot.Axis = {
-    stroke: () => token('--muted'),
-    grid: { stroke: () => token('--line'), width: 1 },
-    ticks: { show: false },
-    font: '11px system-ui, sans-serif',
-  };
-  return {
-    width: 280,
-    height: PLOT_HEIGHT,
-    legend: { show: false },
-    cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_HEIGHT, 8, 0, 0],
-    scales: {
-      x: { time: false, range: iterationRange },
-      y: kind.log ? { distr: 3, range: logRange } : { range: valueRange },
-    },
-    axes: [
-      { ...axis, size: 24 },
-      {
-        ...axis,
-        size: 52,
-        values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)),
-        // uPlot would omit the labels of some powers of ten.
-        ...(kind.log && { splits: decades, filter: (_: uPlot, ticks: number[]) => ticks }),
-      },
-    ],
-    series: [{}, ...kind.curves.map(seriesFor)],
-    hooks: { drawClear: [mark] },
-  };
-}
-
-function seriesFor({ label, color, dash }: Curve): uPlot.Series {
-  return { label, stroke: () => token(color), width: 1.5, points: { show: false }, ...(dash && { dash }) };
 }
 
 function iterationRange(_: uPlot, __: number | null, last: number | null): uPlot.Range.MinMax {
@@ -232,51 +196,17 @@ function tickLabel(tick: number | null, log: boolean): string {
   return Math.abs(tick) >= 10_000 ? `${count(tick / 1000)}k` : Number.isInteger(tick) ? count(tick) : '';
 }
 
-/** Draws level changes as vertical lines with their names, and topology events as tick marks at the bottom. */
-function drawMarks(plot: uPlot, history: History): void {
-  const { ctx, bbox } = plot;
-  ctx.save();
-  ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
-  ctx.textAlign = 'left';
-  ctx.textBaseline = 'alphabetic';
-  // Backwards, so that of overlapping names the later one is drawn.
-  let free = Number.POSITIVE_INFINITY;
-  for (const { iteration, phase } of [...history.phases].reverse()) {
-    const x = Math.round(plot.valToPos(iteration, 'x', true));
-    upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));
-    ctx.fillStyle = token('--muted');
-    const { width } = ctx.measureText(phase);
-    const at = Math.min(x, bbox.left + bbox.width - width);
-    if (at + width > free) continue;
-    ctx.fillText(phase, at, bbox.top - 4 * devicePixelRatio);
-    free = at - 4 * devicePixelRatio;
-  }
-  const foot = bbox.top + bbox.height;
-  // One lane per kind, so that none hides another.
-  const lane = MARK_LANE * devicePixelRatio;
-  const [join, cut, vanish, seed] = ['--join', '--cut', '--vanished', '--seed'].map(token) as [
-    string,
-    string,
-    string,
-    string,
+/** Returns the marks of level changes, and of topology events with one lane per kind. */
+function marksOf({ phases, changes }: History): PlotMark[] {
+  const [level, ...events] = KEYS.map(({ color }) => color);
+  return [
+    ...phases.map(({ iteration: at, phase: name }) => ({ at, name, color: level ?? '' })),
+    ...changes.flatMap(({ iteration: at, axial, annular, vanished, seeds }) =>
+      [axial, annular, vanished, seeds].flatMap((count, lane) =>
+        count > 0 ? [{ at, lane, color: events[lane] ?? '' }] : [],
+      ),
+    ),
   ];
-  for (const { iteration, axial, annular, vanished, seeds } of history.changes) {
-    const x = plot.valToPos(iteration, 'x', true);
-    if (axial > 0) upright(ctx, x, foot - lane, foot, join);
-    if (annular > 0) upright(ctx, x, foot - 2 * lane, foot - lane, cut);
-    if (vanished > 0) upright(ctx, x, foot - 3 * lane, foot - 2 * lane, vanish);
-    if (seeds > 0) upright(ctx, x, foot - 4 * lane, foot - 3 * lane, seed);
-  }
-  ctx.restore();
-}
-
-function upright(ctx: CanvasRenderingContext2D, x: number, top: number, bottom: number, color: string): void {
-  ctx.beginPath();
-  ctx.moveTo(x, top);
-  ctx.lineTo(x, bottom);
-  ctx.strokeStyle = color;
-  ctx.lineWidth = devicePixelRatio;
-  ctx.stroke();
 }
 
 function describeEnergy({ reports }: History): string {

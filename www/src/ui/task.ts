@@ -14,6 +14,8 @@ interface TaskParts {
   onCancel: () => void;
   /** Further buttons, which are hidden during the task. */
   others?: HTMLButtonElement[];
+  /** Further buttons, which are shown only during the task. */
+  during?: HTMLButtonElement[];
 }
 
 /** Controls of a task that takes a while: buttons to start and cancel it, its progress, and a message. */
@@ -22,18 +24,20 @@ export class TaskControls {
   readonly elements: HTMLElement[];
   readonly #idle: HTMLButtonElement[];
   readonly #cancel: HTMLButtonElement;
+  readonly #during: HTMLButtonElement[];
   readonly #progress: HTMLProgressElement;
   readonly #status = h('p', { class: 'help', role: 'status' });
 
-  constructor({ name, start, progress, max = 1, onStart, onCancel, others = [] }: TaskParts) {
+  constructor({ name, start, progress, max = 1, onStart, onCancel, others = [], during = [] }: TaskParts) {
     const button = (value: string, label: string, onclick: () => void) =>
       h('button', { type: 'button', [`data-${name}`]: value, onclick }, label);
     this.#idle = [button('start', start, onStart), ...others];
     this.#cancel = button('cancel', text('controls.cancel'), onCancel);
-    this.#cancel.hidden = true;
+    this.#during = [this.#cancel, ...during];
+    for (const one of this.#during) one.hidden = true;
     this.#progress = h('progress', { max, value: 0, hidden: true, 'aria-label': progress });
     const [first = '', ...rest] = this.#idle;
-    this.elements = [h('div', { class: 'buttons' }, first, this.#cancel, ...rest), this.#progress, this.#status];
+    this.elements = [h('div', { class: 'buttons' }, first, ...this.#during, ...rest), this.#progress, this.#status];
   }
 
   /** Whether the task can be started. */
@@ -68,7 +72,7 @@ export class TaskControls {
 
   #show(isRunning: boolean, message: string): void {
     for (const button of this.#idle) button.hidden = isRunning;
-    this.#cancel.hidden = !isRunning;
+    for (const button of this.#during) button.hidden = !isRunning;
     this.#progress.hidden = !isRunning;
     this.say(message);
   }

@@ -1,9 +1,11 @@
-import uPlot from 'uplot';
 import type { ReconstructClient } from '../reconstruct/client';
 import type { Timing } from '../reconstruct/protocol';
 import { text } from '../texts';
-import { h, onSchemeChange, token } from './dom';
+import { h } from './dom';
 import { count, figure, milliseconds } from './format';
+import { LinePlot } from './line-plot';
+import { legendOf } from './plots';
+import { TaskControls } from './task';
 
 const SIZES = [250, 500, 1000, 2000, 3000, 4500, 6000];
 const KERNELS = ['multi-order', 'thin-plate'] as const;
@@ -18,113 +20,82 @@ export class TimingPanel {
   readonly element: HTMLElement;
   readonly #client: ReconstructClient;
   readonly #onError: (title: string, error: unknown) => void;
-  readonly #start: HTMLButtonElement;
-  readonly #cancel: HTMLButtonElement;
-  readonly #status = h('p', { class: 'help', role: 'status' });
-  readonly #progress = h('progress', {
-    max: SIZES.length * KERNELS.length,
-    value: 0,
-    hidden: true,
-    'aria-label': text('controls.measurementProgress'),
-  });
-  readonly #plot: uPlot;
-  readonly #figure: HTMLElement;
+  readonly #task: TaskControls;
+  readonly #plot: LinePlot;
   readonly #table = h('table', { class: 'times' });
   #timings: Timing[] = [];
 
   constructor(client: ReconstructClient, onError: (title: string, error: unknown) => void) {
     this.#client = client;
     this.#onError = onError;
-    this.#start = h(
-      'button',
-      { type: 'button', onclick: () => void this.#run(), 'data-timing': 'start' },
-      text('pointPanels.measure'),
-    );
-    this.#cancel = h(
-      'button',
-      {
-        type: 'button',
-        hidden: true,
-        'data-timing': 'cancel',
-        onclick: () => void client.request('cancelTiming', undefined),
-      },
-      text('controls.cancel'),
-    );
-    const holder = h('div', { class: 'plot timing', 'aria-hidden': 'true' });
-    const key = (name: string, text: string) =>
-      h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
-    const legend = h('p', { class: 'legend' }, key('axial', 'multi-order'), key('annular', 'thin-plate'));
-    this.#figure = h(
-      'figure',
-      { hidden: true },
-      h('h3', {}, text('pointPanels.timingFigure')),
-      holder,
-      legend,
-      this.#table,
-    );
-    this.#plot = new uPlot(options(), [[], [], []], holder);
-    new ResizeObserver(() => {
-      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: HEIGHT });
-    }).observe(holder);
-    onSchemeChange(() => this.#draw());
+    this.#task = new TaskControls({
+      name: 'timing',
+      start: text('pointPanels.measure'),
+      progress: text('controls.measurementProgress'),
+      max: SIZES.length * KERNELS.length,
+      onStart: () => void this.#run(),
+      onCancel: () => void client.request('cancelTiming', undefined),
+    });
+    const keys = [
+      { name: 'axial', label: KERNELS[0] },
+      { name: 'annular', label: KERNELS[1] },
+    ];
+    this.#plot = new LinePlot({
+      ...{ title: text('pointPanels.timingFigure'), name: 'timing', height: HEIGHT },
+      across: text('pointPanels.columnConstraints'),
+      lines: KERNELS.map((label) => ({ label, color: COLORS[label], dots: true })),
+      x: { range: from0 },
+      y: { range: from0 },
+      yAxis: { size: 36 },
+      below: [legendOf(keys), this.#table],
+    });
+    this.#plot.element.hidden = true;
     this.element = h(
       'div',
       { class: 'compare', 'data-timings': '[]' },
       h('p', { class: 'help' }, text('pointPanels.timingHelp')),
-      h('div', { class: 'buttons' }, this.#start, this.#cancel),
-      this.#progress,
-      this.#status,
-      this.#figure,
+      ...this.#task.elements,
+      this.#plot.element,
     );
   }
 
   set enabled(enabled: boolean) {
-    this.#start.disabled = !enabled;
+    this.#task.enabled = enabled;
   }
 
   clear(): void {
     this.#timings = [];
-    this.#status.textContent = '';
+    this.#task.say('');
     this.#draw();
   }
 
   add(timing: Timing): void {
     this.#timings.push(timing);
-    this.#progress.value = this.#timings.length;
+    this.#task.showProgress(this.#timings.length);
     this.#draw();
   }
 
   async #run(): Promise<void> {
     this.clear();
-    this.#showBusy(true);
+    this.#task.begin(text('controls.measuring'));
     try {
       const kernels = [...KERNELS];
       const timings = await this.#client.request('timing', { sizes: SIZES, kernels });
-      this.#status.textContent = timings ? describeGrowth(timings) : text('controls.cancelled');
+      this.#task.end(timings ? describeGrowth(timings) : text('controls.cancelled'));
     } catch (error) {
-      this.#status.textContent = text('pointPanels.measurementFailed');
+      this.#task.end(text('pointPanels.measurementFailed'));
       this.#onError(text('pointPanels.measurementFailed'), error);
     }
-    this.#showBusy(false);
-  }
-
-  #showBusy(busy: boolean): void {
-    this.#start.hidden = busy;
-    this.#cancel.hidden = !busy;
-    this.#progress.hidden = !busy;
-    this.#progress.value = 0;
-    (busy ? this.#cancel : this.#start).focus();
-    if (busy) this.#status.textContent = text('controls.measuring');
   }
 
   #draw(): void {
     this.element.dataset.timings = JSON.stringify(this.#timings);
-    this.#figure.hidden = this.#timings.length === 0;
+    this.#plot.element.hidden = this.#timings.length === 0;
     const sizes = [...new Set(this.#timings.map(({ constraints }) => constraints))].sort((a, b) => a - b);
     const of = (kernel: string) =>
       sizes.map((size) => this.#timings.find((one) => one.kernel === kernel && one.constraints === size));
     const seconds = (kernel: string) => of(kernel).map((one) => (one ? one.milliseconds / 1000 : null));
-    this.#plot.setData([sizes, ...KERNELS.map(seconds)] as uPlot.AlignedData);
+    this.#plot.show([sizes, ...KERNELS.map(seconds)]);
     const head = [text('pointPanels.columnConstraints'), ...KERNELS].map((title) => h('th', { scope: 'col' }, title));
     const rows = sizes.map((size, i) => {
       const cells = KERNELS.map((kernel) => {
@@ -153,34 +124,6 @@ function describeGrowth(timings: Timing[]): string {
   return `${parts.filter(Boolean).join('; ')}.`.replace(/^./, (letter) => letter.toUpperCase());
 }
 
-function options(): uPlot.Options {
-  const axis: uPlot.Axis = {
-    stroke: () => token('--muted'),
-    grid: { stroke: () => token('--line'), width: 1 },
-    ticks: { show: false },
-    font: '11px system-ui, sans-serif',
-  };
-  const from0 = (_: uPlot, __: number | null, high: number | null): uPlot.Range.MinMax => [0, high || 1];
-  return {
-    width: 280,
-    height: HEIGHT,
-    legend: { show: false },
-    cursor: { y: false, drag: { x: false, y: false } },
-    padding: [8, 12, 0, 0],
-    scales: { x: { time: false, range: from0 }, y: { range: from0 } },
-    axes: [
-      { ...axis, size: 24 },
-      { ...axis, size: 36 },
-    ],
-    series: [
-      {},
-      ...KERNELS.map((kernel) => ({
-        label: kernel,
-        stroke: () => token(COLORS[kernel]),
-        width: 1.5,
-        spanGaps: true,
-        points: { show: true, size: 5 },
-      })),
-    ],
-  };
+function from0(_: unknown, __: number | null, high: number | null): [number, number] {
+  return [0, high || 1];
 }

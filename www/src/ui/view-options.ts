@@ -116,11 +116,6 @@ export class ViewOptionControls extends OptionControls<ViewOptions> {
   constructor(initial: ViewOptions, onChange: (options: ViewOptions) => void) {
     super(EXTRACT_OPTIONS, initial, onChange);
   }
-
-  /** Sets the colouring of the surface and reports it to the lab; an unknown name counts as plain. */
-  set color(color: ColorMode) {
-    this.set({ color });
-  }
 }
 
 const EXTRACT_OPTIONS: ViewOption<ViewOptions>[] = [

@@ -1,9 +1,10 @@
-import uPlot from 'uplot';
 import { text } from '../texts';
-import 'uplot/dist/uPlot.min.css';
 import { type Beat, beatOf } from '../track/curve';
-import { h, onSchemeChange, token } from './dom';
+import { h } from './dom';
 import { figure } from './format';
+import { LinePlot, type PlotLine } from './line-plot';
+import type { PlotMark } from './plot-svg';
+import { legendOf } from './plots';
 
 const HEIGHT = 190;
 /** Space above the plot for the names of end-diastole and end-systole, CSS pixels. */
@@ -29,29 +30,34 @@ const EMPTY: VolumeCurves = { volumes: [], truth: undefined, other: undefined, f
  */
 export class VolumeCurve {
   readonly element: HTMLElement;
-  readonly #plot: uPlot;
+  readonly #plot: LinePlot;
   readonly #caption = h('figcaption', { 'data-beat': '{}' });
-  readonly #legend = h('p', { class: 'legend' });
-  readonly #title = h('h3');
+  readonly #legend = h('div');
+  readonly #other: PlotLine = { label: '', color: '--cut', dash: [2, 3] };
   #curves = EMPTY;
   #pending = 0;
 
   constructor(onFrame: (frame: number) => void) {
-    const holder = h('div', { class: 'plot beat', 'aria-hidden': 'true' });
-    this.element = h('figure', {}, this.#title, holder, this.#legend, this.#caption);
-    this.#plot = new uPlot(
-      options((plot) => this.#mark(plot)),
-      [[0], [null], [null], [null]],
-      holder,
-    );
-    this.#plot.over.addEventListener('click', (event) => {
-      const at = Math.round(this.#plot.posToVal(event.offsetX, 'x')) - 1;
+    this.#plot = new LinePlot({
+      ...{ title: '', across: text('controls.frame'), name: 'beat', height: HEIGHT, top: MARK_HEIGHT },
+      lines: [
+        { label: text('trackPanels.curveTracked'), color: '--curve' },
+        { label: text('trackPanels.curveTruth'), color: '--muted', dash: [5, 4] },
+        this.#other,
+      ],
+      x: { range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 2) + 0.5] },
+      y: { range: (_, low, high) => (low === null || high === null ? [0, 1] : spread(low, high)) },
+      xAxis: { incrs: [1, 2, 5, 10, 20, 50, 100] },
+      yAxis: { size: 40 },
+      marks: () => this.#marks(),
+      below: [this.#legend, this.#caption],
+    });
+    this.element = this.#plot.element;
+    const { over } = this.#plot.plot;
+    over.addEventListener('click', ({ offsetX }) => {
+      const at = Math.round(this.#plot.plot.posToVal(offsetX, 'x')) - 1;
       if (at >= 0 && at < this.#curves.frames) onFrame(at);
     });
-    new ResizeObserver(() => {
-      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: HEIGHT });
-    }).observe(holder);
-    onSchemeChange(() => this.#plot.redraw());
     this.show(EMPTY);
   }
 
@@ -70,54 +76,33 @@ export class VolumeCurve {
     const column = (values: readonly number[] | undefined) =>
       Array.from({ length: all }, (_, i) => (values?.[i] === undefined ? null : scale * (values[i] ?? 0)));
     const x = Array.from({ length: all }, (_, i) => i + 1);
-    this.#plot.setData([x, column(volumes), column(truth), column(other?.volumes)] as uPlot.AlignedData);
-    this.#title.textContent = text('trackPanels.volumeByFrame', {
+    this.#other.label = other?.name ?? '';
+    this.#plot.show([x, column(volumes), column(truth), column(other?.volumes)]);
+    this.#plot.title = text('trackPanels.volumeByFrame', {
       unit: unit === 'mm' ? 'ml' : `${unit || text('view.unknownUnit')}³`,
     });
-    const key = (name: string, text: string) =>
-      h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
-    this.#legend.replaceChildren(
-      key('tracked', text('trackPanels.curveTracked')),
-      ...(truth ? [key('truth', text('trackPanels.curveTruth'))] : []),
-      ...(other ? [key('annular', other.name)] : []),
-    );
+    const keys = [
+      { name: 'tracked', label: text('trackPanels.curveTracked') },
+      ...(truth ? [{ name: 'truth', label: text('trackPanels.curveTruth') }] : []),
+      ...(other ? [{ name: 'annular', label: other.name }] : []),
+    ];
+    this.#legend.replaceChildren(legendOf(keys));
     const beat = beatOf(volumes);
     this.#caption.dataset.beat = JSON.stringify(beat ?? {});
     this.#caption.textContent =
       beat && volumes.length === frames ? describeBeat(beat, this.#curves) : text('trackPanels.curveUnfinished');
   }
 
-  /** Draws vertical lines at the current frame and, once all frames are tracked, at the largest and smallest volume. */
-  #mark(plot: uPlot): void {
-    const { ctx, bbox } = plot;
+  /** Returns the marks of the current frame and, once all frames are tracked, of the largest and smallest volume. */
+  #marks(): PlotMark[] {
     const { volumes, frames, frame } = this.#curves;
     const beat = volumes.length === frames ? beatOf(volumes) : undefined;
-    const marks = beat
-      ? [
-          [text('trackPanels.endDiastoleMark'), beat.diastole] as const,
-          [text('trackPanels.endSystoleMark'), beat.systole] as const,
-        ]
-      : [];
-    ctx.save();
-    ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.textAlign = 'center';
-    ctx.lineWidth = devicePixelRatio;
-    const line = (at: number, color: string) => {
-      const x = Math.round(plot.valToPos(at + 1, 'x', true));
-      ctx.strokeStyle = color;
-      ctx.beginPath();
-      ctx.moveTo(x, bbox.top);
-      ctx.lineTo(x, bbox.top + bbox.height);
-      ctx.stroke();
-      return x;
-    };
-    for (const [name, at] of marks) {
-      const x = line(at, token('--line-strong'));
-      ctx.fillStyle = token('--muted');
-      ctx.fillText(name, x, bbox.top - 5 * devicePixelRatio);
-    }
-    line(frame, token('--outline'));
-    ctx.restore();
+    const extremes = beat && [
+      { at: beat.diastole + 1, name: text('trackPanels.endDiastoleMark'), color: '--line-strong' },
+      { at: beat.systole + 1, name: text('trackPanels.endSystoleMark'), color: '--line-strong' },
+    ];
+    const marks: PlotMark[] = [...(extremes ?? []), { at: frame + 1, color: '--outline' }];
+    return marks.sort((a, b) => a.at - b.at);
   }
 }
 
@@ -156,38 +141,6 @@ function describeBeat(beat: Beat, { truth, other, unit }: VolumeCurves): string 
         ]
       : []),
   ].join(' ');
-}
-
-function options(mark: (plot: uPlot) => void): uPlot.Options {
-  const axis: uPlot.Axis = {
-    stroke: () => token('--muted'),
-    grid: { stroke: () => token('--line'), width: 1 },
-    ticks: { show: false },
-    font: '11px system-ui, sans-serif',
-  };
-  const line = (color: string, dash?: number[]) => ({
-    stroke: () => token(color),
-    width: 1.75,
-    points: { show: false },
-    ...(dash && { dash }),
-  });
-  return {
-    width: 280,
-    height: HEIGHT,
-    legend: { show: false },
-    cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_HEIGHT, 12, 0, 0],
-    scales: {
-      x: { time: false, range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 2) + 0.5] },
-      y: { range: (_, low, high) => (low === null || high === null ? [0, 1] : spread(low, high)) },
-    },
-    axes: [
-      { ...axis, size: 24, incrs: [1, 2, 5, 10, 20, 50, 100] },
-      { ...axis, size: 40 },
-    ],
-    series: [{}, line('--curve'), line('--muted', [5, 4]), line('--cut', [2, 3])],
-    hooks: { drawClear: [mark] },
-  };
 }
 
 function spread(low: number, high: number): [number, number] {

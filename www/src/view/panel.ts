@@ -137,8 +137,16 @@ export class SlicePanel {
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);
     this.#canvas.height = Math.round(clientHeight * ratio);
-    const { x, y, scaleX, scaleY } = this.#placement();
     context.scale(ratio, ratio);
+    this.paint(context, clientWidth, clientHeight);
+  }
+
+  /**
+   * Draws as on the visible canvas, into an area of the given size; returns the length of a unit of world space there.
+   */
+  paint(context: CanvasRenderingContext2D, width: number, height: number): number {
+    const { x, y, scaleX, scaleY, fit } = this.#placement(width, height);
+    context.save();
     context.translate(x, y);
     context.save();
     context.scale(scaleX, scaleY);
@@ -150,6 +158,8 @@ export class SlicePanel {
     this.#drawAttractors(context, scaleX, scaleY);
     this.#drawUncovered(context, scaleX, scaleY);
     this.overlay(context, scaleX, scaleY);
+    context.restore();
+    return fit;
   }
 
   dispose(): void {
@@ -206,15 +216,14 @@ export class SlicePanel {
    * Returns the position of the slice image in the canvas and the voxel size there, in CSS pixels; voxels have their
    * true proportions.
    */
-  #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
+  #placement(clientWidth = this.#canvas.clientWidth, clientHeight = this.#canvas.clientHeight) {
     const { width, height } = this.picture;
     const { spacing } = this.#volume;
     const across = spacing[this.orientation.horizontal.axis];
     const down = spacing[this.orientation.vertical.axis];
-    const { clientWidth, clientHeight } = this.#canvas;
     const fit = Math.min(clientWidth / (width * across), clientHeight / (height * down));
     const [scaleX, scaleY] = [fit * across, fit * down];
-    return { x: (clientWidth - width * scaleX) / 2, y: (clientHeight - height * scaleY) / 2, scaleX, scaleY };
+    return { x: (clientWidth - width * scaleX) / 2, y: (clientHeight - height * scaleY) / 2, scaleX, scaleY, fit };
   }
 
   #drawCrosshair(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {

@@ -2,6 +2,7 @@ import { Box3, Plane, type Raycaster, Vector3 } from 'three';
 import type { Surface, Vec3 } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
+import type { PictureSubject } from '../ui/pictures';
 import { CameraMarks } from './cameras';
 import { PointCloud } from './cloud';
 import type { PinholeCamera } from './pinhole';
@@ -128,6 +129,11 @@ export class ReconstructionView {
   clearSurface(): void {
     this.#hasSurface = false;
     this.setOptions(this.#options);
+  }
+
+  /** The objects shown, for pictures and films. */
+  get subject(): PictureSubject {
+    return { viewport: this.#viewport, legend: this.legend };
   }
 
   setOptions(options: CloudViewOptions): void {

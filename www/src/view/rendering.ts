@@ -25,9 +25,24 @@ export class WebGlRendering {
     });
   }
 
-  setSize(width: number, height: number): void {
-    this.#renderer?.setPixelRatio(Math.min(devicePixelRatio, 2));
+  /** Sets the size of renderings, `ratio` pixels to a unit. */
+  setSize(width: number, height: number, ratio = Math.min(devicePixelRatio, 2)): void {
+    this.#renderer?.setPixelRatio(ratio);
     this.#renderer?.setSize(width, height, false);
+  }
+
+  /** Largest width and height of renderings, in pixels; 0 without a graphics context. */
+  get largest(): number {
+    const context = this.#renderer?.getContext();
+    if (!context) return 0;
+    const { MAX_RENDERBUFFER_SIZE, MAX_VIEWPORT_DIMS } = context;
+    return Math.min(context.getParameter(MAX_RENDERBUFFER_SIZE), ...context.getParameter(MAX_VIEWPORT_DIMS));
+  }
+
+  /** Size of renderings in pixels; browsers make it smaller than it was set if memory does not suffice. */
+  get size(): [number, number] {
+    const { drawingBufferWidth = 0, drawingBufferHeight = 0 } = this.#renderer?.getContext() ?? {};
+    return [drawingBufferWidth, drawingBufferHeight];
   }
 
   render(scene: Scene, camera: PerspectiveCamera): void {

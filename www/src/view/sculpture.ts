@@ -5,6 +5,7 @@ import type { ControlEllipsoid, Layout, Pose } from '../sculpt/protocol';
 import { text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
+import type { PictureSubject } from '../ui/pictures';
 import { EllipsoidHandles, type HandleMode } from './handles';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
@@ -173,6 +174,11 @@ export class SculptureView {
   set mode(mode: HandleMode) {
     this.handles.mode = mode;
     this.#viewport.invalidate();
+  }
+
+  /** The objects shown, for pictures and films. */
+  get subject(): PictureSubject {
+    return { viewport: this.#viewport, legend: this.legend };
   }
 
   setOptions(options: SculptViewOptions): void {

@@ -2,6 +2,7 @@ import type { Raycaster } from 'three';
 import type { Surface, Vec3, VolumeView } from '../protocol';
 import { count, text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
+import type { PictureSubject } from '../ui/pictures';
 import type { SlicePlacement } from '../ui/view-options';
 import { type Axis, toWorld } from './anatomy';
 import { LabelOutlines } from './label-outlines';
@@ -118,6 +119,11 @@ export class SegmentView {
     this.#hidden = hidden;
     for (const [label, { object }] of this.#surfaces) this.#dress(label, object);
     this.#viewport.invalidate();
+  }
+
+  /** The objects shown, for pictures and films. */
+  get subject(): PictureSubject {
+    return { viewport: this.#viewport, panels: () => this.#scene?.panels ?? [] };
   }
 
   setOptions(options: SegmentViewOptions): void {

@@ -2,6 +2,7 @@ import type { Raycaster, Vector3 } from 'three';
 import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
+import type { PictureSubject } from '../ui/pictures';
 import type { ViewOptions } from '../ui/view-options';
 import { slicePlane, toWorld } from './anatomy';
 import { AttractorMarks, UncoveredMarks } from './markers';
@@ -92,6 +93,11 @@ export class Stage {
       this.#scene?.planes[axis]?.showSection(section);
     });
     this.#viewport.invalidate();
+  }
+
+  /** The objects shown, for pictures and films. */
+  get subject(): PictureSubject {
+    return { viewport: this.#viewport, legend: this.legend, panels: () => this.#scene?.panels ?? [] };
   }
 
   setOptions(options: ViewOptions): void {

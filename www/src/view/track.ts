@@ -5,6 +5,7 @@ import { sliceVotes } from '../track/clusters';
 import { crossSection } from '../track/cross-section';
 import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
+import type { PictureSubject } from '../ui/pictures';
 import type { SlicePlacement } from '../ui/view-options';
 import { slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
@@ -164,6 +165,11 @@ export class TrackView {
   showRegion(region: VoxelBox): void {
     this.#grips.region = region;
     this.#redraw();
+  }
+
+  /** The objects shown, for pictures and films. */
+  get subject(): PictureSubject {
+    return { viewport: this.#viewport, panels: () => this.#scene?.panels ?? [] };
   }
 
   setOptions(options: TrackViewOptions): void {

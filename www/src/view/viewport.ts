@@ -50,6 +50,8 @@ export class Viewport {
    * rotated without a GPU, so that simplified objects should be drawn.
    */
   onDraw: (viewer: Vector3, interactive: boolean) => void = () => undefined;
+  /** Called after each rendering, while the canvas still holds it. */
+  onDrawn: () => void = () => undefined;
   /** Called with the ray from the camera through the point of the view that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
   /** Handler called first for key events; returns true if it has handled the key, which the view then ignores. */
@@ -71,6 +73,8 @@ export class Viewport {
    * farther away.
    */
   #cappedAspect = 1;
+  /** Size of renderings in pixels while it is not that of the canvas on the page. */
+  #fixedSize: readonly [number, number] | undefined;
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
@@ -188,7 +192,35 @@ export class Viewport {
 
   /** Aspect ratio of the view, width by height. */
   get aspect(): number {
-    return this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
+    const [width, height] = this.#fixedSize ?? [this.canvas.clientWidth, this.canvas.clientHeight];
+    return width / Math.max(1, height);
+  }
+
+  /** Largest width and height of renderings, in pixels. */
+  get largest(): number {
+    return this.#rendering.largest;
+  }
+
+  /**
+   * Renders at a fixed size in pixels, for pictures and films, or with undefined at that of the canvas on the page
+   * again. Returns whether renderings have this size: the memory may not suffice.
+   */
+  fixSize(size: readonly [number, number] | undefined): boolean {
+    this.#fixedSize = size;
+    this.#resize();
+    return !size || this.#rendering.size.every((length, side) => length === size[side]);
+  }
+
+  /** Size of a pixel at the depth of the centre of rotation, in the coordinates of the objects shown. */
+  get unitsPerPixel(): number {
+    const viewer = this.#viewer();
+    const depth = -this.#controls.target.clone().applyMatrix4(viewer.matrixWorldInverse).z;
+    return (2 * depth) / ((viewer.projectionMatrix.elements[5] ?? 1) * this.canvas.height);
+  }
+
+  /** Rotates the view around the vertical axis through the centre of rotation, by an angle in radians. */
+  turn(angle: number): void {
+    this.#rotate(angle, 0);
   }
 
   #fitView(box: Box3, towards: Vector3): void {
@@ -280,18 +312,18 @@ export class Viewport {
 
   /** Returns the camera in use: the orbit camera, or one with the pose of a photograph. */
   #viewer(): PerspectiveCamera {
-    const { clientWidth, clientHeight } = this.canvas;
-    if (!this.#through || clientHeight === 0) return this.#camera;
+    if (!this.#through || this.canvas.clientHeight === 0) return this.#camera;
     const { near, far } = this.#camera;
-    applyPinhole(this.#photoCamera, this.#through, this.#world.matrixWorld, clientWidth / clientHeight, [near, far]);
+    applyPinhole(this.#photoCamera, this.#through, this.#world.matrixWorld, this.aspect, [near, far]);
     this.#photoCamera.updateMatrixWorld();
     return this.#photoCamera;
   }
 
   #resize(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (width === 0 || height === 0) return;
-    this.#rendering.setSize(width, height);
+    const { clientWidth, clientHeight } = this.canvas;
+    const [width, height] = this.#fixedSize ?? [clientWidth, clientHeight];
+    if (width === 0 || height === 0 || this.#disposed) return;
+    this.#rendering.setSize(width, height, this.#fixedSize && 1);
     this.#camera.aspect = width / height;
     this.#adjustDistance(Math.min(1, this.#camera.aspect));
     this.#camera.updateProjectionMatrix();
@@ -316,6 +348,7 @@ export class Viewport {
     if (viewer === this.#camera) viewer.updateMatrixWorld();
     this.#lamp.matrix.copy(viewer.matrixWorld);
     this.#rendering.render(this.#scene, viewer);
+    this.onDrawn();
   }
 
   #onKey(event: KeyboardEvent): void {
