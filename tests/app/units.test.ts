@@ -50,7 +50,7 @@ test('slices are oriented by radiological convention, whatever the order of the 
 
 test('a picture shows each voxel on the side that its labels say', () => {
   const voxels = Uint8Array.from({ length: 4 * 5 * 6 }, (_, i) => i);
-  const volume = { ...grid(STRAIGHT), voxels };
+  const volume = { ...grid(STRAIGHT), voxels, window: [0, 255] as [number, number] };
   const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const out = new Uint8ClampedArray(4 * 4 * 5);

@@ -3,7 +3,7 @@ import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, Volum
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
-import { slicePlane, toWorld } from './anatomy';
+import { nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { AttractorMarks, UncoveredMarks } from './markers';
 import { SlicePanel } from './panel';
 import { diverging, QUANTITIES, quantityTitle } from './shading';
@@ -16,7 +16,7 @@ import { VolumeScene } from './volume-scene';
 export class Stage {
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
-  readonly #surface = new SurfaceObject();
+  readonly #surface: SurfaceObject;
   readonly #marks = new AttractorMarks();
   readonly #uncoveredMarks = new UncoveredMarks();
   /** Legend of the surface's colours. */
@@ -45,6 +45,7 @@ export class Stage {
     onPlanes: (planes: Plane[]) => void,
   ) {
     this.#viewport = new Viewport(canvas);
+    this.#surface = new SurfaceObject(this.#viewport.clipping);
     this.#slices = slices;
     this.#onPlanes = onPlanes;
     this.#options = options;
@@ -72,6 +73,7 @@ export class Stage {
           onPoint: (index, pressed) => this.#point(index, pressed),
         }),
     );
+    this.#scene.onWindow = () => this.onMoved();
     this.setOptions(this.#options);
     this.showAttractors(this.#attractors);
     this.#viewport.fitVolume(volume);
@@ -126,9 +128,7 @@ export class Stage {
 
   /** Shows a coarser pyramid level in the slices, or with undefined the volume itself. */
   showLevel(level: LevelView | undefined): void {
-    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
-    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
-    this.#viewport.invalidate();
+    this.#scene?.showLevel(level);
   }
 
   /**
@@ -140,18 +140,15 @@ export class Stage {
     const frame = scene?.panels.find((panel) => panel.orientation.name === 'Axial')?.orientation;
     if (!scene || !frame) return undefined;
     const index = this.#crosshair[frame.axis];
-    if (!level) return slicePicture(scene.volume, frame, index);
-    return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index));
+    if (!level) return slicePicture(scene.volume, frame, index, scene.window);
+    return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index), scene.window);
   }
 
   /** Moves the crosshair to the voxel nearest to a world point, and with it the slices. */
   goTo(point: Vec3): void {
     const scene = this.#scene;
     if (!scene) return;
-    const index = toWorld(scene.inverse, point);
-    this.#moveTo(
-      index.map((x, axis) => Math.min((scene.volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3,
-    );
+    this.#moveTo(nearestVoxel(toWorld(scene.inverse, point), scene.volume.dims));
   }
 
   /** World position of the crosshair, the voxel in which the three slices intersect. */
@@ -176,12 +173,10 @@ export class Stage {
     const scene = this.#scene;
     if (!scene) return;
     this.#crosshair = index;
-    for (const panel of scene.panels) panel.setCrosshair(index);
-    for (const [axis, plane] of scene.planes.entries()) plane.moveTo(index[axis] ?? 0);
+    scene.moveTo(index);
     this.onMoved();
     const { volume, inverse } = scene;
     this.#onPlanes(([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, index[axis])));
-    this.#viewport.invalidate();
   }
 
   /**
@@ -196,7 +191,7 @@ export class Stage {
 
   #placeOnSurface(ray: Raycaster): void {
     if (!this.onPlace) return;
-    const [hit] = ray.intersectObject(this.#surface.target, false);
+    const hit = this.#surface.hit(ray);
     if (!hit) return;
     const point = hit.point.toArray();
     this.goTo(point);
