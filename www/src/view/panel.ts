@@ -342,10 +342,6 @@ export class SlicePanel {
       onHover?.(at);
       this.host?.onProbe(at && this.#voxelIn(at));
     };
-    this.#canvas.addEventListener('pointerleave', () => hover(undefined));
-    this.#canvas.addEventListener('pointermove', hover);
-    // The keys of the slice work after a click on it.
-    this.#canvas.addEventListener('pointerdown', () => this.#slider.focus({ preventScroll: true }));
     new SliceGestures(this.#canvas, {
       press: (event) => this.#press(event, onPoint, grab),
       zoom: (factor, x, y) => this.#zoomAt(factor, x, y),
@@ -355,6 +351,11 @@ export class SlicePanel {
       isZoomed: () => this.isZoomed,
       reset: () => this.resetZoom(),
     });
+    // After the gestures, which may move the image.
+    this.#canvas.addEventListener('pointermove', hover);
+    this.#canvas.addEventListener('pointerleave', () => hover(undefined));
+    // The keys of the slice work after a click on it.
+    this.#canvas.addEventListener('pointerdown', () => this.#slider.focus({ preventScroll: true }));
   }
 
   /** Starts to drag the object at the pointer, or else the crosshair. */
