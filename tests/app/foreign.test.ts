@@ -178,7 +178,7 @@ describe('TIFF', () => {
     );
     await open([{ name: 'cell.ome.tif', mimeType: 'image/tiff', buffer: file }], 'cell.ome.tif');
     expect(await fact('Voxels')).toBe('24 × 20 × 16');
-    expect(await fact('Voxel size')).toBe('0.5 × 0.5 × 1.25 mm');
+    expect(await fact('Voxel size')).toBe('0.5 × 0.5 × 1.25 µm');
     await hasVolume(0.5 * 0.5 * 1.25);
   });
 
@@ -228,6 +228,25 @@ describe('the stack described by a TIFF file', () => {
   test('OME: time before depth', () => {
     const text = '<OME><Pixels DimensionOrder="XYTZC" SizeZ="2" SizeT="3" SizeC="1"/></OME>';
     expect(describedIn(text, 6)).toMatchObject({ pages: [0, 3, 1, 4, 2, 5], frames: 3 });
+  });
+
+  test('OME: sizes are in micrometres unless it says otherwise', () => {
+    const sizes = (attributes: string) => describedIn(`<OME><Pixels SizeZ="1" ${attributes}/></OME>`, 1);
+    const size = 'PhysicalSizeX="2" PhysicalSizeY="2" PhysicalSizeZ="4"';
+    expect(sizes(size)).toMatchObject({ spacing: [2, 2, 4], unit: 'um' });
+    const unit = (name: string) => ['X', 'Y', 'Z'].map((axis) => `PhysicalSize${axis}Unit="${name}"`).join(' ');
+    expect(sizes(`${size} ${unit('nm')}`)).toMatchObject({ spacing: [0.002, 0.002, 0.004], unit: 'um' });
+    expect(sizes(`${size} ${unit('mm')}`)).toMatchObject({ spacing: [2, 2, 4], unit: 'mm' });
+    expect(sizes(`${size} ${unit('pixel')}`)).not.toHaveProperty('unit');
+    expect(sizes('')).not.toHaveProperty('unit');
+  });
+
+  test('ImageJ: micrometres by any of their names', () => {
+    for (const unit of ['micron', 'um', 'µm', '\\u00B5m']) {
+      const stack = describedIn(`ImageJ=1.53\nimages=1\nunit=${unit}\nspacing=0.7\n`, 1);
+      expect(stack).toMatchObject({ unit: 'um', scale: 1 });
+    }
+    expect(describedIn('ImageJ=1.53\nimages=1\nunit=inch\n', 1)).not.toHaveProperty('unit');
   });
 
   test('descriptions that do not fit the pages, or none: all pages are slices', () => {

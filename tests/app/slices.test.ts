@@ -216,7 +216,7 @@ describe('a cut', () => {
     await reach(app.page, 'done');
     await unfold(app.page);
     await app.page.locator('[data-view=slices]').selectOption('hidden');
-    const view = app.page.locator('.view > canvas');
+    const view = app.page.locator('.scene > canvas');
     // The surface is of the colour of bone, cut faces are darker.
     const bone = async () => countPixels(app.page, await view.screenshot(), (r, g, b) => r > g && g > b && r - b > 18);
     const whole = await bone();

@@ -8,6 +8,7 @@
 import type {
   Attractor,
   Coverage,
+  LengthUnit,
   MeshFormat,
   MeshInfo,
   MeshReport,
@@ -96,6 +97,8 @@ export interface VolumeView extends LevelView {
   /** 4 × 4 affine matrix from voxel indices to world coordinates, column-major. */
   affine: Float64Array;
   space: 'RAS' | 'LPS';
+  /** Unit of lengths in world space, if the volume's file states it. */
+  unit?: LengthUnit;
   /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
@@ -176,8 +179,8 @@ export interface Loaded extends Ready {
 /** Requests of the page to the Extract lab's worker: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: ImageSource; setup: Setup }; reply: Loaded };
+  /** Opens a frame of a volume, the first is 0, and builds a model of it. On failure, the previous volume and model stay. */
+  load: { body: { name: string; source: ImageSource; setup: Setup; frame: number }; reply: Loaded };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
   cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */

@@ -56,6 +56,7 @@ export class SliceBar {
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   readonly #presets: Preset[];
   readonly #preset: HTMLSelectElement;
+  readonly #cut: HTMLSelectElement;
   readonly #width: HTMLInputElement;
   readonly #level: HTMLInputElement;
   readonly #onWindow: (window: DisplayWindow) => void;
@@ -77,6 +78,8 @@ export class SliceBar {
     this.#preset = preset.select;
     const [width, level] = [this.#field(text('slices.width'), 'width'), this.#field(text('slices.level'), 'level')];
     [this.#width, this.#level] = [width.input, level.input];
+    const cut = choice(text('slices.cut'), 'cut', SIDES, 'none', onCut);
+    this.#cut = cut.select;
     this.#reset = h('button', { type: 'button', disabled: true, onclick: onResetZoom }, text('slices.resetZoom'));
     this.element = h(
       'div',
@@ -93,7 +96,7 @@ export class SliceBar {
           width.element,
           level.element,
           h('label', { class: 'check' }, this.#adjusting, text('slices.adjust')),
-          choice(text('slices.cut'), 'cut', SIDES, 'none', onCut).element,
+          cut.element,
           this.#reset,
         ),
         this.#error,
@@ -110,6 +113,10 @@ export class SliceBar {
 
   set isZoomed(zoomed: boolean) {
     this.#reset.disabled = !zoomed;
+  }
+
+  set cut(side: CutSide) {
+    this.#cut.value = side;
   }
 
   set readout(text: string) {

@@ -61,7 +61,10 @@ export class Stage {
     onSchemeChange(() => this.#recolor());
   }
 
+  /** Shows another volume; crosshair, camera and display stay if it is another frame of the one before. */
   setVolume(volume: VolumeView): void {
+    const before = this.#scene;
+    const isFrame = before !== undefined && isSameImage(before.volume, volume);
     this.#clear();
     this.#scene = new VolumeScene(
       this.#viewport,
@@ -76,8 +79,9 @@ export class Stage {
     this.#scene.onWindow = () => this.onMoved();
     this.setOptions(this.#options);
     this.showAttractors(this.#attractors);
-    this.#viewport.fitVolume(volume);
-    this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
+    if (isFrame) this.#scene.takeOver(before);
+    else this.#viewport.fitVolume(volume);
+    this.#moveTo(isFrame ? this.#crosshair : (volume.dims.map((n) => (n - 1) >> 1) as Vec3));
   }
 
   /** Shows another surface; its arrays are used without a copy until the next one is shown. */
@@ -221,4 +225,9 @@ export class Stage {
     this.#scene?.dispose();
     this.#scene = undefined;
   }
+}
+
+/** Whether two volumes are frames of the same image. */
+function isSameImage(one: VolumeView, other: VolumeView): boolean {
+  return other.frames > 1 && one.name === other.name && one.dims.join() === other.dims.join();
 }

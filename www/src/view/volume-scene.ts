@@ -86,6 +86,13 @@ export class VolumeScene {
     return this.#window;
   }
 
+  /** Takes over window and cut from the display of another volume. */
+  takeOver(other: VolumeScene): void {
+    this.#cut = other.#cut;
+    this.#bar.cut = other.#cut;
+    this.#show(other.#window);
+  }
+
   /** Moves the crosshair to a voxel, and with it the slices. */
   moveTo(index: Vec3): void {
     this.#crosshair = index;

@@ -1,5 +1,5 @@
 /** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
-import { VesicleError, Volume, type VolumeInit } from 'vesicle';
+import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle';
 import startReaders, { parseVolume } from 'vesicle/import';
 import { importVolume } from '../importers';
 import type { Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
@@ -46,14 +46,32 @@ export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   return parseVolume(header.bytes, { data: data.bytes });
 }
 
+/** One frame of a volume, the number of all its frames, and the unit of length that its file states. */
+export interface OpenFrame {
+  volume: Volume;
+  frames: number;
+  unit: LengthUnit | undefined;
+}
+
 /**
- * Returns the computed volume of a shape, or reads a volume from files in any supported format, the library's own or
+ * Returns a frame of the computed volume of a shape, or of one in files of any supported format, the library's own or
  * one that other libraries read.
  */
-export async function volumeFrom(source: VolumeSource): Promise<Volume> {
-  if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
-  const foreign = await importVolume(source.files);
-  return foreign ? new Volume(foreign) : parseFiles(source.files);
+export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
+  const init = await read(source);
+  const all = new Volume(init);
+  const { unit } = init;
+  if (all.frames === 1 && frame === 0) return { volume: all, frames: 1, unit };
+  try {
+    return { volume: all.frame(frame), frames: all.frames, unit };
+  } finally {
+    all.free();
+  }
+}
+
+async function read(source: VolumeSource): Promise<VolumeInit> {
+  if ('shape' in source) return shapeVoxels(source.shape);
+  return (await importVolume(source.files)) ?? readFiles(source.files);
 }
 
 /** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */
