@@ -1,7 +1,7 @@
 import type { Locator } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
-import { type App, drop, open, openApp, QUICK, reach, unfold } from './browser';
+import { type App, afterRun, drop, measures, open, openApp, QUICK, reach, unfold } from './browser';
 import { countPixels } from './pixels';
 
 /** Voxels along each side of the volume. */
@@ -231,5 +231,62 @@ describe('a cut', () => {
     await expect.poll(bone).toBeLessThan(0.2 * whole);
     await cut.selectOption({ label: 'nothing' });
     await expect.poll(bone).toBeGreaterThan(0.9 * whole);
+  });
+});
+
+describe('frames of a 4D volume', () => {
+  const RADII = [11, 9, 7];
+  /** Returns frames with a ball each, of different radii. */
+  const beating = () => {
+    const data = Uint8Array.from({ length: SIZE ** 3 * RADII.length }, (_, i) => {
+      const [x, y, z] = [i % SIZE, Math.floor(i / SIZE) % SIZE, Math.floor(i / SIZE ** 2) % SIZE];
+      const radius = RADII[Math.floor(i / SIZE ** 3)] ?? 0;
+      return Math.max(0, Math.min(255, 128 + 40 * (radius - Math.hypot(x - 15.5, y - 15.5, z - 15.5))));
+    });
+    return new Volume({ data, dims: [SIZE, SIZE, SIZE, RADII.length], spacing: [1, 1, 1] }).toNifti();
+  };
+  const ballOf = (frame: number) => (4 / 3) * Math.PI * (RADII[frame] ?? 0) ** 3;
+  const slider = () => app.page.locator('[data-param=frame]').getByRole('slider', { name: 'Frame' });
+  const dropBeating = () => drop(app.page, [{ name: 'beating.nii', bytes: beating() }]);
+
+  test('the first opens, and the slider chooses another, with the settings and the slices as they are', async () => {
+    await open(app, QUICK.extract);
+    await reach(app.page, 'done');
+    expect(await slider().isVisible()).toBe(false);
+    await afterRun(app.page, dropBeating);
+    expect(await app.page.textContent('[data-param=frame] output')).toBe('1 of 3');
+    expect((await measures(app.page)).volume / ballOf(0)).toBeCloseTo(1, 1);
+    const damping = app.page.locator('[data-param=damping] input[type=number]');
+    await afterRun(app.page, async () => {
+      await damping.fill('0.7');
+      await damping.press('Enter');
+    });
+    const axialSlider = app.page.getByRole('slider', { name: 'Axial' });
+    await axialSlider.fill('9');
+    await afterRun(app.page, () => slider().press('End'));
+    expect((await measures(app.page)).volume / ballOf(2)).toBeCloseTo(1, 1);
+    expect(await app.page.textContent('[data-param=frame] output')).toBe('3 of 3');
+    expect(await damping.inputValue()).toBe('0.7');
+    expect(await axialSlider.inputValue()).toBe('9');
+    expect(app.page.url()).toContain('frame=2');
+  });
+
+  test('a link names the frame, which opens with the file', async () => {
+    const [, hash = ''] = app.page.url().split('#');
+    await open(app, hash);
+    await reach(app.page, 'done');
+    await afterRun(app.page, dropBeating);
+    expect(await app.page.textContent('[data-param=frame] output')).toBe('3 of 3');
+    expect((await measures(app.page)).volume / ballOf(2)).toBeCloseTo(1, 1);
+  });
+
+  test('a link to a frame that does not exist is refused with a reason, and the first frame opens', async () => {
+    const [, hash = ''] = app.page.url().split('#');
+    await open(app, hash.replace('frame=2', 'frame=7'));
+    await reach(app.page, 'done');
+    await dropBeating();
+    await expect.poll(() => app.page.textContent('.banner')).toContain('settings were ignored');
+    expect(await app.page.textContent('.banner')).toContain('frame');
+    await expect.poll(() => app.page.textContent('[data-param=frame] output')).toBe('1 of 3');
   });
 });

@@ -58,15 +58,13 @@ export interface OpenFrame {
  * one that other libraries read.
  */
 export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
-  const init = await read(source);
-  const all = new Volume(init);
-  const { unit } = init;
-  if (all.frames === 1 && frame === 0) return { volume: all, frames: 1, unit };
-  try {
-    return { volume: all.frame(frame), frames: all.frames, unit };
-  } finally {
-    all.free();
-  }
+  const { frameSeconds: _, ...init } = await read(source);
+  const [x, y, z, frames = 1] = init.dims;
+  if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
+    throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
+  const size = x * y * z;
+  const data = init.data.subarray(frame * size, (frame + 1) * size);
+  return { volume: new Volume({ ...init, data, dims: [x, y, z] }), frames, unit: init.unit };
 }
 
 async function read(source: VolumeSource): Promise<VolumeInit> {
