@@ -98,6 +98,76 @@ describe('DICOM', () => {
   });
 });
 
+describe('a dropped folder', () => {
+  /** Drops a folder with folders in it, as from the desktop; `tree` has files by their paths. */
+  function dropFolder(name: string, tree: Record<string, Buffer>): Promise<void> {
+    const files = Object.entries(tree).map(([path, bytes]) => ({ path, base64: bytes.toString('base64') }));
+    return app.page.evaluate(
+      ({ name, files }) => {
+        const fileEntry = (path: string, base64: string) => {
+          const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+          const file = new File([bytes], path.split('/').at(-1) ?? '');
+          return { isFile: true, name: file.name, file: (take: (file: File) => void) => take(file) };
+        };
+        const folderEntry = (name: string, inside: typeof files): object => {
+          const folders = new Set(inside.flatMap(({ path }) => (path.includes('/') ? [path.split('/')[0] ?? ''] : [])));
+          const under = (folder: string) =>
+            inside.flatMap(({ path, base64 }) =>
+              path.startsWith(`${folder}/`) ? [{ path: path.slice(folder.length + 1), base64 }] : [],
+            );
+          const entries = [
+            ...inside.flatMap(({ path, base64 }) => (path.includes('/') ? [] : [fileEntry(path, base64)])),
+            ...Array.from(folders, (folder) => folderEntry(folder, under(folder))),
+          ];
+          // Like browsers, which return some entries at a time.
+          const createReader = () => {
+            const rest = [...entries];
+            return { readEntries: (take: (some: object[]) => void) => take(rest.splice(0, 5)) };
+          };
+          return { isDirectory: true, name, createReader };
+        };
+        const item = { kind: 'file', webkitGetAsEntry: () => folderEntry(name, files) };
+        const dataTransfer = { types: ['Files'], files: [], items: [item] };
+        const event = new DragEvent('drop', { bubbles: true, cancelable: true });
+        Object.defineProperty(event, 'dataTransfer', { value: dataTransfer });
+        window.dispatchEvent(event);
+      },
+      { name, files },
+    );
+  }
+
+  const named = (name: string) =>
+    app.page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), name);
+
+  test('with DICOM files is read with its folders; the largest series opens, and other files are skipped', async () => {
+    const data = Uint16Array.from(ellipsoid(), (value) => value + 1000);
+    const grid = { data, along: [1, 0, 0, 0, 1, 0] as [number, number, number, number, number, number] };
+    const place = { spacing: [1, 1, 1], origin: [0, 0, 0] } as const;
+    const body = { ...grid, dims: [WIDE, HIGH, DEEP], ...place } as Parameters<typeof dicomSeries>[0];
+    const scout = { ...body, dims: [WIDE, HIGH, 2] } as typeof body;
+    const tree = { 'readme.txt': Buffer.from('no image'), 'study/DICOMDIR': Buffer.from('neither') };
+    const put = (folder: string, files: Given[]) =>
+      Object.fromEntries(files.map(({ name, buffer }) => [`${folder}/${name}`, buffer]));
+    await dropFolder('patient', {
+      ...tree,
+      ...put('study/1', dicomSeries(scout, { number: 1, description: 'Scout' })),
+      ...put('study/2', dicomSeries(body, { number: 2, description: 'Body' })),
+    });
+    await named('patient: Body, the largest of 2 series');
+    await reach(app.page, 'done');
+    expect(await fact('Voxels')).toBe('24 × 20 × 16');
+    await hasVolume(1);
+  });
+
+  test('without a volume is refused with a reason, and what was open stays', async () => {
+    const before = await measures(app.page);
+    await dropFolder('letters', { 'a.txt': Buffer.from('a'), 'b.txt': Buffer.from('b'), 'c.txt': Buffer.from('c') });
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/letters could not be opened/);
+    expect(await app.page.textContent('.banner')).toContain('3 files are neither a series of DICOM or TIFF files');
+    expect(await measures(app.page)).toEqual(before);
+  });
+});
+
 describe('TIFF', () => {
   test('OME: of two channels the first is read', async () => {
     const second = new Uint8Array(WIDE * HIGH).fill(255);
@@ -108,7 +178,7 @@ describe('TIFF', () => {
     );
     await open([{ name: 'cell.ome.tif', mimeType: 'image/tiff', buffer: file }], 'cell.ome.tif');
     expect(await fact('Voxels')).toBe('24 × 20 × 16');
-    expect(await fact('Voxel size')).toBe('0.5 × 0.5 × 1.25 mm');
+    expect(await fact('Voxel size')).toBe('0.5 × 0.5 × 1.25 µm');
     await hasVolume(0.5 * 0.5 * 1.25);
   });
 
@@ -158,6 +228,25 @@ describe('the stack described by a TIFF file', () => {
   test('OME: time before depth', () => {
     const text = '<OME><Pixels DimensionOrder="XYTZC" SizeZ="2" SizeT="3" SizeC="1"/></OME>';
     expect(describedIn(text, 6)).toMatchObject({ pages: [0, 3, 1, 4, 2, 5], frames: 3 });
+  });
+
+  test('OME: sizes are in micrometres unless it says otherwise', () => {
+    const sizes = (attributes: string) => describedIn(`<OME><Pixels SizeZ="1" ${attributes}/></OME>`, 1);
+    const size = 'PhysicalSizeX="2" PhysicalSizeY="2" PhysicalSizeZ="4"';
+    expect(sizes(size)).toMatchObject({ spacing: [2, 2, 4], unit: 'um' });
+    const unit = (name: string) => ['X', 'Y', 'Z'].map((axis) => `PhysicalSize${axis}Unit="${name}"`).join(' ');
+    expect(sizes(`${size} ${unit('nm')}`)).toMatchObject({ spacing: [0.002, 0.002, 0.004], unit: 'um' });
+    expect(sizes(`${size} ${unit('mm')}`)).toMatchObject({ spacing: [2, 2, 4], unit: 'mm' });
+    expect(sizes(`${size} ${unit('pixel')}`)).not.toHaveProperty('unit');
+    expect(sizes('')).not.toHaveProperty('unit');
+  });
+
+  test('ImageJ: micrometres by any of their names', () => {
+    for (const unit of ['micron', 'um', 'µm', '\\u00B5m']) {
+      const stack = describedIn(`ImageJ=1.53\nimages=1\nunit=${unit}\nspacing=0.7\n`, 1);
+      expect(stack).toMatchObject({ unit: 'um', scale: 1 });
+    }
+    expect(describedIn('ImageJ=1.53\nimages=1\nunit=inch\n', 1)).not.toHaveProperty('unit');
   });
 
   test('descriptions that do not fit the pages, or none: all pages are slices', () => {

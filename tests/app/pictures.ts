@@ -28,6 +28,17 @@ function valueBytes(kind: string, value: string | number[] | Buffer): Buffer {
   return Buffer.concat(value.map((number) => Buffer.from(Uint16Array.of(number).buffer)));
 }
 
+/** Returns a sequence of undefined length with one item, of undefined length, too. */
+function sequence(group: number, number: number, content: Buffer): Buffer {
+  const head = Buffer.alloc(12);
+  head.writeUInt16LE(group, 0);
+  head.writeUInt16LE(number, 2);
+  head.write('SQ', 4, 'latin1');
+  head.writeUInt32LE(0xffffffff, 8);
+  const mark = (tag: number, length: number) => Buffer.from(Uint32Array.of((tag << 16) | 0xfffe, length).buffer);
+  return Buffer.concat([head, mark(0xe000, 0xffffffff), content, mark(0xe00d, 0), mark(0xe0dd, 0)]);
+}
+
 const CT = '1.2.840.10008.5.1.4.1.1.2';
 const EXPLICIT = '1.2.840.10008.1.2.1';
 
@@ -42,8 +53,14 @@ export interface Grid {
   along: [number, number, number, number, number, number];
 }
 
+/** Series of the files: the last number of its identifier, and its description. */
+export interface SeriesName {
+  number: number;
+  description: string;
+}
+
 /** Returns slice z of a grid as a CT slice. */
-function slice(grid: Grid, z: number): Buffer {
+function slice(grid: Grid, z: number, { number, description }: SeriesName): Buffer {
   const { data, dims, spacing, origin, along } = grid;
   const [x1 = 0, x2 = 0, x3 = 0, y1 = 0, y2 = 0, y3 = 0] = along;
   const normal = [x2 * y3 - x3 * y2, x3 * y1 - x1 * y3, x1 * y2 - x2 * y1];
@@ -64,8 +81,11 @@ function slice(grid: Grid, z: number): Buffer {
     element(8, 0x16, 'UI', CT),
     element(8, 0x18, 'UI', `1.2.3.4.${z + 1}`),
     element(8, 0x60, 'CS', 'CT'),
+    element(8, 0x103e, 'LO', description),
+    // A sequence of undefined length that names another series.
+    sequence(8, 0x1115, element(0x20, 0xe, 'UI', '9.9.9')),
     element(0x20, 0xd, 'UI', '1.2.3.5'),
-    element(0x20, 0xe, 'UI', '1.2.3.6'),
+    element(0x20, 0xe, 'UI', `1.2.3.${number}`),
     element(0x20, 0x13, 'IS', String(z + 1)),
     element(0x20, 0x32, 'DS', place.join('\\')),
     element(0x20, 0x37, 'DS', along.join('\\')),
@@ -87,9 +107,9 @@ function slice(grid: Grid, z: number): Buffer {
 /**
  * Returns a series of files in an order other than that of the slices, with stored values 1000 above the intensities.
  */
-export function dicomSeries(grid: Grid): Given[] {
+export function dicomSeries(grid: Grid, name: SeriesName = { number: 6, description: '' }): Given[] {
   const order = Array.from({ length: grid.dims[2] }, (_, z) => (z * 7) % grid.dims[2]);
-  return order.map((z, k) => ({ name: `IM${k}`, mimeType: 'application/dicom', buffer: slice(grid, z) }));
+  return order.map((z, k) => ({ name: `IM${k}`, mimeType: 'application/dicom', buffer: slice(grid, z, name) }));
 }
 
 /** Returns 8-bit pages as a little-endian TIFF file, with a description on the first page. */

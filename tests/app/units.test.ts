@@ -7,6 +7,7 @@ import { UndoStack } from '../../www/src/labs/undo';
 import type { StepReport } from '../../www/src/protocol';
 import { quantize } from '../../www/src/quantize';
 import { otsu, quantiles } from '../../www/src/threshold';
+import { lengths } from '../../www/src/ui/format';
 import { History } from '../../www/src/ui/history';
 import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
@@ -50,7 +51,7 @@ test('slices are oriented by radiological convention, whatever the order of the 
 
 test('a picture shows each voxel on the side that its labels say', () => {
   const voxels = Uint8Array.from({ length: 4 * 5 * 6 }, (_, i) => i);
-  const volume = { ...grid(STRAIGHT), voxels };
+  const volume = { ...grid(STRAIGHT), voxels, window: [0, 255] as [number, number] };
   const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const out = new Uint8ClampedArray(4 * 4 * 5);
@@ -194,6 +195,7 @@ describe('a link', () => {
   const settings = {
     example: tooth,
     file: 'tooth.nrrd',
+    frame: 0,
     choice: { kind: 'bubbles', bubbles: 7, levels: 2, edge: 1.5 } as const,
     sphere: { center: [0, 0, 0] as [number, number, number], radius: 1 },
     params: { ...tooth?.params, iso: 700, damping: 0.4, restLength: 'mean' },
@@ -216,6 +218,11 @@ describe('a link', () => {
     expect(fromHash(toHash(linked))).toEqual(linked);
   });
 
+  test('contains the frame of a 4D volume, unless it is the first', () => {
+    expect(linkOf({ ...settings, frame: 3 })).toMatchObject({ frame: 3 });
+    expect(fromHash(toHash(linkOf({ ...settings, frame: 3 })))).toMatchObject({ frame: 3 });
+  });
+
   test('is the bare address if nothing differs', () => {
     const [first] = EXAMPLES;
     if (!first) throw new Error('no example');
@@ -231,6 +238,22 @@ describe('a link', () => {
       params: { iso: '' },
       attractors: [],
     });
+  });
+});
+
+describe('lengths', () => {
+  test('that are small are given in a smaller unit, not with a power of ten', () => {
+    expect(lengths([0.0003, 0.0003, 0.002], 'mm')).toBe('0.3 × 0.3 × 2 µm');
+    expect(lengths([4e-7], 'mm')).toBe('0.4 nm');
+    expect(lengths([3e-4], 'mm', 3)).toBe('300,000 µm³');
+    expect(lengths([5e-4], 'm', 2)).toBe('500 mm²');
+  });
+
+  test('that are not small, zero, or of no unit of length stay', () => {
+    expect(lengths([0.5, 0.25], 'mm')).toBe('0.5 × 0.25 mm');
+    expect(lengths([0], 'mm')).toBe('0 mm');
+    expect(lengths([0.0003], '')).toBe('3.00e-4');
+    expect(lengths([2e-5], 'nm')).toBe('2.00e-5 nm');
   });
 });
 

@@ -3,7 +3,7 @@ import type { Shape } from './shapes';
 import { text } from './texts';
 
 /** Unit of lengths in world space; empty if the file does not state one. */
-export type Unit = 'mm' | 'µm' | '';
+export type Unit = 'm' | 'mm' | 'µm' | '';
 
 /** An example volume of the Extract lab, with suitable settings and credits. */
 export interface Example {

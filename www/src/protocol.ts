@@ -8,6 +8,7 @@
 import type {
   Attractor,
   Coverage,
+  LengthUnit,
   MeshFormat,
   MeshInfo,
   MeshReport,
@@ -62,13 +63,16 @@ export interface Setup {
   attractors: Attractor[];
 }
 
-/**
- * Voxels of one coarser level of the volume's pyramid or, in the Track lab, of one frame, reduced to 8 bits for display
- * like the volume itself.
- */
+/** Intensities of voxels, in the narrowest of these types that holds all of them exactly. */
+export type Intensities = Uint8Array | Uint16Array | Int16Array | Float32Array;
+
+/** Voxels of a volume, of one coarser level of its pyramid or, in the Track lab, of one frame, for display. */
 export interface LevelView {
   dims: Vec3;
-  voxels: Uint8Array;
+  /** Intensities of the voxels, x fastest. */
+  voxels: Intensities;
+  /** Intensities that are displayed as black and as white, until the user chooses others. */
+  window: [number, number];
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
@@ -82,25 +86,22 @@ export interface SavedRun {
   done: boolean;
 }
 
-/** Description of a volume for the page, with its voxels reduced to 8 bits for display. */
-export interface VolumeView {
+/**
+ * Description of a volume for the page, with its voxels: frame after frame if all frames were requested, else only the
+ * first.
+ */
+export interface VolumeView extends LevelView {
   name: string;
-  dims: Vec3;
   frames: number;
   spacing: Vec3;
   /** 4 × 4 affine matrix from voxel indices to world coordinates, column-major. */
   affine: Float64Array;
   space: 'RAS' | 'LPS';
+  /** Unit of lengths in world space, if the volume's file states it. */
+  unit?: LengthUnit;
   /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
-  /** Intensities of the volume that are displayed as black and as white. */
-  window: [number, number];
-  /**
-   * Grey values of the voxels for display, x fastest: 0 = black, 255 = white. Frame after frame if all frames were
-   * requested, else only the first.
-   */
-  voxels: Uint8Array;
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
    * and the bytes of all.
@@ -178,8 +179,8 @@ export interface Loaded extends Ready {
 /** Requests of the page to the Extract lab's worker: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: ImageSource; setup: Setup }; reply: Loaded };
+  /** Opens a frame of a volume, the first is 0, and builds a model of it. On failure, the previous volume and model stay. */
+  load: { body: { name: string; source: ImageSource; setup: Setup; frame: number }; reply: Loaded };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
   cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */

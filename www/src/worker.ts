@@ -4,7 +4,6 @@ import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
 import type {
   Attractor,
   DataEvent,
-  ImageSource,
   LargeSource,
   LevelView,
   Loaded,
@@ -20,6 +19,7 @@ import type {
   Setup,
   SurfaceBuffers,
   VertexQuantity,
+  VolumeView,
   WorkerEvent,
 } from './protocol';
 import { text } from './texts';
@@ -29,7 +29,7 @@ import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
-import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
+import { levelsOf, openFrame, viewOf } from './worker/volumes';
 
 /**
  * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit
@@ -81,7 +81,7 @@ class Session {
   readonly #coverageRun = new Work();
 
   readonly handlers: Handlers<Requests> = {
-    load: ({ name, source, setup }) => this.#load(name, source, setup),
+    load: (body) => this.#load(body),
     cancelLoad: () => {
       this.#opening?.abort();
       return undefined;
@@ -109,12 +109,12 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load(name: string, source: ImageSource, setup: Setup): Promise<Loaded> {
+  async #load({ name, source, setup, frame }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
     if ('zarr' in source) return this.#loadLarge(name, source, setup);
-    const volume = await volumeFrom(source);
+    const { volume, frames, unit } = await openFrame(source, frame);
     try {
-      const view = viewOf(volume, name);
+      const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
       // No checks: the page starts the run at once, and would not show their result.
       const ready = this.#replaceModel(buildModel(volume, setup), 'measured');
       this.#keep({ volume });

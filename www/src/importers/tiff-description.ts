@@ -1,5 +1,7 @@
 /** Parses the description of the stack in a TIFF file: OME's XML, or the lines of ImageJ. */
 
+import type { LengthUnit } from 'vesicle';
+
 export interface Stack {
   /**
    * Indices of the pages of the file, or files, that make up the volume: all slices of the first frame, then those of
@@ -7,14 +9,32 @@ export interface Stack {
    */
   pages: number[];
   frames: number;
-  /** Voxel sizes along x, y and z in the description's unit of length; undefined where it has none. */
+  /** Voxel sizes along x, y and z in `unit`; undefined where the description has none. */
   spacing: [number | undefined, number | undefined, number | undefined];
   /**
    * Whether the pages' resolution tags count pixels per unit of length of the description, as in ImageJ; else they are
    * not used.
    */
   perUnit: boolean;
+  /** Unit of the voxel sizes, if the description states it. */
+  unit?: LengthUnit;
+  /** Length of the description's unit, in which the resolution tags are, in `unit`. */
+  scale: number;
 }
+
+/** Units in descriptions: the unit that lengths are converted to, and their length in it. */
+const UNITS: Record<string, [LengthUnit, number]> = {
+  nm: ['um', 1e-3],
+  um: ['um', 1],
+  micron: ['um', 1],
+  microns: ['um', 1],
+  mm: ['mm', 1],
+  cm: ['mm', 10],
+  m: ['m', 1],
+};
+
+/** Returns the unit that a description names; the prefix for micro may be written in several ways. */
+const unitNamed = (name: string) => UNITS[name.trim().replace(/^(\\u00B5|[µμ])/i, 'u')];
 
 /**
  * Parses the description of a stack of `count` pages; if it is neither OME's nor ImageJ's, all pages are slices of one
@@ -23,7 +43,7 @@ export interface Stack {
 export function describedIn(text: string, count: number): Stack {
   if (/<OME[\s>]/.test(text)) return fromOme(text, count);
   if (text.startsWith('ImageJ=')) return fromImageJ(text, count);
-  return { pages: range(count), frames: 1, spacing: [undefined, undefined, undefined], perUnit: false };
+  return { pages: range(count), frames: 1, spacing: [undefined, undefined, undefined], perUnit: false, scale: 1 };
 }
 
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
@@ -40,8 +60,15 @@ function fromOme(text: string, count: number): Stack {
   const size = (name: string) => Math.max(1, Math.floor(positive(attribute(name)) ?? 1));
   const sizes = { Z: size('SizeZ'), C: size('SizeC'), T: size('SizeT') };
   const order = /^XY([ZCT]{3})$/.exec(attribute('DimensionOrder') ?? '')?.[1] ?? 'ZCT';
-  const spacing = ['PhysicalSizeX', 'PhysicalSizeY', 'PhysicalSizeZ'].map((name) => positive(attribute(name)));
-  return { ...ordered(sizes, order, count), spacing: spacing as Stack['spacing'], perUnit: false };
+  const axes = ['PhysicalSizeX', 'PhysicalSizeY', 'PhysicalSizeZ'].map((name) => ({
+    size: positive(attribute(name)),
+    unit: unitNamed(attribute(`${name}Unit`) ?? 'µm'),
+  }));
+  const unit = axes[0]?.unit?.[0];
+  const isOneUnit = unit !== undefined && axes.every((axis) => axis.unit?.[0] === unit);
+  const spacing = axes.map(({ size, unit }) => size && size * (isOneUnit ? (unit?.[1] ?? 1) : 1)) as Stack['spacing'];
+  const isKnown = isOneUnit && spacing.some(Boolean);
+  return { ...ordered(sizes, order, count), spacing, perUnit: false, scale: 1, ...(isKnown && { unit }) };
 }
 
 function fromImageJ(text: string, count: number): Stack {
@@ -49,8 +76,11 @@ function fromImageJ(text: string, count: number): Stack {
   const size = (name: string) => Math.max(1, Math.floor(positive(lines.get(name)) ?? 1));
   const [channels, frames] = [size('channels'), size('frames')];
   const slices = lines.has('slices') ? size('slices') : Math.floor(count / (channels * frames));
-  const spacing: Stack['spacing'] = [undefined, undefined, positive(lines.get('spacing'))];
-  return { ...ordered({ Z: slices, C: channels, T: frames }, 'CZT', count), spacing, perUnit: true };
+  const [unit, scale] = unitNamed(lines.get('unit') ?? '') ?? [undefined, 1];
+  const between = positive(lines.get('spacing'));
+  const spacing: Stack['spacing'] = [undefined, undefined, between && between * scale];
+  const pages = ordered({ Z: slices, C: channels, T: frames }, 'CZT', count);
+  return { ...pages, spacing, perUnit: true, scale, ...(unit && { unit }) };
 }
 
 /**

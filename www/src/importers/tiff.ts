@@ -48,7 +48,7 @@ async function joined(planes: GeoTIFFImage[], stack: Stack, spacing: [number, nu
   }
   if (!data) throw new Refusal('bad-file', text('files.tiffEmpty'));
   const slices = planes.length / stack.frames;
-  return { data, dims: [wide, high, slices, stack.frames], spacing };
+  return { data, dims: [wide, high, slices, stack.frames], spacing, ...(stack.unit && { unit: stack.unit }) };
 }
 
 async function valuesOf(plane: GeoTIFFImage, k: number): Promise<VoxelArray> {
@@ -69,10 +69,10 @@ async function tagOf(page: GeoTIFFImage, name: 'ImageDescription' | 'XResolution
  * Returns the voxel size along x, y and z: from the description, else 1 along z and, along x and y, the page's
  * resolution if it counts pixels per unit of the description (scanners store that of paper), else 1.
  */
-async function pixelSize(page: GeoTIFFImage, { spacing, perUnit }: Stack): Promise<[number, number, number]> {
+async function pixelSize(page: GeoTIFFImage, { spacing, perUnit, scale }: Stack): Promise<[number, number, number]> {
   const resolution = async (tag: 'XResolution' | 'YResolution') => {
     const [count = 0, units = 0] = perUnit ? Array.from(((await tagOf(page, tag)) ?? []) as ArrayLike<number>) : [];
-    return count > 0 && units > 0 ? units / count : 1;
+    return count > 0 && units > 0 ? (scale * units) / count : 1;
   };
   return [
     spacing[0] ?? (await resolution('XResolution')),

@@ -91,6 +91,15 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     return this.open({ name, load: async () => source });
   }
 
+  /** Opens another frame of the open volume, with the settings in force. */
+  async frame(frame: number): Promise<void> {
+    const { source } = this;
+    if (!source) return;
+    const { params, attractors, sphere } = this.#settings;
+    const { kind: start, edge = 0, ...choice } = this.#ui.start.inForce;
+    await this.open({ ...source, linked: { ...choice, frame, start, edge, sphere, params, attractors } });
+  }
+
   protected fromFiles(files: File[]): ExtractSource {
     const [archive] = files;
     if (files.length === 1 && archive && /\.zip$/i.test(archive.name))
@@ -101,7 +110,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   protected async load(source: ExtractSource, volume: ImageSource, reopening: boolean): Promise<OpenedVolume> {
     const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
     const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
-    const body = { name: source.name, source: volume, setup };
+    const body = { name: source.name, source: volume, setup, frame: source.linked?.frame ?? 0 };
     const loaded = await this.#client.request('load', body, transferable(volume));
     const { large } = loaded.volume;
     const levels = large ? Math.min(choice.levels, large.levels.length - 1) : choice.levels;

@@ -1,14 +1,14 @@
-import { EXAMPLES, type Example } from '../examples';
+import { EXAMPLES, type Example, type Unit } from '../examples';
 import { PRESETS } from '../presets';
 import type { VolumeView } from '../protocol';
 import { text } from '../texts';
-import { figure } from '../ui/format';
+import { count, figure, lengths } from '../ui/format';
 import { ExamplePanel, type Fact } from './example-panel';
 
-/** Creates the panel that opens examples and files; `chooser` opens files, `large` volumes larger than memory. */
+/** Creates the panel that opens examples and files; `chooser` opens files, and `more` are further controls. */
 export function extractData(
   chooser: HTMLElement,
-  large: HTMLElement,
+  more: HTMLElement[],
   onExample: (example: Example) => void,
 ): ExamplePanel<Example> {
   const contents = {
@@ -24,7 +24,7 @@ export function extractData(
     ],
     choosers: [chooser],
     help: text('extract.dropHelp'),
-    more: [large],
+    more,
   };
   return new ExamplePanel<Example>(contents, onExample);
 }
@@ -34,10 +34,15 @@ export function factsOf({ name, dims, spacing, range, large, frames }: VolumeVie
   const facts: Fact[] = [
     [text('labs.factFile'), name],
     [text('extract.factVoxels'), dims.join(' × ')],
-    [text('labs.factVoxelSize'), `${spacing.map(figure).join(' × ')} ${unit}`.trim()],
+    [text('labs.factVoxelSize'), lengths(spacing, unit)],
     [text('extract.sectionIntensities'), text('extract.range', { low: figure(range[0]), high: figure(range[1]) })],
   ];
   if (large) facts.push([text('extract.factLevels'), large.levels.map((level) => level.join(' × ')).join(', ')]);
-  if (frames > 1) facts.push([text('labs.frames'), text('extract.framesFirstShown', { count: frames })]);
+  if (frames > 1) facts.push([text('labs.frames'), count(frames)]);
   return facts;
+}
+
+/** Returns the unit of lengths that a volume's file states, or else that of most such files. */
+export function unitOf({ unit = 'mm' }: VolumeView): Unit {
+  return unit === 'um' ? 'µm' : unit;
 }

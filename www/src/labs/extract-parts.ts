@@ -10,6 +10,7 @@ import { CoveragePanel } from '../ui/coverage';
 import { folded, h, section, wideButton } from '../ui/dom';
 import { FigurePanel } from '../ui/figure';
 import { fileChooser, VOLUME_FILES } from '../ui/files';
+import { FrameChoice } from '../ui/frame-choice';
 import { Histogram } from '../ui/histogram';
 import type { History } from '../ui/history';
 import { LargeSourceControls } from '../ui/large-source';
@@ -22,13 +23,14 @@ import { TimeTable } from '../ui/times';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import type { ExtractSource } from './extract-opening';
-import { extractData, factsOf } from './extract-page';
+import { extractData, factsOf, unitOf } from './extract-page';
 import { type RunEvents, RunParts } from './lab-parts';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 
 export interface PartEvents extends RunEvents<Example> {
   onLarge: (name: string, source: LargeSource) => void;
+  onFrame: (frame: number) => void;
   onVariant: (preset: Preset, variant: Variant) => void;
   onStart: () => void;
   onAttractors: (attractors: Attractor[], what: string, tuning: boolean) => void;
@@ -48,6 +50,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly stage: Stage;
   readonly measures = new MeasurePanel();
   readonly large: LargeSourceControls;
+  readonly #frames: FrameChoice;
   readonly histogram: Histogram;
   readonly start: StartControls;
   readonly pyramid: PyramidPanel;
@@ -70,16 +73,19 @@ export class ExtractParts extends RunParts<Example> {
     events: PartEvents,
   ) {
     const large = new LargeSourceControls(events.onLarge);
+    const frames = new FrameChoice(events.onFrame);
+    const chooser = fileChooser(events.onFiles, `${VOLUME_FILES},.zip`);
     super(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
       onFolder: (folder) => events.onLarge(folder.name, { zarr: folder }),
-      data: extractData(fileChooser(events.onFiles, `${VOLUME_FILES},.zip`), large.element, events.onExample),
+      data: extractData(chooser, [frames.element, large.element], events.onExample),
       ownControls: ['iso'],
       history,
       fetchMesh,
     });
     this.large = large;
+    this.#frames = frames;
     this.stage = new Stage(this.canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
     this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
@@ -136,7 +142,7 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   /** Shows a newly opened volume, and clears results of the previous one. */
-  adopt(volume: VolumeView, { example, unit = 'mm' }: ExtractSource): void {
+  adopt(volume: VolumeView, { example, linked, unit = unitOf(volume) }: ExtractSource): void {
     this.saving.name = volume.name;
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
@@ -144,6 +150,7 @@ export class ExtractParts extends RunParts<Example> {
     this.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
+    this.#frames.show(linked?.frame ?? 0, volume.frames);
     this.large.showTotal(volume.large?.bytes);
     this.stage.setVolume(volume);
     this.compare.clear();

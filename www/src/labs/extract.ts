@@ -64,6 +64,7 @@ export class ExtractLab extends RunLab<Example> {
     return {
       ...this.runEvents(),
       onLarge: (name, source) => void this.opening.large(name, source),
+      onFrame: (frame) => void this.opening.frame(frame),
       onVariant: (preset, variant) => void this.#settings.changeTo(preset, variant),
       onStart: () => void this.#settings.restart(),
       onParam: (name, value) => void this.#settings.setParam(name, value),
@@ -93,12 +94,22 @@ export class ExtractLab extends RunLab<Example> {
     this.updateAddress();
   }
 
-  protected address({ example, name: file }: ExtractSource): string {
+  protected address({ example, name: file, linked }: ExtractSource): string {
     const { params, sphere, attractors } = this.#settings;
     const { defaults } = this.opening;
     const choice = this.ui.start.inForce;
     return toHash(
-      linkOf({ example, file, choice, sphere, params, defaults, attractors, color: this.ui.options.value.color }),
+      linkOf({
+        example,
+        file,
+        frame: linked?.frame ?? 0,
+        choice,
+        sphere,
+        params,
+        defaults,
+        attractors,
+        color: this.ui.options.value.color,
+      }),
     );
   }
 

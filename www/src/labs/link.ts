@@ -26,6 +26,8 @@ export interface Linked {
   bubbles?: number;
   sphere?: { center: Vec3; radius: number };
   levels?: number;
+  /** Index of the open frame of a 4D volume; without it, the first one opens. */
+  frame?: number;
   /** Target edge length in world units; 0 if the model chooses it. */
   edge?: number;
   params: ParamValues;
@@ -38,6 +40,8 @@ export interface LabSettings {
   example: Example | undefined;
   /** Name of the open file, which the link contains if no example is open. */
   file: string;
+  /** Index of the open frame. */
+  frame: number;
   choice: StartChoice;
   /** Sphere around the crosshair, in world units, that is the initial surface if a sphere is chosen. */
   sphere: { center: Vec3; radius: number };
@@ -53,13 +57,14 @@ export interface LabSettings {
  * from the method's defaults, and all attractors.
  */
 export function linkOf(settings: LabSettings): Linked {
-  const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
+  const { example, file, frame, choice, sphere, params, defaults, attractors, color } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
   const start = defaultStart(example);
   const bubbles = 'bubbles' in start ? start.bubbles : undefined;
   return {
     ...(!example && { file }),
     ...(example && example !== EXAMPLES[0] && { example: example.id }),
+    ...(frame > 0 && { frame }),
     ...(choice.kind !== start.kind && { start: choice.kind }),
     ...(choice.kind === 'bubbles' && choice.bubbles !== bubbles && { bubbles: choice.bubbles }),
     ...(choice.kind === 'sphere' && { sphere }),
@@ -91,8 +96,8 @@ const numbers = (values: number[]) => values.map((value) => Number(value.toPreci
 /** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: Linked): string {
   const query = new URLSearchParams();
-  const { example, file, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
-  for (const [name, value] of Object.entries({ example, file, start, bubbles, levels, edge, color }))
+  const { example, file, frame, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
+  for (const [name, value] of Object.entries({ example, file, frame, start, bubbles, levels, edge, color }))
     if (value !== undefined) query.set(name, String(value));
   if (sphere) query.set('sphere', numbers([...sphere.center, sphere.radius]));
   for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
@@ -116,7 +121,7 @@ export function fromHash(hash: string): Linked | undefined {
     const value = query.get(name);
     if (value) linked[name] = value;
   }
-  for (const name of ['bubbles', 'levels', 'edge'] as const) {
+  for (const name of ['frame', 'bubbles', 'levels', 'edge'] as const) {
     const value = Number(query.get(name) ?? Number.NaN);
     if (Number.isFinite(value)) linked[name] = value;
   }

@@ -1,7 +1,7 @@
 import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
 import type { OpenedImage } from '../segment/protocol';
 import { text } from '../texts';
-import { figure, milliseconds } from '../ui/format';
+import { lengths, milliseconds } from '../ui/format';
 import { ExamplePanel, type Fact } from './example-panel';
 
 /** Name of the fact that tells where the label map is from. */
@@ -32,12 +32,12 @@ export function factsOf(
   { volume, labelFile, milliseconds: duration }: OpenedImage,
   example: SegmentExample | undefined,
 ): Fact[] {
-  const sizes = volume.spacing.map((x) => figure(Number(x.toPrecision(3)))).join(' × ');
+  const sizes = volume.spacing.map((x) => Number(x.toPrecision(3)));
   return [
     [text('labs.factFile'), volume.name],
     [MAP_FACT, labelFile ?? (example?.labelling ? text('segment.computedMap') : text('segment.emptyMap'))],
     [text('extract.factVoxels'), volume.dims.join(' × ')],
-    [text('labs.factVoxelSize'), `${sizes} ${example?.unit ?? 'mm'}`.trim()],
+    [text('labs.factVoxelSize'), lengths(sizes, example?.unit ?? 'mm')],
     [text('segment.factSurfaces'), milliseconds(duration)],
   ];
 }

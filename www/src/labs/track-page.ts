@@ -2,7 +2,7 @@ import { text } from '../texts';
 import { IMAGES, type TrackExample } from '../track/examples';
 import { TRACK_PRESETS } from '../track/presets';
 import type { OpenedImage } from '../track/protocol';
-import { figure, milliseconds } from '../ui/format';
+import { lengths, milliseconds } from '../ui/format';
 import { ExamplePanel, type Fact } from './example-panel';
 
 /** Creates the panel that opens examples and, by `chooser`, files. */
@@ -31,12 +31,16 @@ export function imageData(
 
 /** Returns the facts about an open image. */
 export function factsOf({ dims, spacing, volume, openingMs }: OpenedImage, name: string, unit: string): Fact[] {
-  const sizes = (values: readonly number[]) => values.map((x) => figure(Number(x.toPrecision(3)))).join(' × ');
+  const sizes = (values: readonly number[], unit = '') =>
+    lengths(
+      values.map((x) => Number(x.toPrecision(3))),
+      unit,
+    );
   return [
     [text('labs.factFile'), name],
     [text('labs.frames'), String(volume.frames)],
     [text('extract.factVoxels'), sizes(dims)],
-    [text('labs.factVoxelSize'), `${sizes(spacing)} ${unit}`.trim()],
+    [text('labs.factVoxelSize'), sizes(spacing, unit)],
     [text('track.factPrepared'), sizes(volume.dims)],
     [text('track.factOpening'), milliseconds(openingMs)],
   ];

@@ -1,7 +1,7 @@
 import type { CoverageProgressEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../protocol';
 import { plural, text } from '../texts';
 import { h } from './dom';
-import { count, figure } from './format';
+import { count, figure, lengths } from './format';
 import { TaskControls } from './task';
 
 /**
@@ -121,7 +121,7 @@ export class CoveragePanel {
 
   #item({ kind, area, position }: UncoveredRegion): HTMLElement {
     const where = position.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
-    const size = `${figure(Number(area.toPrecision(3)))} ${this.unit ? `${this.unit}²` : ''}`.trim();
+    const size = lengths([Number(area.toPrecision(3))], this.unit, 2);
     const label = text('extractPanels.uncoveredShow', { kind: KINDS[kind], size, where });
     const goTo = h(
       'button',

@@ -1,9 +1,12 @@
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
+import { type Dropped, largestSeries, readFolders } from './folders';
+
+export { nameOf } from './folders';
 
 /** Endings of files of volumes. */
-export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
+export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.dicom,.ima,.tif,.tiff';
 
 /**
  * Creates a button with the given label that chooses one file, or several that belong together; by default files of
@@ -20,15 +23,15 @@ export function fileChooser(
     const files = [...(input.files ?? [])];
     // Makes choosing the same file again a change.
     input.value = '';
-    if (files.length > 0) onFiles(files);
+    if (files.length > 0) void largestSeries(files).then(onFiles);
   });
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
 }
 
 /**
  * Accepts files dropped anywhere on the page, until `signal` is aborted, and shows `overlay` while files are dragged
- * over the page. A folder is passed to `onFolder`, if given, in browsers that have handles of folders; otherwise it
- * counts as a file.
+ * over the page or folders are read. All files in a folder are passed on, or of a DICOM series only those; a folder that
+ * is an OME-Zarr image is passed to `onFolder`, if given, in browsers that have handles of folders.
  */
 export function acceptDrops(
   overlay: HTMLElement,
@@ -53,37 +56,29 @@ export function acceptDrops(
     },
     { signal },
   );
+  let drops = 0;
+  const open = async (folders: Promise<Dropped> | undefined, files: File[]) => {
+    const drop = ++drops;
+    // If a folder cannot be read, opening it as a file gives the error message.
+    const dropped = (await folders?.catch(() => undefined)) ?? { files };
+    const chosen = 'zarr' in dropped ? dropped : { files: await largestSeries(dropped.files) };
+    if (drop !== drops || signal.aborted) return;
+    overlay.hidden = true;
+    if ('files' in chosen) onFiles(chosen.files);
+    else onFolder?.(chosen.zarr);
+  };
   window.addEventListener(
     'drop',
     (event) => {
       overlay.hidden = true;
       if (!hasFiles(event)) return;
       event.preventDefault();
-      const files = [...(event.dataTransfer?.files ?? [])];
-      const folder = onFolder && folderIn(event.dataTransfer);
-      if (!folder) return onFiles(files);
-      // If it cannot be read, opening it as a file gives the error message.
-      folder.then(onFolder, () => onFiles(files));
+      const folders = readFolders(event.dataTransfer, onFolder !== undefined);
+      overlay.hidden = !folders;
+      void open(folders, [...(event.dataTransfer?.files ?? [])]);
     },
     { signal },
   );
-}
-
-/** An item that was dropped, in browsers that have handles of folders. */
-type DroppedItem = DataTransferItem & { getAsFileSystemHandle?: () => Promise<FileSystemDirectoryHandle> };
-
-/** Returns the handle of a folder that was dropped, undefined if none was; may be called during the event only. */
-function folderIn(data: DataTransfer | null): Promise<FileSystemDirectoryHandle> | undefined {
-  const items: DroppedItem[] = [...(data?.items ?? [])];
-  const folder = items.find((item) => item.webkitGetAsEntry()?.isDirectory);
-  return folder?.getAsFileSystemHandle?.();
-}
-
-/** Returns a name for one or several files that were opened together, for display. */
-export function nameOf(files: File[]): string {
-  const [first, second] = files.map(({ name }) => name);
-  if (files.length === 2) return text('controls.twoFiles', { first: first ?? '', second: second ?? '' });
-  return files.length > 1 ? text('controls.moreFiles', { first: first ?? '', more: files.length - 1 }) : (first ?? '');
 }
 
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {

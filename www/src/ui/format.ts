@@ -13,6 +13,26 @@ export function figure(value: number): string {
   return new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 }).format(value);
 }
 
+/** Units of length, each a thousandth of the one before. */
+const UNITS = ['m', 'mm', 'µm', 'nm'];
+
+/**
+ * Formats lengths, areas (power 2) or volumes (power 3) with their unit, as "0.5 × 0.5 × 2 µm". Values of which the
+ * smallest would need a power of ten are converted to a smaller unit; a unit that is none of length stays.
+ */
+export function lengths(values: readonly number[], unit: string, power: 1 | 2 | 3 = 1): string {
+  const raised = ['', '²', '³'][power - 1] ?? '';
+  const least = Math.min(...values.map(Math.abs).filter((value) => value > 0));
+  const finer = UNITS[UNITS.indexOf(unit) + 1];
+  if (least < 1e-3 && UNITS.includes(unit) && finer)
+    return lengths(
+      values.map((value) => value * 1000 ** power),
+      finer,
+      power,
+    );
+  return `${values.map(figure).join(' × ')} ${unit && unit + raised}`.trim();
+}
+
 export function milliseconds(value: number): string {
   return value < 1000
     ? text('controls.milliseconds', { value: figure(Math.round(value)) })

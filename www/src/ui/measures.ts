@@ -2,7 +2,7 @@ import type { Unit } from '../examples';
 import type { Measures, StepReport } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
-import { count, figure } from './format';
+import { count, figure, lengths } from './format';
 
 /**
  * Measures shown for every surface, also available to other programs as JSON in the element's `data-measures`.
@@ -156,11 +156,11 @@ function textOf(name: Name, value: number | boolean, unit: Unit): string {
 
 /**
  * Formats an area (power 2) or volume (power 3) with its unit; from 10 cm² or 10 cm³ on, values in millimetres are
- * converted to centimetres.
+ * converted to centimetres, and small ones as by {@link lengths}.
  */
 export function sized(value: number, power: 2 | 3, unit: Unit): string {
   const raised = power === 2 ? '²' : '³';
   const inCentimetres = value / 10 ** power;
   if (unit === 'mm' && inCentimetres >= 10) return `${figure(inCentimetres)} cm${raised}`;
-  return unit ? `${figure(value)} ${unit}${raised}` : figure(value);
+  return lengths([value], unit, power);
 }

@@ -137,3 +137,8 @@ export function slicePlane(affine: ArrayLike<number>, inverse: ArrayLike<number>
   const length = Math.hypot(...normal);
   return { origin: toWorld(affine, at), normal: normal.map((x) => x / length) as Vec3 };
 }
+
+/** Returns the index of the voxel nearest to a position, in voxels, also outside the volume. */
+export function nearestVoxel(place: Vec3, dims: Vec3): Vec3 {
+  return place.map((at, axis) => Math.min((dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
+}

@@ -7,7 +7,7 @@ import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
 import { context2d, h, token } from '../ui/dom';
 import { invert, sliceOrientations } from './anatomy';
 import { greysOf, slicePicture } from './slicing';
-import { voxelsOfFrame } from './track';
+import { frameOf } from './track';
 import { votesIn } from './votes';
 
 /** Length of an image's longer side in canvas pixels; sharp on high-resolution screens, too. */
@@ -89,7 +89,7 @@ export function paintWindow(
   threshold: number,
 ): boolean {
   const side = sliceSide(volume);
-  const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
+  const shown = frameOf(volume, frame);
   const small = slicePicture(shown, side, voxel[ACROSS]);
   const { width, height } = small;
   const values = greysOf(shown, side, voxel[ACROSS]);
@@ -140,7 +140,7 @@ export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, 
 /** Paints the edges that Canny's detector finds in the slice at the crosshair: figure 4 c of the paper. */
 export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subject, settings: CannySettings): void {
   const side = sliceSide(volume);
-  const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
+  const shown = frameOf(volume, frame);
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
   const edges = canny({ width, height, values: greysOf(shown, side, voxel[ACROSS]) }, settings);
   picture.paint(
@@ -164,7 +164,7 @@ export function paintTime(
   const length = volume.dims[side.horizontal.axis];
   const row = placeIn(side.vertical, voxel, volume.dims);
   const lines = Array.from({ length: frames }, (_, t) => {
-    const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, t) };
+    const shown = frameOf(volume, t);
     return greysOf(shown, side, voxel[ACROSS]).subarray(row * length, (row + 1) * length);
   });
   const small = inGrey(frames, length, (i) => lines[i % frames]?.[Math.floor(i / frames)] ?? 0);
@@ -197,7 +197,7 @@ export function paintBetween(
   const side = sliceSide(volume);
   const pixel = pixelOfSide(volume, side);
   for (const [i, voxels] of [before, flow, measured, linear, after].entries())
-    pictures[i]?.paint(slicePicture({ dims: [width, height, 1], voxels }, side, 0), pixel);
+    pictures[i]?.paint(slicePicture({ dims: [width, height, 1], voxels, window: [0, 255] }, side, 0), pixel);
 }
 
 /**

@@ -34,7 +34,7 @@ export class LabelPicture {
   readonly #pixels: ImageData;
 
   constructor(dims: Vec3, orientation: SliceOrientation) {
-    const { width, height } = pictureSize({ dims, voxels: new Uint8Array() }, orientation);
+    const { width, height } = pictureSize({ dims }, orientation);
     Object.assign(this.canvas, { width, height });
     this.#orientation = orientation;
     this.#pixels = new ImageData(width, height);

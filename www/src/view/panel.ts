@@ -1,8 +1,10 @@
 import type { Attractor, LevelView, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { text } from '../texts';
 import { context2d, h, token, uniqueId } from '../ui/dom';
-import { SLICE_NAMES, type SliceOrientation } from './anatomy';
-import { ballSection, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
+import { nearestVoxel, SLICE_NAMES, type SliceOrientation } from './anatomy';
+import { type Extent, SliceCamera } from './slice-camera';
+import { type Drag, SliceGestures } from './slice-gestures';
+import { ballSection, type DisplayWindow, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
 /** Names of the style tokens (CSS variables) with the colours of the slices across the three voxel axes. */
 export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
@@ -24,6 +26,18 @@ export interface PanelEvents {
   onHover?: (index: Vec3 | undefined) => void;
 }
 
+/** What all slices of a volume share, besides the crosshair. */
+export interface PanelHost {
+  /** Called with the voxel under the pointer; undefined when it has left the slice image. */
+  onProbe: (voxel: Vec3 | undefined) => void;
+  /** Called when the zoom may have changed. */
+  onZoom: () => void;
+  /** Returns the drag that changes the displayed intensities. */
+  adjustWindow: (event: PointerEvent) => Drag;
+  /** Whether drags with the main button change the displayed intensities. */
+  isAdjusting: () => boolean;
+}
+
 /** Handle of an object on a slice while it is dragged; positions are in voxels, also between and outside them. */
 export interface Grip {
   move: (index: Vec3) => void;
@@ -39,6 +53,11 @@ export type Overlay = (context: CanvasRenderingContext2D, scaleX: number, scaleY
 /** Distance within which the pointer can grab a side of the region of interest, CSS pixels. */
 const SLACK = 7;
 
+/** Magnification by one press of the + key. */
+const KEY_ZOOM = 1.25;
+/** Distance by which an arrow key pans, as a fraction of the canvas. */
+const KEY_PAN = 0.1;
+
 /** A slice as an image with the surface's outline over it, its crosshair, and a slider. */
 export class SlicePanel {
   readonly element: HTMLElement;
@@ -47,6 +66,7 @@ export class SlicePanel {
   readonly orientation: SliceOrientation;
   /** Draws additional content over the slice image, such as the region of interest. */
   overlay: Overlay = () => undefined;
+  host: PanelHost | undefined;
   readonly #volume: VolumeView;
   readonly #inverse: Float64Array;
   readonly #canvas: HTMLCanvasElement;
@@ -54,6 +74,7 @@ export class SlicePanel {
   readonly #output: HTMLOutputElement;
   readonly #pixels: ImageData;
   readonly #observer = new ResizeObserver(() => this.draw());
+  readonly #camera: SliceCamera;
   #outline: Float32Array = new Float32Array(0);
   /** Description of the content over the slice, in place of that of the outline. */
   #content: string | undefined;
@@ -61,17 +82,24 @@ export class SlicePanel {
   #uncovered: readonly UncoveredRegion[] = [];
   /** Voxels shown instead of the volume's: those of a coarser pyramid level, or of one frame. */
   #level: LevelView | undefined;
+  #window: DisplayWindow;
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
 
   constructor(volume: VolumeView, orientation: SliceOrientation, inverse: Float64Array, events: PanelEvents) {
     this.#volume = volume;
+    this.#window = volume.window;
     this.orientation = orientation;
     this.#inverse = inverse;
     const { width, height } = pictureSize(volume, orientation);
     this.picture.width = width;
     this.picture.height = height;
     this.#pixels = new ImageData(width, height);
+    const { horizontal, vertical } = orientation;
+    this.#camera = new SliceCamera(
+      { width, height },
+      { width: volume.spacing[horizontal.axis], height: volume.spacing[vertical.axis] },
+    );
     const id = uniqueId('slice');
     const last = volume.dims[orientation.axis] - 1;
     this.#canvas = h('canvas', { role: 'img' });
@@ -81,6 +109,7 @@ export class SlicePanel {
     this.#output = h('output', { for: id, 'aria-live': 'off' });
     this.element = this.#build(id);
     this.#followPointer(events);
+    this.element.addEventListener('keydown', (event) => this.#onKey(event));
     this.#observer.observe(this.#canvas);
   }
 
@@ -89,6 +118,7 @@ export class SlicePanel {
     const { axis } = this.orientation;
     const moved = this.#crosshair[axis] !== index[axis] || this.#output.value === '';
     this.#crosshair = [...index];
+    this.#camera.reveal(...this.#crosshairPoint(), this.#extent);
     if (moved) this.#paint(index[axis]);
     this.draw();
   }
@@ -108,6 +138,30 @@ export class SlicePanel {
     this.#level = level;
     this.#paint(this.#crosshair[this.orientation.axis]);
     this.draw();
+  }
+
+  /** Intensities that are displayed as black and as white. */
+  set window(window: DisplayWindow) {
+    this.#window = window;
+    this.#paint(this.#crosshair[this.orientation.axis]);
+    this.draw();
+  }
+
+  /** Whether the slice image is magnified. */
+  get isZoomed(): boolean {
+    return this.#camera.zoom > 1;
+  }
+
+  /** Fits the slice image into the canvas again. */
+  resetZoom(): void {
+    this.#camera.reset();
+    this.draw();
+    this.host?.onZoom();
+  }
+
+  /** Text for the slider, which a screen reader says with its number. */
+  set spoken(text: string) {
+    this.#slider.setAttribute('aria-valuetext', text);
   }
 
   /** Describes the content over the slice, for screen readers, where it is not the outline of a surface. */
@@ -145,7 +199,7 @@ export class SlicePanel {
    * Draws as on the visible canvas, into an area of the given size; returns the length of a unit of world space there.
    */
   paint(context: CanvasRenderingContext2D, width: number, height: number): number {
-    const { x, y, scaleX, scaleY, fit } = this.#placement(width, height);
+    const { x, y, scaleX, scaleY } = this.#camera.placement({ width, height });
     context.save();
     context.translate(x, y);
     context.save();
@@ -159,7 +213,7 @@ export class SlicePanel {
     this.#drawUncovered(context, scaleX, scaleY);
     this.overlay(context, scaleX, scaleY);
     context.restore();
-    return fit;
+    return scaleX / this.#volume.spacing[this.orientation.horizontal.axis];
   }
 
   dispose(): void {
@@ -184,9 +238,9 @@ export class SlicePanel {
 
   #paint(index: number): void {
     if (this.#level) {
-      paintLevel(this.#volume, this.#level, this.orientation, index, this.picture);
+      paintLevel(this.#volume, this.#level, this.orientation, index, this.picture, this.#window);
     } else {
-      paintSlice(this.#volume, this.orientation, index, this.#pixels.data);
+      paintSlice(this.#volume, this.orientation, index, this.#pixels.data, this.#window);
       context2d(this.picture)?.putImageData(this.#pixels, 0, 0);
     }
     this.#slider.valueAsNumber = index;
@@ -212,29 +266,25 @@ export class SlicePanel {
     );
   }
 
-  /**
-   * Returns the position of the slice image in the canvas and the voxel size there, in CSS pixels; voxels have their
-   * true proportions.
-   */
-  #placement(clientWidth = this.#canvas.clientWidth, clientHeight = this.#canvas.clientHeight) {
-    const { width, height } = this.picture;
-    const { spacing } = this.#volume;
-    const across = spacing[this.orientation.horizontal.axis];
-    const down = spacing[this.orientation.vertical.axis];
-    const fit = Math.min(clientWidth / (width * across), clientHeight / (height * down));
-    const [scaleX, scaleY] = [fit * across, fit * down];
-    return { x: (clientWidth - width * scaleX) / 2, y: (clientHeight - height * scaleY) / 2, scaleX, scaleY, fit };
+  get #extent(): Extent {
+    return { width: this.#canvas.clientWidth, height: this.#canvas.clientHeight };
+  }
+
+  /** Returns the position of the crosshair in the slice image, in voxels from its top left corner. */
+  #crosshairPoint(): [number, number] {
+    const { horizontal, vertical } = this.orientation;
+    const at = ({ axis, flip }: SliceOrientation['horizontal']) => {
+      const index = this.#crosshair[axis];
+      return (flip ? this.#volume.dims[axis] - 1 - index : index) + 0.5;
+    };
+    return [at(horizontal), at(vertical)];
   }
 
   #drawCrosshair(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     const { horizontal, vertical } = this.orientation;
     const { width, height } = this.picture;
-    const at = ({ axis, flip }: SliceOrientation['horizontal']) => {
-      const index = this.#crosshair[axis];
-      return (flip ? this.#volume.dims[axis] - 1 - index : index) + 0.5;
-    };
-    const x = at(horizontal) * scaleX;
-    const y = at(vertical) * scaleY;
+    const [column, row] = this.#crosshairPoint();
+    const [x, y] = [column * scaleX, row * scaleY];
     context.globalAlpha = 0.7;
     line(context, token(AXIS_TOKENS[horizontal.axis]), x, 0, x, height * scaleY);
     line(context, token(AXIS_TOKENS[vertical.axis]), 0, y, width * scaleX, y);
@@ -297,32 +347,81 @@ export class SlicePanel {
   }
 
   #followPointer({ onPoint, grab, onHover }: PanelEvents): void {
-    let grip: Grip | undefined;
-    const report = (event: PointerEvent) =>
-      onPoint(this.#voxelAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
-    this.#canvas.addEventListener('pointerdown', (event) => {
-      this.#canvas.setPointerCapture(event.pointerId);
-      grip = grab?.(this.#placeAt(event.offsetX, event.offsetY), this.#slack());
-      if (!grip) report(event);
+    const hover = (event: PointerEvent | undefined) => {
+      const at = event && this.#placeAt(event.offsetX, event.offsetY);
+      onHover?.(at);
+      this.host?.onProbe(at && this.#voxelIn(at));
+    };
+    new SliceGestures(this.#canvas, {
+      press: (event) => this.#press(event, onPoint, grab),
+      zoom: (factor, x, y) => this.#zoomAt(factor, x, y),
+      pan: (x, y) => this.#pan(x, y),
+      adjustWindow: (event) => this.host?.adjustWindow(event) ?? { move: () => undefined },
+      isAdjusting: () => this.host?.isAdjusting() ?? false,
+      isZoomed: () => this.isZoomed,
+      reset: () => this.resetZoom(),
     });
-    this.#canvas.addEventListener('pointerleave', () => onHover?.(undefined));
-    this.#canvas.addEventListener('pointermove', (event) => {
-      onHover?.(this.#placeAt(event.offsetX, event.offsetY));
-      if (grip) grip.move(this.#placeAt(event.offsetX, event.offsetY));
-      else if (event.buttons & 1) report(event);
-    });
-    for (const end of ['pointerup', 'pointercancel'] as const)
-      this.#canvas.addEventListener(end, () => {
-        grip?.drop();
-        grip = undefined;
-      });
+    // After the gestures, which may move the image.
+    this.#canvas.addEventListener('pointermove', hover);
+    this.#canvas.addEventListener('pointerleave', () => hover(undefined));
+    // The keys of the slice work after a click on it.
+    this.#canvas.addEventListener('pointerdown', () => this.#slider.focus({ preventScroll: true }));
+  }
+
+  /** Starts to drag the object at the pointer, or else the crosshair. */
+  #press(event: PointerEvent, onPoint: PanelEvents['onPoint'], grab: PanelEvents['grab']): Drag {
+    const grip = grab?.(this.#placeAt(event.offsetX, event.offsetY), this.#slack());
+    if (grip) {
+      const move = (to: PointerEvent) => grip.move(this.#placeAt(to.offsetX, to.offsetY));
+      return { move, end: () => grip.drop(), takesClicks: true };
+    }
+    onPoint(this.#voxelAt(event.offsetX, event.offsetY), true);
+    return { move: (to) => onPoint(this.#voxelAt(to.offsetX, to.offsetY), false) };
+  }
+
+  #zoomAt(factor: number, x: number, y: number): void {
+    this.#camera.zoomAt(factor, x, y, this.#extent);
+    this.draw();
+    this.host?.onZoom();
+  }
+
+  #pan(x: number, y: number): void {
+    this.#camera.pan(x, y, this.#extent);
+    this.draw();
+  }
+
+  #onKey(event: KeyboardEvent): void {
+    if (event.altKey || event.ctrlKey || event.metaKey) return;
+    const { width, height } = this.#extent;
+    const zoom = (factor: number) => {
+      const { x, y, scaleX, scaleY } = this.#camera.placement(this.#extent);
+      const [column, row] = this.#crosshairPoint();
+      this.#zoomAt(factor, x + column * scaleX, y + row * scaleY);
+    };
+    const moves: Record<string, () => void> = {
+      '+': () => zoom(KEY_ZOOM),
+      '=': () => zoom(KEY_ZOOM),
+      '-': () => zoom(1 / KEY_ZOOM),
+      '0': () => this.resetZoom(),
+    };
+    const pans: Record<string, () => void> = {
+      ArrowLeft: () => this.#pan(KEY_PAN * width, 0),
+      ArrowRight: () => this.#pan(-KEY_PAN * width, 0),
+      ArrowUp: () => this.#pan(0, KEY_PAN * height),
+      ArrowDown: () => this.#pan(0, -KEY_PAN * height),
+    };
+    const act = moves[event.key] ?? (event.shiftKey ? pans[event.key] : undefined);
+    if (!act) return;
+    event.preventDefault();
+    event.stopPropagation();
+    act();
   }
 
   /**
    * Returns the tolerance for grabbing an object on the slice, in voxels along the two sides of the image; 0 across it.
    */
   #slack(): Vec3 {
-    const { scaleX, scaleY } = this.#placement();
+    const { scaleX, scaleY } = this.#camera.placement(this.#extent);
     const slack: Vec3 = [0, 0, 0];
     slack[this.orientation.horizontal.axis] = SLACK / scaleX;
     slack[this.orientation.vertical.axis] = SLACK / scaleY;
@@ -334,7 +433,7 @@ export class SlicePanel {
    * the centre of the first voxel is at 0.
    */
   #placeAt(canvasX: number, canvasY: number): Vec3 {
-    const { x, y, scaleX, scaleY } = this.#placement();
+    const { x, y, scaleX, scaleY } = this.#camera.placement(this.#extent);
     const place: Vec3 = [...this.#crosshair];
     for (const [{ axis, flip }, position] of [
       [this.orientation.horizontal, (canvasX - x) / scaleX],
@@ -346,8 +445,13 @@ export class SlicePanel {
 
   /** Returns the index of the voxel in the slice image nearest to a position on the canvas in CSS pixels. */
   #voxelAt(canvasX: number, canvasY: number): Vec3 {
-    const place = this.#placeAt(canvasX, canvasY);
-    return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
+    return nearestVoxel(this.#placeAt(canvasX, canvasY), this.#volume.dims);
+  }
+
+  /** Returns the voxel that contains a position, in voxels; undefined outside the slice image. */
+  #voxelIn(place: Vec3): Vec3 | undefined {
+    const voxel = place.map(Math.round) as Vec3;
+    return voxel.every((at, axis) => at >= 0 && at < (this.#volume.dims[axis] ?? 0)) ? voxel : undefined;
   }
 }
 

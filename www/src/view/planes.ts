@@ -81,6 +81,11 @@ export class SlicePlane {
     this.#texture.needsUpdate = true;
   }
 
+  /** Uploads the texture again, after the caller has repainted it. */
+  refresh(): void {
+    this.#texture.needsUpdate = true;
+  }
+
   /** Shows the cross-section of the surface with this slice, given as pairs of world points, packed xyz. */
   showSection(segments: Float32Array): void {
     this.#section.show(segments);

@@ -82,6 +82,7 @@ function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
   const context = canvas.getContext('webgl2', { alpha: true, antialias: true, depth: true, stencil: false });
   if (!context) return undefined;
   const renderer = new WebGLRenderer({ canvas, context, antialias: true, alpha: true });
+  renderer.localClippingEnabled = true;
   // Checking a shader for errors blocks until it is compiled.
   renderer.debug.checkShaderErrors = false;
   return renderer;

@@ -4,7 +4,7 @@ import { count, text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import type { PictureSubject } from '../ui/pictures';
 import type { SlicePlacement } from '../ui/view-options';
-import { type Axis, toWorld } from './anatomy';
+import { type Axis, nearestVoxel, toWorld } from './anatomy';
 import { LabelOutlines } from './label-outlines';
 import { LabelPicture, type Overlays } from './label-overlay';
 import { type Grip, SlicePanel } from './panel';
@@ -147,7 +147,7 @@ export class SegmentView {
   /** Moves the crosshair to a voxel, and with it the slices. */
   goToVoxel(index: Vec3): void {
     const dims = this.#scene?.volume.dims;
-    if (dims) this.#moveTo(index.map((x, axis) => Math.min((dims[axis] ?? 1) - 1, Math.max(0, x))) as Vec3);
+    if (dims) this.#moveTo(nearestVoxel(index, dims));
   }
 
   /** Moves on by a number of axial slices. */
@@ -172,7 +172,7 @@ export class SegmentView {
   }
 
   #newSurface(label: number): SurfaceObject {
-    const object = new SurfaceObject();
+    const object = new SurfaceObject(this.#viewport.clipping);
     object.edgeColor = token('--wire');
     object.edges = this.#options.edges;
     this.#dress(label, object);
@@ -202,9 +202,7 @@ export class SegmentView {
     const moved = ([0, 1, 2] as const).filter((axis) => this.#crosshair[axis] !== index[axis]);
     this.#crosshair = index;
     this.#paintPictures(moved);
-    for (const panel of scene.panels) panel.setCrosshair(index);
-    for (const [axis, plane] of scene.planes.entries()) plane.moveTo(index[axis] ?? 0);
-    this.#viewport.invalidate();
+    scene.moveTo(index);
   }
 
   #paint(): void {
@@ -286,14 +284,14 @@ export class SegmentView {
   #pick(ray: Raycaster): void {
     const scene = this.#scene;
     if (!scene) return;
-    const hits = [...this.#surfaces]
-      .filter(([label]) => !this.#hidden.has(label))
-      .flatMap(([label, { object }]) => ray.intersectObject(object.target, false).map((hit) => ({ label, hit })))
-      .sort((one, other) => one.hit.distance - other.hit.distance);
-    const [first] = hits;
+    const hits = [...this.#surfaces].flatMap(([label, { object }]) => {
+      const hit = this.#hidden.has(label) ? undefined : object.hit(ray);
+      return hit ? [{ label, hit }] : [];
+    });
+    const [first] = hits.sort((one, other) => one.hit.distance - other.hit.distance);
     if (!first) return;
     const point = this.#viewport.toWorld(first.hit.point).toArray();
-    this.goToVoxel(toWorld(scene.inverse, point).map(Math.round) as Vec3);
+    this.goToVoxel(toWorld(scene.inverse, point));
     this.#events.onPick(first.label);
   }
 

@@ -2,28 +2,39 @@ import type { Attractor, LevelView, VolumeView } from '../protocol';
 import { context2d } from '../ui/dom';
 import type { SliceOrientation } from './anatomy';
 
-type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
+/** Intensities that are displayed as black and as white. */
+export type DisplayWindow = [low: number, high: number];
+
+type Grid = Pick<LevelView, 'dims'>;
 
 /** Returns the size, in voxels, of slice images of a volume in an orientation. */
-export function pictureSize(volume: Voxels, orientation: SliceOrientation): { width: number; height: number } {
+export function pictureSize(volume: Grid, orientation: SliceOrientation): { width: number; height: number } {
   return { width: volume.dims[orientation.horizontal.axis], height: volume.dims[orientation.vertical.axis] };
 }
 
 /**
- * Paints the slice with the given index as grey RGBA pixels, row by row, oriented as specified by `orientation`. `out`
- * holds 4 × width × height bytes.
+ * Paints the slice with the given index as grey RGBA pixels, row by row, oriented as specified by `orientation`, linear
+ * from black to white over the intensities of the window; NaN is black. `out` holds 4 × width × height bytes.
  */
-export function paintSlice(volume: Voxels, orientation: SliceOrientation, index: number, out: Uint8ClampedArray): void {
+export function paintSlice(
+  volume: LevelView,
+  orientation: SliceOrientation,
+  index: number,
+  out: Uint8ClampedArray,
+  [low, high]: DisplayWindow = volume.window,
+): void {
   const { width, height } = pictureSize(volume, orientation);
   const strides = [1, volume.dims[0], volume.dims[0] * volume.dims[1]] as const;
   const across = strides[orientation.horizontal.axis] * (orientation.horizontal.flip ? -1 : 1);
   const first = orientation.horizontal.flip ? (width - 1) * strides[orientation.horizontal.axis] : 0;
+  const scale = high > low ? 255 / (high - low) : 0;
   let target = 0;
   for (let j = 0; j < height; j++) {
     const row = (orientation.vertical.flip ? height - 1 - j : j) * strides[orientation.vertical.axis];
     let source = index * strides[orientation.axis] + row + first;
     for (let i = 0; i < width; i++) {
-      const grey = volume.voxels[source] ?? 0;
+      // The array of pixels rounds and clamps.
+      const grey = ((volume.voxels[source] ?? 0) - low) * scale;
       out[target++] = grey;
       out[target++] = grey;
       out[target++] = grey;
@@ -37,7 +48,7 @@ export function paintSlice(volume: Voxels, orientation: SliceOrientation, index:
  * Returns the grey values, 0..255, of the slice with the given index, row by row, oriented as specified by
  * `orientation`.
  */
-export function greysOf(volume: Voxels, orientation: SliceOrientation, index: number): Uint8Array {
+export function greysOf(volume: LevelView, orientation: SliceOrientation, index: number): Uint8Array {
   const { width, height } = pictureSize(volume, orientation);
   const rgba = new Uint8ClampedArray(4 * width * height);
   paintSlice(volume, orientation, index, rgba);
@@ -48,7 +59,7 @@ export function greysOf(volume: Voxels, orientation: SliceOrientation, index: nu
  * Returns the index of that slice of a coarser pyramid level, `level`, which is at the position of the volume's slice
  * `index`.
  */
-export function levelIndex(volume: Voxels, level: LevelView, orientation: SliceOrientation, index: number): number {
+export function levelIndex(volume: Grid, level: Grid, orientation: SliceOrientation, index: number): number {
   const last = level.dims[orientation.axis] - 1;
   return Math.min(last, Math.floor(((index + 0.5) * level.dims[orientation.axis]) / volume.dims[orientation.axis]));
 }
@@ -58,13 +69,14 @@ export function levelIndex(volume: Voxels, level: LevelView, orientation: SliceO
  * stretched to the size of the volume's slices so that its voxels are visible.
  */
 export function paintLevel(
-  volume: Voxels,
+  volume: LevelView,
   level: LevelView,
   orientation: SliceOrientation,
   index: number,
   picture: HTMLCanvasElement,
+  window: DisplayWindow,
 ): void {
-  const small = slicePicture(level, orientation, levelIndex(volume, level, orientation, index));
+  const small = slicePicture(level, orientation, levelIndex(volume, level, orientation, index), window);
   const context = context2d(picture);
   if (!context) return;
   context.imageSmoothingEnabled = false;
@@ -72,13 +84,18 @@ export function paintLevel(
 }
 
 /** Returns a new canvas with the slice with the given index as a grey image, one pixel a voxel. */
-export function slicePicture(volume: Voxels, orientation: SliceOrientation, index: number): HTMLCanvasElement {
+export function slicePicture(
+  volume: LevelView,
+  orientation: SliceOrientation,
+  index: number,
+  window = volume.window,
+): HTMLCanvasElement {
   const { width, height } = pictureSize(volume, orientation);
   const canvas = document.createElement('canvas');
   canvas.width = width;
   canvas.height = height;
   const pixels = new ImageData(width, height);
-  paintSlice(volume, orientation, index, pixels.data);
+  paintSlice(volume, orientation, index, pixels.data, window);
   context2d(canvas)?.putImageData(pixels, 0, 0);
   return canvas;
 }

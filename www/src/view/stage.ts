@@ -4,7 +4,7 @@ import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { PictureSubject } from '../ui/pictures';
 import type { ViewOptions } from '../ui/view-options';
-import { slicePlane, toWorld } from './anatomy';
+import { nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { AttractorMarks, UncoveredMarks } from './markers';
 import { SlicePanel } from './panel';
 import { diverging, QUANTITIES, quantityTitle } from './shading';
@@ -17,7 +17,7 @@ import { VolumeScene } from './volume-scene';
 export class Stage {
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
-  readonly #surface = new SurfaceObject();
+  readonly #surface: SurfaceObject;
   readonly #marks = new AttractorMarks();
   readonly #uncoveredMarks = new UncoveredMarks();
   /** Legend of the surface's colours. */
@@ -46,6 +46,7 @@ export class Stage {
     onPlanes: (planes: Plane[]) => void,
   ) {
     this.#viewport = new Viewport(canvas);
+    this.#surface = new SurfaceObject(this.#viewport.clipping);
     this.#slices = slices;
     this.#onPlanes = onPlanes;
     this.#options = options;
@@ -61,7 +62,10 @@ export class Stage {
     onSchemeChange(() => this.#recolor());
   }
 
+  /** Shows another volume; crosshair, camera and display stay if it is another frame of the one before. */
   setVolume(volume: VolumeView): void {
+    const before = this.#scene;
+    const isFrame = before !== undefined && isSameImage(before.volume, volume);
     this.#clear();
     this.#scene = new VolumeScene(
       this.#viewport,
@@ -73,10 +77,12 @@ export class Stage {
           onPoint: (index, pressed) => this.#point(index, pressed),
         }),
     );
+    this.#scene.onWindow = () => this.onMoved();
     this.setOptions(this.#options);
     this.showAttractors(this.#attractors);
-    this.#viewport.fitVolume(volume);
-    this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
+    if (isFrame) this.#scene.takeOver(before);
+    else this.#viewport.fitVolume(volume);
+    this.#moveTo(isFrame ? this.#crosshair : (volume.dims.map((n) => (n - 1) >> 1) as Vec3));
   }
 
   /** Shows another surface; its arrays are used without a copy until the next one is shown. */
@@ -132,9 +138,7 @@ export class Stage {
 
   /** Shows a coarser pyramid level in the slices, or with undefined the volume itself. */
   showLevel(level: LevelView | undefined): void {
-    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
-    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
-    this.#viewport.invalidate();
+    this.#scene?.showLevel(level);
   }
 
   /**
@@ -146,18 +150,15 @@ export class Stage {
     const frame = scene?.panels.find((panel) => panel.orientation.name === 'Axial')?.orientation;
     if (!scene || !frame) return undefined;
     const index = this.#crosshair[frame.axis];
-    if (!level) return slicePicture(scene.volume, frame, index);
-    return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index));
+    if (!level) return slicePicture(scene.volume, frame, index, scene.window);
+    return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index), scene.window);
   }
 
   /** Moves the crosshair to the voxel nearest to a world point, and with it the slices. */
   goTo(point: Vec3): void {
     const scene = this.#scene;
     if (!scene) return;
-    const index = toWorld(scene.inverse, point);
-    this.#moveTo(
-      index.map((x, axis) => Math.min((scene.volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3,
-    );
+    this.#moveTo(nearestVoxel(toWorld(scene.inverse, point), scene.volume.dims));
   }
 
   /** World position of the crosshair, the voxel in which the three slices intersect. */
@@ -182,12 +183,10 @@ export class Stage {
     const scene = this.#scene;
     if (!scene) return;
     this.#crosshair = index;
-    for (const panel of scene.panels) panel.setCrosshair(index);
-    for (const [axis, plane] of scene.planes.entries()) plane.moveTo(index[axis] ?? 0);
+    scene.moveTo(index);
     this.onMoved();
     const { volume, inverse } = scene;
     this.#onPlanes(([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, index[axis])));
-    this.#viewport.invalidate();
   }
 
   /**
@@ -202,7 +201,7 @@ export class Stage {
 
   #placeOnSurface(ray: Raycaster): void {
     if (!this.onPlace) return;
-    const [hit] = ray.intersectObject(this.#surface.target, false);
+    const hit = this.#surface.hit(ray);
     if (!hit) return;
     const point = hit.point.toArray();
     this.goTo(point);
@@ -232,4 +231,9 @@ export class Stage {
     this.#scene?.dispose();
     this.#scene = undefined;
   }
+}
+
+/** Whether two volumes are frames of the same image. */
+function isSameImage(one: VolumeView, other: VolumeView): boolean {
+  return other.frames > 1 && one.name === other.name && one.dims.join() === other.dims.join();
 }

@@ -1,14 +1,18 @@
 import {
+  BackSide,
   BufferAttribute,
   BufferGeometry,
   type ColorRepresentation,
   Group,
+  type Intersection,
   LineBasicMaterial,
   LineSegments,
   type Material,
   Mesh,
   MeshBasicMaterial,
   MeshStandardMaterial,
+  type Plane,
+  type Raycaster,
   Sphere,
   type Texture,
   Vector3,
@@ -20,6 +24,10 @@ import { isQuantity, linearColors, QUANTITIES, robustRange, type ShownQuantity, 
 import { simplifiedIndices } from './simplify';
 
 const BONE: ColorRepresentation = '#e9dcc3';
+/** Layer of the cut faces of surfaces, drawn by cameras that show a cut. */
+export const CUT_LAYER = 1;
+/** Brightness of a cut face, compared with the surface. */
+const CUT_SHADE = 0.3;
 /**
  * Factor by which a surface's own colours are brightened under lighting. Colours from photographs already contain
  * shading; lit again, white would appear grey.
@@ -61,6 +69,13 @@ export class SurfaceObject {
   /** Simplified geometry, drawn in place of the full one while it exists. */
   #coarse: BufferGeometry | undefined;
   readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
+  /**
+   * Back faces, in a plain colour: where a closed surface is cut open they are seen through the cut, so that it looks
+   * filled.
+   */
+  readonly #inside = new Mesh(this.#fine, new MeshBasicMaterial({ side: BackSide }));
+  /** Planes that cut the surface; the array is shared, and changes. */
+  readonly #clipping: Plane[];
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** Number of vertices in use in the buffers, which may be longer. */
   #vertices = 0;
@@ -78,12 +93,18 @@ export class SurfaceObject {
   /** Magnitude of the values at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
 
-  constructor() {
-    // No culling: the surface nearly always fills the view, and bounding spheres are infinite.
-    this.#mesh.frustumCulled = false;
-    this.#edges.frustumCulled = false;
+  /** `clipping` are the planes that cut the surface, as in `Viewport.clipping`. */
+  constructor(clipping: Plane[] = []) {
+    this.#clipping = clipping;
+    this.#inside.layers.set(CUT_LAYER);
     this.#edges.visible = false;
-    this.object.add(this.#mesh, this.#edges);
+    for (const part of [this.#mesh, this.#inside, this.#edges]) {
+      // No culling: the surface nearly always fills the view, and bounding spheres are infinite.
+      part.frustumCulled = false;
+      this.object.add(part);
+    }
+    for (const material of [this.#material, this.#plainMaterial, this.#inside.material, this.#edgeMaterial])
+      material.clippingPlanes = clipping;
   }
 
   /** Shows another surface; its arrays are used without a copy until the next one is shown. */
@@ -128,6 +149,22 @@ export class SurfaceObject {
     return this.#mesh;
   }
 
+  /**
+   * Returns the point that a ray from the viewer hits first: of the part of the surface that is not cut away, or of the
+   * cut.
+   */
+  hit(ray: Raycaster): Pick<Intersection, 'point' | 'distance'> | undefined {
+    const [cut] = this.#clipping;
+    const hits: Intersection[] = [];
+    for (const part of cut ? [this.target, this.#inside] : [this.target]) part.raycast(ray, hits);
+    const [first] = hits
+      .filter(({ point }) => !cut || cut.distanceToPoint(point) >= 0)
+      .sort((one, other) => one.distance - other.distance);
+    if (!cut || first?.object !== this.#inside) return first;
+    const point = ray.ray.intersectPlane(cut, new Vector3()) ?? first.point;
+    return { point, distance: point.distanceTo(ray.ray.origin) };
+  }
+
   set edges(visible: boolean) {
     this.#edges.visible = visible;
     if (visible) this.#fillEdges();
@@ -151,6 +188,7 @@ export class SurfaceObject {
 
   set solid(visible: boolean) {
     this.#mesh.visible = visible;
+    this.#inside.visible = visible;
   }
 
   /** Colour of the surface where the colouring is 'plain'. */
@@ -172,6 +210,7 @@ export class SurfaceObject {
     this.#edges.geometry.dispose();
     this.#material.dispose();
     this.#plainMaterial.dispose();
+    this.#inside.material.dispose();
     this.#edgeMaterial.dispose();
   }
 
@@ -208,6 +247,7 @@ export class SurfaceObject {
     this.#coarse.setIndex(new BufferAttribute(list, 1));
     this.#coarse.boundingSphere = this.#fine.boundingSphere;
     this.#mesh.geometry = this.#coarse;
+    this.#inside.geometry = this.#coarse;
   }
 
   #dropCoarse(): void {
@@ -215,6 +255,7 @@ export class SurfaceObject {
     if (!coarse) return;
     this.#coarse = undefined;
     this.#mesh.geometry = this.#fine;
+    this.#inside.geometry = this.#fine;
     // The shared attributes stay on the GPU.
     for (const name of Object.keys(coarse.attributes)) coarse.deleteAttribute(name);
     coarse.dispose();
@@ -225,6 +266,7 @@ export class SurfaceObject {
     this.#edges.geometry.dispose();
     this.#fine = geometry;
     this.#mesh.geometry = geometry;
+    this.#inside.geometry = geometry;
     this.#edges.geometry = new BufferGeometry();
   }
 
@@ -253,6 +295,7 @@ export class SurfaceObject {
       this.#material.needsUpdate = true;
     }
     this.#material.color.set(on || map ? '#ffffff' : this.#plain).multiplyScalar(own ? OWN_GAIN : 1);
+    this.#inside.material.color.set(this.#plain).multiplyScalar(CUT_SHADE);
     this.#range = shaded ? robustRange(this.#values, QUANTITIES[mode].least) : 0;
     const geometry = this.#fine;
     if (!on || !geometry.index) return;

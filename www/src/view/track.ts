@@ -7,7 +7,7 @@ import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { PictureSubject } from '../ui/pictures';
 import type { SlicePlacement } from '../ui/view-options';
-import { slicePlane, toWorld } from './anatomy';
+import { nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
 import { Lines } from './lines';
 import { SlicePanel } from './panel';
@@ -54,7 +54,7 @@ export class TrackView {
   onMoved: () => void = () => undefined;
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
-  readonly #surface = new SurfaceObject();
+  readonly #surface: SurfaceObject;
   readonly #cloud = new PointCloud();
   readonly #box = new Lines('#fff');
   readonly #grips = new RegionGrips(
@@ -75,6 +75,7 @@ export class TrackView {
 
   constructor(canvas: HTMLCanvasElement, slices: HTMLElement, options: TrackViewOptions) {
     this.#viewport = new Viewport(canvas);
+    this.#surface = new SurfaceObject(this.#viewport.clipping);
     this.#slices = slices;
     this.#options = options;
     for (const { object } of [this.#surface, this.#cloud, this.#box]) this.#viewport.add(object);
@@ -121,9 +122,7 @@ export class TrackView {
     this.#frame = frame;
     this.#shown = surface;
     if (surface) this.#surface.show(surface);
-    const level = this.#level;
-    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
-    this.#placePlanes();
+    this.#scene?.showLevel(this.#level);
     this.#updateSections();
     this.#apply();
   }
@@ -182,8 +181,7 @@ export class TrackView {
   goTo(point: Vec3): void {
     const scene = this.#scene;
     if (!scene) return;
-    const last = (axis: number) => (scene.volume.dims[axis] ?? 1) - 1;
-    this.#moveTo(toWorld(scene.inverse, point).map((x, k) => Math.min(last(k), Math.max(0, Math.round(x)))) as Vec3);
+    this.#moveTo(nearestVoxel(toWorld(scene.inverse, point), scene.volume.dims));
   }
 
   goToVoxel(voxel: Vec3): void {
@@ -222,7 +220,7 @@ export class TrackView {
   /** Voxels of the displayed frame as a volume of its own; undefined if there is no image. */
   get #level(): LevelView | undefined {
     const volume = this.#scene?.volume;
-    return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
+    return volume && frameOf(volume, this.#frame);
   }
 
   #moveSlice(axis: 0 | 1 | 2, index: number): void {
@@ -233,15 +231,9 @@ export class TrackView {
 
   #moveTo(index: Vec3): void {
     this.#crosshair = index;
-    for (const panel of this.#scene?.panels ?? []) panel.setCrosshair(index);
-    this.#placePlanes();
+    this.#scene?.moveTo(index);
     this.#updateSections();
     this.onMoved();
-  }
-
-  #placePlanes(): void {
-    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
-    this.#viewport.invalidate();
   }
 
   /** Updates the surface's outlines on the slices, both in the slice panels and in the 3D view. */
@@ -303,8 +295,8 @@ export class TrackView {
   }
 }
 
-/** Returns the grey values of the voxels of one frame, without a copy. */
-export function voxelsOfFrame({ dims, voxels }: VolumeView, frame: number): Uint8Array {
+/** Returns one frame of an image as a volume of its own, without a copy of its voxels. */
+export function frameOf({ dims, voxels, window }: VolumeView, frame: number): LevelView {
   const size = dims[0] * dims[1] * dims[2];
-  return voxels.subarray(frame * size, (frame + 1) * size);
+  return { dims, voxels: voxels.subarray(frame * size, (frame + 1) * size), window };
 }

@@ -6,6 +6,7 @@ import {
   Matrix4,
   type Object3D,
   PerspectiveCamera,
+  type Plane,
   Raycaster,
   Scene,
   Spherical,
@@ -18,6 +19,7 @@ import type { Vec3 } from '../protocol';
 import { anatomicalSigns, type Grid } from './anatomy';
 import { applyPinhole, type PinholeCamera } from './pinhole';
 import { WebGlRendering } from './rendering';
+import { CUT_LAYER } from './surface';
 
 const FIELD_OF_VIEW = 30;
 /** Rotation of the view by one press of an arrow key, radians. */
@@ -58,6 +60,8 @@ export class Viewport {
   takesKey: (event: KeyboardEvent) => boolean = () => false;
   /** Called when the view leaves the pose of a photograph's camera. */
   onLeave: () => void = () => undefined;
+  /** Planes beyond which surfaces made with them are not drawn; see {@link cut}. */
+  readonly clipping: Plane[] = [];
   #through: PinholeCamera | undefined;
   /** Whether a pointer or the wheel is in use, so that camera motion comes from the user. */
   #dragged = false;
@@ -153,6 +157,14 @@ export class Viewport {
     if (camera === this.#through) return;
     this.#through = camera;
     if (!camera) this.onLeave();
+    this.invalidate();
+  }
+
+  /** Cuts the surfaces open along a plane, and removes what is behind it; undefined shows them in full. */
+  cut(plane: Plane | undefined): void {
+    this.clipping.splice(0, 1, ...(plane ? [plane] : []));
+    if (plane) this.#camera.layers.enable(CUT_LAYER);
+    else this.#camera.layers.disable(CUT_LAYER);
     this.invalidate();
   }
 

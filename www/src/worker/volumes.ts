@@ -1,9 +1,8 @@
 /** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
-import { VesicleError, Volume, type VolumeInit } from 'vesicle';
+import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle';
 import startReaders, { parseVolume } from 'vesicle/import';
 import { importVolume } from '../importers';
-import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
-import { quantize } from '../quantize';
+import type { Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
@@ -47,17 +46,33 @@ export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   return parseVolume(header.bytes, { data: data.bytes });
 }
 
-/**
- * Returns the computed volume of a shape, or reads a volume from files in any supported format, the library's own or
- * one that other libraries read.
- */
-export async function volumeFrom(source: VolumeSource): Promise<Volume> {
-  if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
-  const foreign = await importVolume(source.files);
-  return foreign ? new Volume(foreign) : parseFiles(source.files);
+/** One frame of a volume, the number of all its frames, and the unit of length that its file states. */
+export interface OpenFrame {
+  volume: Volume;
+  frames: number;
+  unit: LengthUnit | undefined;
 }
 
-/** Reduces a volume to the data that the page displays: grey values of its first `pictures` frames, and metadata. */
+/**
+ * Returns a frame of the computed volume of a shape, or of one in files of any supported format, the library's own or
+ * one that other libraries read.
+ */
+export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
+  const { frameSeconds: _, ...init } = await read(source);
+  const [x, y, z, frames = 1] = init.dims;
+  if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
+    throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
+  const size = x * y * z;
+  const data = init.data.subarray(frame * size, (frame + 1) * size);
+  return { volume: new Volume({ ...init, data, dims: [x, y, z] }), frames, unit: init.unit };
+}
+
+async function read(source: VolumeSource): Promise<VolumeInit> {
+  if ('shape' in source) return shapeVoxels(source.shape);
+  return (await importVolume(source.files)) ?? readFiles(source.files);
+}
+
+/** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */
 export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   const { range } = volume;
   const histogram = volume.histogram(HISTOGRAM_BINS);
@@ -75,33 +90,53 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
     range,
     histogram,
     window,
-    voxels: greys(volume, window, pictures),
+    voxels: intensitiesOf(volume, pictures),
   };
 }
 
 /**
- * Returns the `levels` pyramid levels coarser than the volume, the finest first, as grey values: `window` holds the
- * intensities of black and white.
+ * Returns the `levels` pyramid levels coarser than the volume, the finest first; `window` holds the intensities of black
+ * and white.
  */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
   const [, ...coarser] = volume.pyramid(levels + 1);
   return coarser.map((level) => {
     try {
-      return { dims: level.dims, voxels: greys(level, window) };
+      return { dims: level.dims, voxels: intensitiesOf(level), window };
     } finally {
       level.free();
     }
   });
 }
 
+/** Returns the intensities of the first `frames` frames in the narrowest type that holds all of them exactly. */
+function intensitiesOf(volume: Volume, frames = 1): Intensities {
+  const size = volume.dims.reduce((product, side) => product * side, frames);
+  const narrow = narrowArray(volume.range, size);
+  return (narrow && filled(narrow, volume, frames)) ?? filled(new Float32Array(size), volume, frames);
+}
+
+/** Returns an array of the narrowest integers that span a range; undefined if none of at most two bytes does. */
+function narrowArray([low, high]: [number, number], size: number): Intensities | undefined {
+  if (low >= 0 && high < 2 ** 8) return new Uint8Array(size);
+  if (low >= 0 && high < 2 ** 16) return new Uint16Array(size);
+  return low >= -(2 ** 15) && high < 2 ** 15 ? new Int16Array(size) : undefined;
+}
+
 /**
- * Converts the first `frames` frames to grey values, slice by slice to avoid a full copy of the volume in floats.
- * `window` holds the intensities of black and white.
+ * Copies the first `frames` frames into `out`, slice by slice to avoid a full copy of the volume in floats; returns
+ * undefined if `out` cannot hold one of the intensities exactly.
  */
-function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
+function filled(out: Float32Array, volume: Volume, frames: number): Float32Array;
+function filled(out: Intensities, volume: Volume, frames: number): Intensities | undefined;
+function filled(out: Intensities, volume: Volume, frames: number): Intensities | undefined {
   const [nx, ny, nz] = volume.dims;
-  const voxels = new Uint8Array(nx * ny * nz * frames);
-  for (let frame = 0; frame < frames; frame++)
-    for (let z = 0; z < nz; z++) quantize(volume.slice(2, z, frame), window, voxels, (frame * nz + z) * nx * ny);
-  return voxels;
+  for (let slice = 0; slice < frames * nz; slice++) {
+    const values = volume.slice(2, slice % nz, Math.floor(slice / nz));
+    const first = slice * nx * ny;
+    out.set(values, first);
+    if (out instanceof Float32Array) continue;
+    for (let i = 0; i < values.length; i++) if (out[first + i] !== values[i]) return undefined;
+  }
+  return out;
 }
