@@ -18,6 +18,7 @@ import type {
 } from 'vesicle';
 
 import type { Shape } from './shapes';
+import type { RunLog } from './worker/run-log';
 
 export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredRegion, Vec3 };
 
@@ -80,6 +81,8 @@ export interface SavedRun {
   levels: number;
   iteration: number;
   done: boolean;
+  /** Log of the run up to this state. */
+  log: RunLog<Setup>;
 }
 
 /** Description of a volume for the page, with its voxels reduced to 8 bits for display. */
@@ -217,6 +220,10 @@ export interface Requests {
   cancelCoverage: { body: undefined; reply: undefined };
   /** Adds to the surface the components and cavities of the object that it misses; replies with their number. */
   seed: { body: undefined; reply: number };
+  /** Replies with JavaScript that repeats the run; `files` are the names of the volume's files. */
+  code: { body: { files: string[] }; reply: string };
+  /** Replies with the volume as NIfTI. */
+  volume: { body: undefined; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

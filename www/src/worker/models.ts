@@ -9,7 +9,8 @@ import { HISTOGRAM_BINS } from './volumes';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
 
-function startOf({ start }: Setup, iso: number): Options['start'] {
+/** Returns the initial surface of a set-up, whose iso value is `iso`. */
+export function startOf({ start }: Setup, iso: number): Options['start'] {
   switch (start.kind) {
     case 'contour':
     case 'enclosing':
@@ -38,6 +39,8 @@ export function modelOptions(volume: Volume, setup: Setup) {
 /** Builds the model of a set-up with the attractors in it; `make` is called without them. */
 export function withAttractors(setup: Setup, make: () => DeformableModel): DeformableModel {
   const model = make();
+  // Setting none would wake the model, which then takes more iterations from a contour.
+  if (setup.attractors.length === 0) return model;
   try {
     model.setAttractors(setup.attractors);
   } catch (error) {
