@@ -1,7 +1,8 @@
 /** Session files: what is written is read again, and what cannot be read is refused by name. */
 import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { describe, expect, test } from 'vitest';
-import { describe as describeFiles, isSession, matching, readSession, writeSession } from '../../www/src/session/file';
+import { describe as describeFiles, matching, readSession, writeSession } from '../../www/src/session/file';
+import { isSession } from '../../www/src/session/recognise';
 
 const BYTES = Uint8Array.from({ length: 1000 }, (_, i) => i * i);
 const session = async (included = true) => ({

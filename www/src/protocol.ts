@@ -181,8 +181,11 @@ export interface Loaded extends Ready {
 /** Requests of the page to the Extract lab's worker: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: ImageSource; setup: Setup }; reply: Loaded };
+  /**
+   * Opens a volume and builds a model of it, or with `saved` restores a run of it. On failure, the previous volume and
+   * model stay.
+   */
+  load: { body: { name: string; source: ImageSource; setup: Setup; saved?: SavedRun | undefined }; reply: Loaded };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
   cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */

@@ -18,6 +18,7 @@ import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ENERGY_PLOTS, Plots } from '../ui/plots';
 import { PyramidPanel } from '../ui/pyramid';
+import { SessionControls } from '../ui/session';
 import { StartControls } from '../ui/start';
 import { TimeTable } from '../ui/times';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
@@ -41,6 +42,8 @@ export interface PartEvents extends RunEvents<Example> {
   onCancelCoverage: () => void;
   onSeed: () => void;
   onSculpt: () => void;
+  onCopyCode: () => void;
+  onSaveVolume: () => void;
 }
 
 /** Controls and views of the Extract lab. */
@@ -56,6 +59,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly options: ViewOptionControls;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
+  readonly session: SessionControls;
   readonly #figure: FigurePanel<Variant, Preset>;
   readonly #sculpt: HTMLButtonElement;
   readonly #plots: Plots;
@@ -109,6 +113,7 @@ export class ExtractParts extends RunParts<Example> {
       onMark: (parts) => this.stage.showUncovered(parts),
     });
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
+    this.session = new SessionControls(events);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
     this.layOut({
@@ -127,7 +132,7 @@ export class ExtractParts extends RunParts<Example> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
-        this.saveSection(this.exports.element, this.#sculpt),
+        this.saveSection(this.exports.element, this.#sculpt, this.session.element),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
@@ -188,6 +193,7 @@ export class ExtractParts extends RunParts<Example> {
   showState(state: LabState, beneath: LabState, ready: boolean): void {
     const idle = this.showRunState(state, beneath, ready);
     this.#sculpt.disabled = !idle;
+    this.session.enabled = idle;
     this.compare.enabled = idle;
     this.coverage.enabled = idle;
   }

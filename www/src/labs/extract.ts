@@ -14,6 +14,9 @@ import { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
 import { linkOf, toHash } from './link';
 
+/** Files of volumes that the package reads by itself. */
+const PACKAGE_FILES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/i;
+
 /** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
 export class ExtractLab extends RunLab<Example> {
   protected readonly id = 'extract';
@@ -77,8 +80,41 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
+      onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
+      onSaveVolume: () => this.ask(this.#saveVolume(), text('sessions.volumeFailed')),
       onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
     };
+  }
+
+  /** Pauses a run to save its state, and then continues it. */
+  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const isRunning = this.states.modelState === 'running';
+    await this.client.request('pause', undefined);
+    const moments = await this.#settings.moments();
+    if (isRunning) await this.client.request('play', undefined);
+    if (!moments) return undefined;
+    const view = { ...this.ui.stage.view, options: this.ui.options.value };
+    return { ...(await import('../session/moments')).packMoments(moments), view, edits: {} };
+  }
+
+  /** Copies code that repeats the run; without a clipboard, saves it as a file. */
+  async #copyCode(): Promise<void> {
+    const { source } = this.opening;
+    if (!source) return;
+    const { saving, status } = this.ui;
+    const files = this.opening.filesOf(await source.load()).map(({ name }) => name);
+    const isRead = files.length > 0 && files.length < 3 && files.some((name) => PACKAGE_FILES.test(name));
+    const code = await this.client.request('code', { files: isRead ? files : [`${saving.stem}.nii`] });
+    try {
+      await navigator.clipboard.writeText(code);
+      status.say(text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', { name: files[0] ?? saving.stem }));
+    } catch {
+      saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
+    }
+  }
+
+  async #saveVolume(): Promise<void> {
+    this.ui.saving.bytes('nii', await this.client.request('volume', undefined), 'application/octet-stream');
   }
 
   #showSettings(): void {

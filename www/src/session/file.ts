@@ -7,12 +7,11 @@ import { LAB_IDS } from '../labs/address';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { decode, encode, type Parts } from './codec';
+import { INDEX, isRecord } from './recognise';
 
 const FORMAT = 'vesicle-session';
 /** Version of the format that is written; older ones are read. */
 const VERSION = 1;
-const INDEX = 'session.json';
-export const ENDING = '.vesicle.zip';
 
 /** Limits of what is unpacked: parts, and bytes of all together. A session without its data is far below. */
 const MOST_PARTS = 1000;
@@ -57,14 +56,6 @@ export function describe(files: NamedBytes[], included: boolean): Promise<Source
       ...(included && { content: bytes }),
     })),
   );
-}
-
-/** Returns whether a file is a session, by its name or by the first entry of the ZIP that it is. */
-export async function isSession(file: File): Promise<boolean> {
-  if (file.name.toLowerCase().endsWith(ENDING)) return true;
-  // The name of the first entry is after 30 bytes of a header, which begins with PK.
-  const head = strFromU8(new Uint8Array(await file.slice(0, 30 + INDEX.length).arrayBuffer()), true);
-  return head.startsWith('PK') && head.endsWith(INDEX);
 }
 
 /** Returns a session as the bytes of a file. */
@@ -153,10 +144,6 @@ function isFile(value: unknown): value is SourceFile {
   const { name, size, sha256, content } = value;
   const isContent = content === undefined || content instanceof Uint8Array;
   return typeof name === 'string' && typeof size === 'number' && typeof sha256 === 'string' && isContent;
-}
-
-export function isRecord(value: unknown): value is Record<string, unknown> {
-  return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
 /**

@@ -1,7 +1,7 @@
 /** Saved states of a lab, that of the present and those to undo and redo, as the content of a session. */
 import { text } from '../texts';
 import type { HistoryMark } from '../ui/history';
-import { isRecord } from './file';
+import { isRecord } from './recognise';
 import { type PackedMark, ReportLists } from './reports';
 
 /** Most bytes of states to undo and redo in a session; the oldest are left out. */

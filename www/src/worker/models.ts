@@ -3,7 +3,7 @@
  * coloured.
  */
 import { DeformableModel, type Volume } from 'vesicle';
-import type { Setup, VertexQuantity } from '../protocol';
+import type { SavedRun, Setup, VertexQuantity } from '../protocol';
 import { otsu } from '../threshold';
 import { HISTOGRAM_BINS } from './volumes';
 
@@ -52,6 +52,18 @@ export function withAttractors(setup: Setup, make: () => DeformableModel): Defor
 
 export function buildModel(volume: Volume, setup: Setup): DeformableModel {
   return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup), volume }));
+}
+
+/** Builds a model with the state of a saved run; its own initial surface is replaced at once. */
+export function restoredModel(volume: Volume, { state, levels }: SavedRun): DeformableModel {
+  const model = new DeformableModel({ volume, levels, start: 'enclosing' });
+  try {
+    model.restore(state);
+  } catch (error) {
+    model.free();
+    throw error;
+  }
+  return model;
 }
 
 /**
