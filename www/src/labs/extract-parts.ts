@@ -10,7 +10,7 @@ import { CoveragePanel } from '../ui/coverage';
 import { folded, h, section, wideButton } from '../ui/dom';
 import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { FigurePanel } from '../ui/figure';
-import { fileChooser, VOLUME_FILES } from '../ui/files';
+import { fileChooser } from '../ui/files';
 import { Histogram } from '../ui/histogram';
 import type { History } from '../ui/history';
 import { LargeSourceControls } from '../ui/large-source';
@@ -79,7 +79,7 @@ export class ExtractParts extends RunParts<Example> {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
       onFolder: (folder) => events.onLarge(folder.name, { zarr: folder }),
-      data: extractData(fileChooser(events.onFiles, `${VOLUME_FILES},.zip`), large.element, events.onExample),
+      data: extractData(fileChooser(events.onFiles), large.element, events.onExample),
       ownControls: ['iso'],
       history,
       fetchMesh,

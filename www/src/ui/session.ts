@@ -1,5 +1,5 @@
 import { text } from '../texts';
-import { h, uniqueId } from './dom';
+import { h, uniqueId, wideButton } from './dom';
 
 /** The user's wishes that {@link SessionControls} reports. */
 export interface SessionEvents {
@@ -38,8 +38,9 @@ export class SessionControls {
 
   #action(name: string, label: string, help: string, onclick: () => void): HTMLElement[] {
     const id = uniqueId('session');
-    const attributes = { type: 'button', class: 'wide', 'data-action': name, 'aria-describedby': id, disabled: true };
-    const button = h('button', { ...attributes, onclick }, label);
+    const button = wideButton(label, name, onclick);
+    button.setAttribute('aria-describedby', id);
+    button.disabled = true;
     this.#buttons.push(button);
     return [button, h('p', { class: 'help', id }, help)];
   }
