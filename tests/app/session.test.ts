@@ -5,7 +5,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { readSession } from '../../www/src/session/file';
-import { type App, afterRun, drop, open, openApp, reach, recordStates } from './browser';
+import { type App, afterRun, drop, open, openApp, reach } from './browser';
 
 let app: App;
 /** A file of the user's: a tooth, of few voxels. */

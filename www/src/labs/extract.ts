@@ -86,12 +86,8 @@ export class ExtractLab extends RunLab<Example> {
     };
   }
 
-  /** Pauses a run to save its state, and then continues it. */
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
-    const isRunning = this.states.modelState === 'running';
-    await this.client.request('pause', undefined);
-    const moments = await this.#settings.moments();
-    if (isRunning) await this.client.request('play', undefined);
+    const moments = await this.paused(() => this.#settings.moments());
     if (!moments) return undefined;
     const view = { ...this.ui.stage.view, options: this.ui.options.value };
     return { ...(await import('../session/moments')).packMoments(moments), view, edits: {} };

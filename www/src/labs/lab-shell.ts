@@ -208,6 +208,15 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
     return true;
   }
 
+  /** Pauses a run for `work`, and then continues it. */
+  protected async paused<Result>(work: () => Promise<Result>): Promise<Result> {
+    const isRunning = this.states.modelState === 'running';
+    await this.client.request('pause', undefined);
+    const result = await work();
+    if (isRunning) await this.client.request('play', undefined);
+    return result;
+  }
+
   /** Opens the present surface in the Sculpt lab, as a mesh to deform. */
   protected toSculpt(mesh: Promise<Uint8Array>, name = text('labs.surfaceName', { name: this.ui.saving.name })): void {
     this.ask(

@@ -199,18 +199,27 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
   }
 
-  /** Opens the data of a session, and continues it; `files` are those of its data, if it is no example. */
+  /** Opens the data of a session, its example or else `files`, and continues it. */
   session(session: Session, files: File[]): Promise<void> {
     const { name, example: id } = session.source;
     const example = id === undefined ? undefined : this.find(id);
-    const origin = example && files.length === 0 ? this.fromExample(example) : this.fromFiles(files);
-    const load = async () => {
+    const own = files.length > 0 ? [this.fromFiles(files)] : [];
+    const origins = example ? [this.fromExample(example), ...own] : own;
+    const load = () => this.#matching(session.source, origins);
+    return this.open({ ...origins[0], ...(example && { example }), name, load, session });
+  }
+
+  /** Returns the data of the first of several sources that are those of a session. */
+  async #matching(wanted: Session['source'], [origin, ...others]: Source<Example, Linked, Data>[]): Promise<Data> {
+    if (!origin) throw new Error(text('labs.linkNoExample', { example: wanted.example ?? '' }));
+    try {
       const data = await origin.load();
-      const { matching } = await import('../session/file');
-      await matching(session.source.files, this.filesOf(data));
+      await (await import('../session/file')).matching(wanted.files, this.filesOf(data));
       return data;
-    };
-    return this.open({ ...origin, ...(example && { example }), name, load, session });
+    } catch (error) {
+      if (others.length === 0) throw error;
+      return this.#matching(wanted, others);
+    }
   }
 
   /** Opens the first example. */

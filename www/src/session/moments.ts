@@ -26,6 +26,12 @@ export interface Moments<M> {
   redo: Labelled<M>[];
 }
 
+/** Converts all states by a function. */
+export function mapMoments<M, N>({ now, undo, redo }: Moments<M>, convert: (moment: M) => N): Moments<N> {
+  const all = (list: Labelled<M>[]) => list.map((one) => ({ ...one, state: convert(one.state) }));
+  return { now: convert(now), undo: all(undo), redo: all(redo) };
+}
+
 /** Returns saved states as plain data. */
 export function packMoments<M extends Moment>({ now, undo, redo }: Moments<M>): Record<string, unknown> {
   const reports = new ReportLists();
