@@ -19,6 +19,7 @@ import type {
 } from 'vesicle';
 
 import type { Shape } from './shapes';
+import type { RunLog } from './worker/run-log';
 
 export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredRegion, Vec3 };
 
@@ -84,6 +85,8 @@ export interface SavedRun {
   levels: number;
   iteration: number;
   done: boolean;
+  /** Log of the run up to this state. */
+  log: RunLog<Setup>;
 }
 
 /**
@@ -179,8 +182,14 @@ export interface Loaded extends Ready {
 /** Requests of the page to the Extract lab's worker: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens a frame of a volume, the first is 0, and builds a model of it. On failure, the previous volume and model stay. */
-  load: { body: { name: string; source: ImageSource; setup: Setup; frame: number }; reply: Loaded };
+  /**
+   * Opens a frame of a volume, the first is 0, and builds a model of it, or with `saved` restores a run of it. On failure, the previous volume and
+   * model stay.
+   */
+  load: {
+    body: { name: string; source: ImageSource; setup: Setup; frame: number; saved?: SavedRun | undefined };
+    reply: Loaded;
+  };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */
   cancelLoad: { body: undefined; reply: undefined };
   /** Builds a new model of the open volume. On failure, the previous model stays. */
@@ -218,6 +227,10 @@ export interface Requests {
   cancelCoverage: { body: undefined; reply: undefined };
   /** Adds to the surface the components and cavities of the object that it misses; replies with their number. */
   seed: { body: undefined; reply: number };
+  /** Replies with JavaScript that repeats the run; `files` are the names of the volume's files. */
+  code: { body: { files: string[] }; reply: string };
+  /** Replies with the volume as NIfTI. */
+  volume: { body: undefined; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

@@ -1,6 +1,6 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 
-import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
+import { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
   Attractor,
   DataEvent,
@@ -23,10 +23,12 @@ import type {
   WorkerEvent,
 } from './protocol';
 import { text } from './texts';
+import { toCode } from './worker/code';
 import { compare } from './worker/compare';
 import type { LargeVolume } from './worker/large';
-import { buildModel, valuesFor } from './worker/models';
+import { buildModel, restoredModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
+import { type RunLog, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, openFrame, viewOf } from './worker/volumes';
@@ -68,6 +70,7 @@ class Session {
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
+  readonly #log = new RunRecorder<Setup>();
   /** Number of coarser pyramid levels the model was built with, besides the volume itself. */
   #levels = 0;
   #measuredAt = 0;
@@ -103,20 +106,24 @@ class Session {
     coverage: () => this.#coverage(),
     cancelCoverage: () => this.#coverageRun.stop(),
     seed: () => this.#seed(),
+    code: ({ files }) => this.#code(files),
+    volume: () => this.#image().toNifti(),
   };
 
   takeBack(buffers: SurfaceBuffers): void {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load({ name, source, setup, frame }: Requests['load']['body']): Promise<Loaded> {
+  async #load({ name, source, setup, frame, saved }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
     if ('zarr' in source) return this.#loadLarge(name, source, setup);
     const { volume, frames, unit } = await openFrame(source, frame);
     try {
       const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
-      // No checks: the page starts the run at once, and would not show their result.
-      const ready = this.#replaceModel(buildModel(volume, setup), 'measured');
+      const model = saved ? restoredModel(volume, saved) : buildModel(volume, setup);
+      // No checks of a new model: the page starts the run at once, and would not show their result.
+      const ready = this.#replaceModel(model, setup, saved ? 'checked' : 'measured');
+      if (saved) this.#continue(saved);
       this.#keep({ volume });
       this.#window = view.window;
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
@@ -134,7 +141,8 @@ class Session {
     try {
       const view = large.view(name);
       const levels = Math.min(setup.levels, large.coarserLevels);
-      const ready = this.#replaceModel(large.model({ ...setup, levels }), 'measured');
+      const fitting = { ...setup, levels };
+      const ready = this.#replaceModel(large.model(fitting), fitting, 'measured');
       this.#keep({ large });
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
@@ -158,17 +166,16 @@ class Session {
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
-    return this.#replaceModel(this.#build(setup));
+    return this.#replaceModel(this.#build(setup), setup);
   }
 
-  #replaceModel(model: DeformableModel, detail: Detail = 'checked'): Ready {
-    this.#coverageRun.abort();
-    this.#model?.free();
-    this.#model = model;
+  #replaceModel(model: DeformableModel, setup: Setup, detail: Detail = 'checked'): Ready {
+    this.#replaceBy(model);
     this.#levels = model.level;
     this.#iteration = 0;
     this.#reports = [];
     this.#done = false;
+    this.#log.begin({ ...setup, params: { iso: model.params.iso, ...setup.params } });
     this.#snapshot(detail);
     return { params: { ...model.params }, delta: model.delta };
   }
@@ -223,6 +230,8 @@ class Session {
   #stepped(report: StepReport): void {
     this.#reports.push(report);
     this.#done = report.done;
+    // Seeding is reported, too, and is no iteration.
+    if (report.iteration > this.#iteration) this.#log.add('step', report.iteration - this.#iteration);
     this.#iteration = report.iteration;
     if (this.#free.length === 0) {
       this.#flushReports();
@@ -267,12 +276,14 @@ class Session {
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     model.setParams(params);
+    this.#log.add('setParams', params);
     this.#done = false;
     return { ...model.params };
   }
 
   #setAttractors(attractors: Attractor[]): undefined {
     this.#current().setAttractors(attractors);
+    this.#log.add('setAttractors', attractors);
     this.#done = false;
   }
 
@@ -299,35 +310,49 @@ class Session {
     this.#image();
     const model = this.#current();
     const state = model.save();
-    return withTransfer({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
+    return withTransfer(
+      { state, levels: this.#levels, iteration: this.#iteration, done: this.#done, log: this.#logged() },
+      [state],
+    );
+  }
+
+  #logged(): RunLog<Setup> {
+    if (!this.#log.log) throw new Refusal('invalid-argument', text('extract.noVolume'));
+    return this.#log.log;
+  }
+
+  /** Returns code that repeats the run with the package alone. */
+  #code(files: string[]): string {
+    // Of a volume larger than memory, the package reads parts while the model runs.
+    this.#image();
+    const defaults = Object.fromEntries(paramSpecs('deformable').map(({ name, default: value }) => [name, value]));
+    return toCode(this.#logged(), { files, version: version(), defaults });
   }
 
   /**
    * Restores a saved run. Its state fits only a model with the same number of pyramid levels; if the present model has
-   * another number, one that fits is built first, and its own initial surface is replaced at once.
+   * another number, one that fits is built.
    */
-  async #restore({ state, levels, iteration, done }: SavedRun): Promise<Ready> {
+  async #restore(saved: SavedRun): Promise<Ready> {
     await this.#pause();
-    if (levels === this.#levels) this.#current().restore(state);
-    else this.#replaceBy(state, levels);
+    if (saved.levels === this.#levels) this.#current().restore(saved.state);
+    else this.#replaceBy(restoredModel(this.#image(), saved));
     const model = this.#current();
-    this.#levels = levels;
-    this.#iteration = iteration;
-    this.#reports = [];
-    this.#done = done;
+    this.#continue(saved);
     this.#reportStopped();
     return { params: { ...model.params }, delta: model.delta };
   }
 
-  #replaceBy(state: Uint8Array, levels: number): void {
-    const start = { kind: 'enclosing' } as const;
-    const model = this.#build({ start, levels, edge: undefined, params: {}, attractors: [] });
-    try {
-      model.restore(state);
-    } catch (error) {
-      model.free();
-      throw error;
-    }
+  /** Continues a saved run, whose state the model has. */
+  #continue({ levels, iteration, done, log }: SavedRun): void {
+    this.#levels = levels;
+    this.#log.resume(log);
+    this.#iteration = iteration;
+    this.#reports = [];
+    this.#done = done;
+  }
+
+  #replaceBy(model: DeformableModel): void {
     this.#coverageRun.abort();
     this.#model?.free();
     this.#model = model;
@@ -365,6 +390,7 @@ class Session {
   async #seed(): Promise<number> {
     await this.#pause();
     const report = this.#current().seed();
+    this.#log.add('seed', undefined);
     this.#stepped(report);
     this.#reportStopped();
     return report.events.seeds;

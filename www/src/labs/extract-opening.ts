@@ -1,15 +1,19 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
-import type { ImageSource, LargeSource, Loaded, ParamSpec, ParamValues, Setup } from '../protocol';
+import type { ImageSource, LargeSource, Loaded, NamedBytes, ParamSpec, ParamValues, Setup } from '../protocol';
+import type { Session } from '../session/file';
+import { isRecord } from '../session/recognise';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
+import type { ViewOptions } from '../ui/view-options';
+import type { StageView } from '../view/stage';
 import { fetchBytes, preload } from './downloads';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
-import type { ExtractSettings } from './extract-settings';
+import { type ExtractMoments, type ExtractSettings, isExtractMoment } from './extract-settings';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
@@ -21,6 +25,8 @@ export type ExtractSource = Source<Example, Linked, ImageSource>;
 interface OpenedVolume extends Loaded {
   choice: StartChoice;
   setup: Setup;
+  /** The states of the session that is continued. */
+  moments?: ExtractMoments | undefined;
 }
 
 /** Opens volumes in the Extract lab, and builds models of them. */
@@ -67,7 +73,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   /** Opens a volume passed on by another lab, with the parameters passed on with it. */
   override passedOn({ name, bytes, params }: Handoff): Promise<void> {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
-    return this.open({ name, load, linked: { params, attractors: [] }, unit: '' });
+    return this.open({ name, load, linked: { params, attractors: [] }, unit: '', isMade: true });
   }
 
   protected find(id: string): Example | undefined {
@@ -108,22 +114,25 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   }
 
   protected async load(source: ExtractSource, volume: ImageSource, reopening: boolean): Promise<OpenedVolume> {
-    const choice = reopening ? this.#ui.start.inForce : this.#startFor(source, volume);
-    const setup = reopening ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
-    const body = { name: source.name, source: volume, setup, frame: source.linked?.frame ?? 0 };
+    const moments = source.session && !reopening ? await momentsOf(source.session) : undefined;
+    const { saved, page } = moments?.now ?? {};
+    const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
+    const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
+    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved };
     const loaded = await this.#client.request('load', body, transferable(volume));
     const { large } = loaded.volume;
     const levels = large ? Math.min(choice.levels, large.levels.length - 1) : choice.levels;
-    return { ...loaded, choice: { ...choice, levels }, setup };
+    return { ...loaded, choice: { ...choice, levels }, setup, moments };
   }
 
   protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
     if (reopening) return this.#takeUp(opened, source);
-    const { volume, choice, params, setup } = opened;
+    const { volume, choice, params, setup, moments } = opened;
     this.states.ready = true;
     this.#ui.adopt(volume, source);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup.attractors);
+    if (moments) return this.#resume(moments, source.session?.content.view);
     this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);
   }
@@ -144,6 +153,18 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     this.#ui.status.say(
       newest ? text('extract.restartedFrom', { iteration: count(newest.saved.iteration) }) : text('extract.restarted'),
     );
+  }
+
+  /** Continues a session: shows its state and view, and does not run it. */
+  #resume(moments: ExtractMoments, view: unknown): void {
+    this.#settings.resume(moments);
+    if (!isRecord(view)) return;
+    this.#ui.options.set(view.options as Partial<ViewOptions>);
+    this.#ui.stage.view = view as unknown as StageView;
+  }
+
+  override filesOf(source: ImageSource): NamedBytes[] {
+    return 'files' in source ? source.files : [];
   }
 
   protected override superseded(): void {
@@ -199,6 +220,16 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
       : own;
     return linked ? withLink(suits, linked) : suits;
   }
+}
+
+async function momentsOf({ content }: Session): Promise<ExtractMoments> {
+  const { unpackMoments } = await import('../session/moments');
+  return unpackMoments(content, isExtractMoment);
+}
+
+/** Returns the frame of a 4D volume that a source opens, counted from 0: that of its link or session. */
+export function frameOf({ linked, session }: ExtractSource): number {
+  return (session ? fromHash(session.hash) : linked)?.frame ?? 0;
 }
 
 function transferable(source: ImageSource): Transferable[] {

@@ -9,7 +9,7 @@ import { ComparePanel } from '../ui/compare';
 import { CoveragePanel } from '../ui/coverage';
 import { folded, h, section, wideButton } from '../ui/dom';
 import { FigurePanel } from '../ui/figure';
-import { fileChooser, VOLUME_FILES } from '../ui/files';
+import { fileChooser } from '../ui/files';
 import { FrameChoice } from '../ui/frame-choice';
 import { Histogram } from '../ui/histogram';
 import type { History } from '../ui/history';
@@ -18,11 +18,12 @@ import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ENERGY_PLOTS, Plots } from '../ui/plots';
 import { PyramidPanel } from '../ui/pyramid';
+import { SessionControls } from '../ui/session';
 import { StartControls } from '../ui/start';
 import { TimeTable } from '../ui/times';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
-import type { ExtractSource } from './extract-opening';
+import { type ExtractSource, frameOf } from './extract-opening';
 import { extractData, factsOf, unitOf } from './extract-page';
 import { type RunEvents, RunParts } from './lab-parts';
 
@@ -42,6 +43,8 @@ export interface PartEvents extends RunEvents<Example> {
   onCancelCoverage: () => void;
   onSeed: () => void;
   onSculpt: () => void;
+  onCopyCode: () => void;
+  onSaveVolume: () => void;
 }
 
 /** Controls and views of the Extract lab. */
@@ -58,6 +61,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly options: ViewOptionControls;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
+  readonly session: SessionControls;
   readonly #figure: FigurePanel<Variant, Preset>;
   readonly #sculpt: HTMLButtonElement;
   readonly #plots: Plots;
@@ -74,7 +78,7 @@ export class ExtractParts extends RunParts<Example> {
   ) {
     const large = new LargeSourceControls(events.onLarge);
     const frames = new FrameChoice(events.onFrame);
-    const chooser = fileChooser(events.onFiles, `${VOLUME_FILES},.zip`);
+    const chooser = fileChooser(events.onFiles);
     super(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
@@ -114,6 +118,7 @@ export class ExtractParts extends RunParts<Example> {
       onMark: (parts) => this.stage.showUncovered(parts),
     });
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
+    this.session = new SessionControls(events);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
     this.layOut({
@@ -132,7 +137,7 @@ export class ExtractParts extends RunParts<Example> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
-        this.saveSection(this.stage.subject, this.exports.element, this.#sculpt),
+        this.saveSection(this.stage.subject, this.exports.element, this.#sculpt, this.session.element),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
@@ -142,7 +147,8 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   /** Shows a newly opened volume, and clears results of the previous one. */
-  adopt(volume: VolumeView, { example, linked, unit = unitOf(volume) }: ExtractSource): void {
+  adopt(volume: VolumeView, source: ExtractSource): void {
+    const { example, unit = unitOf(volume) } = source;
     this.saving.name = volume.name;
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
@@ -150,7 +156,7 @@ export class ExtractParts extends RunParts<Example> {
     this.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
-    this.#frames.show(linked?.frame ?? 0, volume.frames);
+    this.#frames.show(frameOf(source), volume.frames);
     this.large.showTotal(volume.large?.bytes);
     this.stage.setVolume(volume);
     this.compare.clear();
@@ -194,6 +200,7 @@ export class ExtractParts extends RunParts<Example> {
   showState(state: LabState, beneath: LabState, ready: boolean): void {
     const idle = this.showRunState(state, beneath, ready);
     this.#sculpt.disabled = !idle;
+    this.session.enabled = idle;
     this.compare.enabled = idle;
     this.coverage.enabled = idle;
   }

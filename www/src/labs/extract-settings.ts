@@ -1,6 +1,8 @@
 import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
+import type { Moments } from '../session/moments';
+import { isRecord } from '../session/recognise';
 import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
@@ -27,6 +29,23 @@ interface PageState {
   attractors: Attractor[];
   /** Creates a mark in the run's history at the iteration at which the model was saved. */
   mark: (iteration: number) => HistoryMark;
+}
+
+export type ExtractMoments = Moments<SavedMoment<PageState, SavedRun>>;
+
+/** Tests whether saved data, of a model and of the page, may be those of a state of this lab. */
+export function isExtractMoment(saved: Record<string, unknown>, page: Record<string, unknown>): boolean {
+  const { levels, done, log } = saved;
+  const { choice, params, attractors } = page;
+  const isLog = isRecord(log) && isRecord(log.setup) && Array.isArray(log.calls);
+  return (
+    isLog &&
+    typeof levels === 'number' &&
+    typeof done === 'boolean' &&
+    isRecord(choice) &&
+    isRecord(params) &&
+    Array.isArray(attractors)
+  );
 }
 
 /**
@@ -113,6 +132,17 @@ export class ExtractSettings {
   begin(choice: StartChoice, params: ParamValues): void {
     this.#states.idle(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
+  }
+
+  /** Returns the present state and those to undo and redo, for a session; undefined if they cannot be saved. */
+  moments(): Promise<ExtractMoments | undefined> {
+    return this.#undo.moments();
+  }
+
+  /** Continues a session, whose volume has been adopted, and whose model the worker has restored. */
+  resume(moments: ExtractMoments): void {
+    this.#undo.adopt(moments);
+    this.adoptMoment(moments.now);
   }
 
   /** Saves the present state of model and page, to return to it if the user cancels opening something else. */

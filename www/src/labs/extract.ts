@@ -5,7 +5,7 @@ import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
 import type { ViewOptions } from '../ui/view-options';
-import { ExtractOpening, type ExtractSource } from './extract-opening';
+import { ExtractOpening, type ExtractSource, frameOf } from './extract-opening';
 import { ExtractParts, type PartEvents } from './extract-parts';
 import { ExtractResults } from './extract-results';
 import { ExtractSettings } from './extract-settings';
@@ -13,6 +13,9 @@ import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
 import { linkOf, toHash } from './link';
+
+/** Files of volumes that the package reads by itself. */
+const PACKAGE_FILES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/i;
 
 /** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
 export class ExtractLab extends RunLab<Example> {
@@ -78,8 +81,37 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
+      onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
+      onSaveVolume: () => this.ask(this.#saveVolume(), text('sessions.volumeFailed')),
       onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
     };
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const moments = await this.paused(() => this.#settings.moments());
+    if (!moments) return undefined;
+    const view = { ...this.ui.stage.view, options: this.ui.options.value };
+    return { ...(await import('../session/moments')).packMoments(moments), view, edits: {} };
+  }
+
+  /** Copies code that repeats the run; without a clipboard, saves it as a file. */
+  async #copyCode(): Promise<void> {
+    const { source } = this.opening;
+    if (!source) return;
+    const { saving, status } = this.ui;
+    const files = this.opening.filesOf(await source.load()).map(({ name }) => name);
+    const isRead = files.length > 0 && files.length < 3 && files.some((name) => PACKAGE_FILES.test(name));
+    const code = await this.client.request('code', { files: isRead ? files : [`${saving.stem}.nii`] });
+    try {
+      await navigator.clipboard.writeText(code);
+      status.say(text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', { name: files[0] ?? saving.stem }));
+    } catch {
+      saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
+    }
+  }
+
+  async #saveVolume(): Promise<void> {
+    this.ui.saving.bytes('nii', await this.client.request('volume', undefined), 'application/octet-stream');
   }
 
   #showSettings(): void {
@@ -94,7 +126,8 @@ export class ExtractLab extends RunLab<Example> {
     this.updateAddress();
   }
 
-  protected address({ example, name: file, linked }: ExtractSource): string {
+  protected address(source: ExtractSource): string {
+    const { example, name: file } = source;
     const { params, sphere, attractors } = this.#settings;
     const { defaults } = this.opening;
     const choice = this.ui.start.inForce;
@@ -102,7 +135,7 @@ export class ExtractLab extends RunLab<Example> {
       linkOf({
         example,
         file,
-        frame: linked?.frame ?? 0,
+        frame: frameOf(source),
         choice,
         sphere,
         params,

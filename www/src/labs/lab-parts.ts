@@ -21,6 +21,8 @@ export interface LabEvents<Example> {
   onCancel: () => void;
   onDismiss: () => void;
   onCopyLink: () => void;
+  /** Saves the session; `included`: with its data. */
+  onSaveSession: (included: boolean) => void;
   onError: (title: string, error: unknown) => void;
 }
 

@@ -10,6 +10,7 @@ import type { LabEvents, LabParts, RunEvents, RunParts } from './lab-parts';
 import type { LabStates } from './lab-states';
 import type { Handoff, Lab, OpenInLab } from './labs';
 import type { Opening, Source } from './opening';
+import { Sessions } from './sessions';
 
 /** Events that the workers of all labs send. */
 type EngineEvent = { event: 'failure'; failure: Failure } | { event: 'state'; state: 'running' | 'paused' | 'done' };
@@ -37,6 +38,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Aborted when the lab is closed, which removes all event listeners. */
   protected readonly closing = new AbortController();
   readonly #help: HTMLElement;
+  #sessions: Sessions | undefined;
 
   protected abstract readonly id: keyof typeof GUIDES;
   protected abstract readonly client: Engine;
@@ -60,6 +62,11 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Enables and disables controls according to the lab's state. */
   protected abstract showControls(state: LabState): void;
 
+  /** Returns the lab's own part of a session, and leaves a run as it is; undefined if the lab cannot save its model. */
+  protected async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    return undefined;
+  }
+
   /** Returns what a copied link does not contain, as sentences; false: none. */
   protected linkLacks(): (string | false)[] {
     return [];
@@ -70,6 +77,11 @@ export abstract class LabShell<Example extends Listed> implements Lab {
 
   /** Begins to follow the lab's state and to listen to the keyboard. */
   protected begin(shortcuts: Shortcut[]): void {
+    this.#sessions = new Sessions({
+      ...{ id: this.id, ui: this.ui, states: this.states, opening: this.opening, passOn: this.passOn },
+      address: (source) => this.address(source),
+      content: () => this.sessionContent(),
+    });
     this.states.subscribe((state) => this.#showState(state));
     const onEscape = {
       key: 'Escape',
@@ -82,7 +94,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
 
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
   async start(passedOn?: Handoff): Promise<void> {
-    const open = passedOn && (() => this.opening.passedOn(passedOn));
+    const open = passedOn && (() => this.#sessions?.passedOn(passedOn) ?? this.opening.passedOn(passedOn));
     await this.opening.start(this.closing.signal, () => this.updateAddress(), open);
   }
 
@@ -97,11 +109,12 @@ export abstract class LabShell<Example extends Listed> implements Lab {
 
   protected labEvents(): Omit<LabEvents<Example>, 'onParam'> {
     return {
-      onFiles: (files) => void this.opening.files(files),
+      onFiles: (files) => void this.#sessions?.files(files),
       onExample: (example) => void this.opening.example(example),
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
+      onSaveSession: (included) => void this.#sessions?.save(included),
       onError: (title, error) => this.states.fail(title, error),
     };
   }
@@ -118,6 +131,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   }
 
   protected dismiss(): void {
+    this.#sessions?.forget();
     if (this.states.dismiss()) this.ui.status.say(this.describe());
   }
 
@@ -191,6 +205,15 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
     else if (sent.event !== 'state') return false;
     else if (this.states.setModelState(sent.state)) this.settled(sent.state);
     return true;
+  }
+
+  /** Pauses a run for `work`, and then continues it. */
+  protected async paused<Result>(work: () => Promise<Result>): Promise<Result> {
+    const isRunning = this.states.modelState === 'running';
+    await this.client.request('pause', undefined);
+    const result = await work();
+    if (isRunning) await this.client.request('play', undefined);
+    return result;
   }
 
   /** Opens the present surface in the Sculpt lab, as a mesh to deform. */

@@ -1,10 +1,17 @@
 /** The interface between the page and its labs. */
 import type { ParamValues } from '../protocol';
+import type { Session } from '../session/file';
+import type { LAB_IDS } from './address';
 
-/** Data that one lab passes to another: a volume for Extract, with suitable parameters, or a mesh for Sculpt. */
+/**
+ * Data that one lab passes to another: a volume for Extract, with suitable parameters, a mesh for Sculpt, or a session of
+ * the other lab.
+ */
 export interface Handoff {
   /** The receiving lab's name in addresses. */
-  lab: 'extract' | 'sculpt';
+  lab: (typeof LAB_IDS)[number];
+  /** The session, if it is one; name, bytes and parameters are then empty. */
+  session?: Session;
   name: string;
   /** Content of a volume or mesh file. */
   bytes: Uint8Array;

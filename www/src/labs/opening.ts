@@ -1,6 +1,7 @@
 import { toFailure } from '../channel';
 import type { Unit } from '../examples';
-import type { Failure, ParamSpec } from '../protocol';
+import type { Failure, NamedBytes, ParamSpec } from '../protocol';
+import type { Session } from '../session/file';
 import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
@@ -22,6 +23,10 @@ export interface Source<Example, Linked, Data> {
   linked?: Linked;
   /** Unit of lengths, if there is no example to define it. */
   unit?: Unit;
+  /** The session to continue, whose state takes precedence over all settings. */
+  session?: Session;
+  /** Whether the data are nowhere but in the app, since another lab has made them. */
+  isMade?: boolean;
 }
 
 /** The controls of a lab that opening data affects. */
@@ -87,6 +92,11 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Returns all that is needed to open the user's files, without reading them yet. */
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
+  /** Returns the files among the data, which sessions describe or include; none by default, as if all were computed. */
+  filesOf(_data: Data): NamedBytes[] {
+    return [];
+  }
+
   /**
    * Has the worker build a model of the data. With `reopening`, the same source was open before, and the engine was
    * restarted.
@@ -125,7 +135,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /** Opens what another lab passes on; by default nothing is accepted, and the first example opens. */
   passedOn(_handoff: Handoff): Promise<void> {
-    return this.example(this.first);
+    return this.default();
   }
 
   /** Called when a request to open something is made, to end the one before if that takes long; does nothing by default. */
@@ -187,6 +197,34 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   files(files: File[]): Promise<void> {
     const linked = this.#awaiting;
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
+  }
+
+  /** Opens the data of a session, its example or else `files`, and continues it. */
+  session(session: Session, files: File[]): Promise<void> {
+    const { name, example: id } = session.source;
+    const example = id === undefined ? undefined : this.find(id);
+    const own = files.length > 0 ? [this.fromFiles(files)] : [];
+    const origins = example ? [this.fromExample(example), ...own] : own;
+    const load = () => this.#matching(session.source, origins);
+    return this.open({ ...origins[0], ...(example && { example }), name, load, session });
+  }
+
+  /** Returns the data of the first of several sources that are those of a session. */
+  async #matching(wanted: Session['source'], [origin, ...others]: Source<Example, Linked, Data>[]): Promise<Data> {
+    if (!origin) throw new Error(text('labs.linkNoExample', { example: wanted.example ?? '' }));
+    try {
+      const data = await origin.load();
+      await (await import('../session/file')).matching(wanted.files, this.filesOf(data));
+      return data;
+    } catch (error) {
+      if (others.length === 0) throw error;
+      return this.#matching(wanted, others);
+    }
+  }
+
+  /** Opens the first example. */
+  default(): Promise<void> {
+    return this.example(this.first);
   }
 
   /** Opens the present source again, after a failure of the engine. */

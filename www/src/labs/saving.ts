@@ -21,6 +21,11 @@ export class Saving {
     this.#name = name.replace(/^.*\//, '');
   }
 
+  /** The name without the ending of its format, as part of the names of saved files. */
+  get stem(): string {
+    return this.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '').replaceAll(' ', '-');
+  }
+
   /** Saves the data of the plots as CSV; `residual` is the heading of the residual's column. */
   plots(history: History, residual?: string): void {
     this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
@@ -31,9 +36,7 @@ export class Saving {
    * same type.
    */
   bytes(extension: string, bytes: Uint8Array, type: string, suffix = ''): void {
-    const stem = this.name
-      .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')
-      .replaceAll(' ', '-');
+    const { stem } = this;
     download(`${stem}${suffix}.${extension}`, bytes, type);
     this.#say(text('labs.saved', { stem, suffix, extension }));
   }

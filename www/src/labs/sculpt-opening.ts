@@ -1,7 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
-import type { OpenedScene, SceneSource } from '../sculpt/protocol';
+import type { NamedBytes, OpenedScene, SceneSource } from '../sculpt/protocol';
+import { isRecord } from '../session/recognise';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
@@ -9,8 +10,14 @@ import { fromExample, fromFiles } from './mesh-files';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedScene } from './sculpt-link';
 import type { SculptParts } from './sculpt-parts';
+import { isSculptMoment, type SculptMoments } from './sculpt-settings';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
+
+/** A scene opened in the Sculpt lab, and the states of the session that is continued. */
+export interface OpenedPose extends OpenedScene {
+  moments?: SculptMoments;
+}
 
 /**
  * Parameters for the user's own meshes: each edge of the base may be halved twice where the detail needs more vertices,
@@ -19,16 +26,16 @@ export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 const OWN_PARAMS = { supersample: 2 };
 
 /** Opens meshes in the Sculpt lab, and builds models of them. */
-export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, OpenedScene> {
+export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, OpenedPose> {
   protected readonly first = SCENES[0];
   readonly #client: SculptClient;
-  readonly #onOpened: (opened: OpenedScene, source: SculptSource) => Promise<void>;
+  readonly #onOpened: (opened: OpenedPose, source: SculptSource) => Promise<void>;
 
   constructor(
     client: SculptClient,
     ui: SculptParts,
     states: LabStates,
-    onOpened: (opened: OpenedScene, source: SculptSource) => Promise<void>,
+    onOpened: (opened: OpenedPose, source: SculptSource) => Promise<void>,
   ) {
     super(client, ui, states);
     this.#client = client;
@@ -37,7 +44,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
 
   /** Opens a mesh passed on by another lab. */
   override passedOn({ name, bytes }: Handoff): Promise<void> {
-    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }) });
+    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }), isMade: true });
   }
 
   protected find(id: string): SculptExample | undefined {
@@ -56,7 +63,23 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     return { name: files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
-  protected load({ name, example, linked }: SculptSource, meshes: SceneSource): Promise<OpenedScene> {
+  override filesOf({ detail, base }: SceneSource): NamedBytes[] {
+    const files = [detail, base].flatMap((mesh) => (mesh && 'file' in mesh ? [mesh.file] : []));
+    const texture = detail && 'file' in detail ? detail.texture : undefined;
+    return texture
+      ? [...files, { name: text('sculpt.textureFile', { type: texture.type.slice(6) }), bytes: texture.bytes }]
+      : files;
+  }
+
+  protected async load({ name, example, linked, session }: SculptSource, meshes: SceneSource): Promise<OpenedPose> {
+    if (session) {
+      const { unpackMoments } = await import('../session/moments');
+      const moments: SculptMoments = unpackMoments(session.content, isSculptMoment);
+      const { saved } = moments.now;
+      const params = isRecord(session.content.params) ? session.content.params : {};
+      const setup = { start: saved.start, params, pose: undefined };
+      return { ...(await this.#client.request('open', { source: meshes, setup, saved })), moments };
+    }
     if (meshes.detail && !meshes.base) this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
     const [variant] = isSculptPreset(example) ? example.variants : [];
@@ -65,7 +88,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     return this.#client.request('open', { source: meshes, setup });
   }
 
-  protected adopt(opened: OpenedScene, source: SculptSource): Promise<void> {
+  protected adopt(opened: OpenedPose, source: SculptSource): Promise<void> {
     return this.#onOpened(opened, source);
   }
 }

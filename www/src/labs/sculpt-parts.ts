@@ -14,6 +14,7 @@ import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
 import { Plots } from '../ui/plots';
 import { SculptOptionControls } from '../ui/sculpt-options';
+import { SessionControls } from '../ui/session';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
 import { DragLatency } from './drag-latency';
@@ -40,6 +41,7 @@ export class SculptParts extends RunParts<SculptExample> {
   readonly options: SculptOptionControls;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
+  readonly #session: SessionControls;
   readonly plots: Plots;
   readonly #onError: PartEvents['onError'];
   readonly #figure: FigurePanel<SculptVariant, SculptPreset>;
@@ -61,6 +63,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
     this.ellipsoids = new EllipsoidControls(events);
     this.film = new FilmControls(events);
+    this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.plots = new Plots(history, SCULPT_PLOTS, true);
     this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -80,7 +83,7 @@ export class SculptParts extends RunParts<SculptExample> {
       ],
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
-        this.saveSection(this.view.subject, this.exports.element),
+        this.saveSection(this.view.subject, this.exports.element, this.#session.element),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
       ],
     });
@@ -128,7 +131,7 @@ export class SculptParts extends RunParts<SculptExample> {
    * even when the model has converged.
    */
   showState(state: LabState, beneath: LabState, ready: boolean, canPlay: boolean): void {
-    this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
+    this.#session.enabled = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
   }
 
   dispose(): void {

@@ -3,11 +3,12 @@ import type { SculptClient } from '../sculpt/client';
 import { samePose } from '../sculpt/ellipsoids';
 import type { Film } from '../sculpt/film';
 import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protocol';
+import type { Moments } from '../session/moments';
 import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
-import { UndoHistory } from './undo-history';
+import { type SavedMoment, UndoHistory } from './undo-history';
 
 /** The page's part of a saved state; the worker saves the model. Undo restores both. */
 interface PageState {
@@ -15,6 +16,13 @@ interface PageState {
   posed: boolean;
   film: Film | undefined;
   mark: (iteration: number) => HistoryMark;
+}
+
+export type SculptMoments = Moments<SavedMoment<PageState, SavedPose>>;
+
+/** Tests whether saved data, of a model and of the page, may be those of a state of this lab. */
+export function isSculptMoment(saved: Record<string, unknown>, page: Record<string, unknown>): boolean {
+  return Array.isArray(saved.start) && typeof saved.frame === 'number' && Array.isArray(page.names);
 }
 
 /** The settings that a scene (meshes and ellipsoids) of the Sculpt lab opens with. */
@@ -223,6 +231,19 @@ export class SculptSettings {
     });
   }
 
+  /** Returns the present state and those to undo and redo, for a session; undefined if they cannot be saved. */
+  moments(): Promise<SculptMoments | undefined> {
+    return this.#undo.moments();
+  }
+
+  /** Continues a session, whose scene has been adopted; the model does not move. */
+  async resume(moments: SculptMoments): Promise<void> {
+    this.#undo.adopt(moments);
+    await this.#restore(moments.now.saved, moments.now.page);
+    // Sends the surface, its measures and the state.
+    await this.#client.request('step', { count: 0 });
+  }
+
   travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
@@ -261,6 +282,11 @@ export class SculptSettings {
   }
 
   async #goTo(saved: SavedPose, page: PageState): Promise<void> {
+    await this.#restore(saved, page);
+    await this.#client.request('settle', undefined);
+  }
+
+  async #restore(saved: SavedPose, page: PageState): Promise<void> {
     this.#names = page.names;
     this.#posed = page.posed;
     this.#film = page.film;
@@ -272,7 +298,6 @@ export class SculptSettings {
     this.#params = ready.params;
     this.#pose = ready.pose;
     this.show();
-    await this.#client.request('settle', undefined);
   }
 
   #showPose(): void {

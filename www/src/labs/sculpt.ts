@@ -2,29 +2,24 @@ import { SculptClient } from '../sculpt/client';
 import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
-import type {
-  FrameContents,
-  FrameEvent,
-  OpenedScene,
-  ParamValues,
-  SculptQuantity,
-  WorkerEvent,
-} from '../sculpt/protocol';
+import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, WorkerEvent } from '../sculpt/protocol';
+import { isRecord } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import type { SculptViewOptions } from '../view/sculpture';
+import type { CameraPose } from '../view/viewport';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
 import { Filming } from './sculpt-filming';
-import { filmOf, linkOf, toHash } from './sculpt-link';
-import { SculptOpening, type SculptSource } from './sculpt-opening';
+import { filmOf, fromHash, linkOf, toHash } from './sculpt-link';
+import { type OpenedPose, SculptOpening, type SculptSource } from './sculpt-opening';
 import { type PartEvents, SculptParts } from './sculpt-parts';
 import { Posing } from './sculpt-posing';
 import { SculptResults } from './sculpt-results';
-import { SculptSettings } from './sculpt-settings';
+import { type SculptMoments, SculptSettings } from './sculpt-settings';
 
 /** The colourings of the surface for which the worker has to compute values at the vertices. */
 const QUANTITIES: readonly string[] = [
@@ -104,7 +99,8 @@ export class SculptLab extends RunLab<SculptExample> {
    * Displays a newly opened scene, with the settings of its example or link. Plays its film; without a film, with a
    * pose from a link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
    */
-  async #adopt(opened: OpenedScene, { name, example, linked }: SculptSource): Promise<void> {
+  async #adopt(opened: OpenedPose, { name, example, session, ...source }: SculptSource): Promise<void> {
+    const linked = session ? fromHash(session.hash) : source.linked;
     this.states.ready = true;
     this.#usual = { ...opened.params };
     for (const [name, value] of Object.entries(linked?.params ?? {}))
@@ -127,10 +123,26 @@ export class SculptLab extends RunLab<SculptExample> {
       ...preset?.view,
     });
     if (preset?.stages) this.#results.showStages(preset.stages);
+    if (opened.moments) return this.#resume(opened.moments, session?.content.view);
     await this.#settings.setFilm(film, 0);
     await this.client.request('show', this.#shown);
     const endless = film?.loop === true && prefersReducedMotion();
     await this.client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
+  }
+
+  /** Continues a session: shows its state and view, and does not run it. */
+  async #resume(moments: SculptMoments, view: unknown): Promise<void> {
+    if (isRecord(view)) this.ui.options.set(view.options as Partial<SculptViewOptions>);
+    await this.client.request('show', this.#shown);
+    await this.#settings.resume(moments);
+    if (isRecord(view)) this.ui.view.pose = view.camera as CameraPose;
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const moments = await this.paused(() => this.#settings.moments());
+    if (!moments) return undefined;
+    const view = { camera: this.ui.view.pose, options: this.ui.options.value };
+    return { ...(await import('../session/moments')).packMoments(moments), params: this.#settings.params, view };
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {

@@ -1,20 +1,24 @@
 import { exampleUrl } from '../examples';
+import type { Moments } from '../session/moments';
 import type { TrackClient } from '../track/client';
 import { IMAGES, type TrackExample } from '../track/examples';
 import { imageById } from '../track/presets';
-import type { ImageSource, OpenedImage as OpenedFilm, Setup } from '../track/protocol';
+import type { ImageSource, NamedBytes, OpenedImage as OpenedFilm, Setup } from '../track/protocol';
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedTrack, setupOf } from './track-link';
 import type { TrackParts } from './track-parts';
+import type { TrackMoment } from './track-settings';
 
 export type TrackSource = Source<TrackExample, LinkedTrack, ImageSource>;
 
 /** A 4D image opened in the Track lab, and the setup of its tracker. */
 export interface OpenedTrack extends OpenedFilm {
   setup: Setup;
+  /** The states of the session that is continued. */
+  moments: Moments<TrackMoment> | undefined;
 }
 
 /** Opens 4D images in the Track lab, and builds trackers of them. */
@@ -50,9 +54,15 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
     return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
-  protected async load({ name, example, linked }: TrackSource, source: ImageSource): Promise<OpenedTrack> {
-    const setup = setupOf(example, linked);
-    return { ...(await this.#client.request('open', { name, source, setup })), setup };
+  override filesOf(source: ImageSource): NamedBytes[] {
+    return 'files' in source ? source.files : [];
+  }
+
+  protected async load({ name, example, linked, session }: TrackSource, source: ImageSource): Promise<OpenedTrack> {
+    const moments = session && (await import('./track-session')).unpackTrack(session.content);
+    const saved = moments?.now.saved;
+    const setup = saved?.setup ?? setupOf(example, linked);
+    return { ...(await this.#client.request('open', { name, source, setup, saved })), setup, moments };
   }
 
   protected adopt(opened: OpenedTrack, source: TrackSource): Promise<void> {

@@ -16,6 +16,7 @@ import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
 import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
+import { SessionControls } from '../ui/session';
 import { TrackComparePanel } from '../ui/track-compare';
 import { TrackOptionControls } from '../ui/track-options';
 import { VolumeCurve } from '../ui/volume-curve';
@@ -62,6 +63,7 @@ export class TrackParts extends RunParts<TrackExample> {
   readonly #figure: FigurePanel<TrackVariant, TrackPreset>;
   readonly #saves: HTMLButtonElement[];
   readonly #sculpt: HTMLButtonElement;
+  readonly #session: SessionControls;
   readonly #thresholdHolder = h('div');
   #threshold: EdgeThreshold | undefined;
   /**
@@ -96,6 +98,7 @@ export class TrackParts extends RunParts<TrackExample> {
       wideButton(text('track.saveAnimation'), 'save-animation', () => events.onSave('animation')),
       wideButton(text('track.saveTable'), 'save-table', () => events.onSave('table')),
     ];
+    this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.options = new TrackOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -122,7 +125,7 @@ export class TrackParts extends RunParts<TrackExample> {
       results: [
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
-        this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt),
+        this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt, this.#session.element),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
       ],
@@ -177,6 +180,7 @@ export class TrackParts extends RunParts<TrackExample> {
     const idle = this.showRunState(state, beneath, ready);
     this.exports.enabled = idle && here;
     this.#sculpt.disabled = !idle || !here;
+    this.#session.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }

@@ -1,17 +1,20 @@
 import { toFailure } from '../channel';
 import type { ParamValues } from '../protocol';
+import type { Moments } from '../session/moments';
 import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Ready, SavedTrack, Setup, VolumeView } from '../track/protocol';
 import type { LabStates } from './lab-states';
 import type { TrackParts } from './track-parts';
 import type { TrackRecord, TrackResults } from './track-results';
-import { UndoHistory } from './undo-history';
+import { type SavedMoment, UndoHistory } from './undo-history';
 
 /** The page's part of a saved state; the worker saves the tracker. Undo restores both. */
 interface PageState {
   record: TrackRecord;
 }
+
+export type TrackMoment = SavedMoment<PageState, SavedTrack>;
 
 /**
  * Manages the setup of the tracker (preparation of the image, region, tracked component, parameters): changes it, sends
@@ -161,6 +164,17 @@ export class TrackSettings {
       this.#take(this.#setup, ready);
       this.#results.startOver();
     });
+  }
+
+  /** Returns the present state and those to undo and redo, for a session; undefined if they cannot be saved. */
+  moments(): Promise<Moments<TrackMoment> | undefined> {
+    return this.#undo.moments();
+  }
+
+  /** Continues a session, whose image has been adopted. */
+  async resume(moments: Moments<TrackMoment>): Promise<void> {
+    this.#undo.adopt(moments);
+    await this.#goTo(moments.now.saved, moments.now.page);
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {

@@ -1,4 +1,6 @@
 import { toFailure } from '../channel';
+import type { Moments } from '../session/moments';
+import { isRecord } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
@@ -9,6 +11,8 @@ import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/p
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { invert, sliceOrientations } from '../view/anatomy';
+import type { StageView } from '../view/stage';
+import type { TrackViewOptions } from '../view/track';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -18,7 +22,7 @@ import { type OpenedTrack, TrackOpening, type TrackSource } from './track-openin
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { saveTrack } from './track-saving';
-import { TrackSettings } from './track-settings';
+import { type TrackMoment, TrackSettings } from './track-settings';
 
 /**
  * The Track lab: a surface is tracked through the frames of a 4D image. Opening, settings, results and comparison are in
@@ -96,8 +100,8 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   /** Displays a newly opened image, with the settings of its example or link, and starts tracking. */
-  async #adopt(opened: OpenedTrack, { name, example, linked }: TrackSource): Promise<void> {
-    const { setup } = opened;
+  async #adopt(opened: OpenedTrack, { name, example, linked, session }: TrackSource): Promise<void> {
+    const { setup, moments } = opened;
     this.states.ready = true;
     this.#slices = opened.dims[2];
     this.#truth = opened.truth;
@@ -106,11 +110,28 @@ export class TrackLab extends RunLab<TrackExample> {
     this.#takeVolume(opened.volume, false);
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
+    if (moments) return this.#resume(moments, session?.content.view);
     this.ui.options.set({ ...viewOf(example), ...linked?.view });
     if (setup.box && this.#region) this.ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.ui.view.goTo(crosshair);
     await this.client.request('play', undefined);
+  }
+
+  /** Continues a session: shows its state and view, and does not run it. */
+  async #resume(moments: Moments<TrackMoment>, view: unknown): Promise<void> {
+    await this.#settings.resume(moments);
+    if (!isRecord(view)) return;
+    this.ui.options.set(view.options as Partial<TrackViewOptions>);
+    this.ui.view.pose = view as unknown as StageView;
+    if (typeof view.frame === 'number') this.#results.choose(view.frame);
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const moments = await this.paused(() => this.#settings.moments());
+    if (!moments) return undefined;
+    const view = { ...this.ui.view.pose, options: this.ui.options.value, frame: this.#results.frame };
+    return { ...(await import('./track-session')).packTrack(moments), view };
   }
 
   #takeVolume(volume: VolumeView, keep: boolean): void {

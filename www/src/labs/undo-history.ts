@@ -1,3 +1,4 @@
+import type { Moments } from '../session/moments';
 import { UndoStack } from './undo';
 
 /** Limits of the undo history: number of states, and their total size in bytes. */
@@ -61,6 +62,20 @@ export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
     this.#lastChange = { mergeKey: '', at: 0 };
     this.#stack.clear();
     this.#newest = undefined;
+    this.#notify();
+  }
+
+  /** Returns the present state and those to undo and redo; undefined if the worker could not save its model. */
+  async moments(): Promise<Moments<SavedMoment<Page, Saved>> | undefined> {
+    const now = await this.save();
+    await this.#ready;
+    return now && { now, ...this.#stack.entries };
+  }
+
+  /** Takes over the states of a session, whose present one the worker has restored. */
+  adopt({ now, ...entries }: Moments<SavedMoment<Page, Saved>>): void {
+    this.#stack.entries = entries;
+    this.#newest = now;
     this.#notify();
   }
 

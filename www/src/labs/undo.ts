@@ -52,6 +52,17 @@ export class UndoStack<State> {
     this.#future = [];
   }
 
+  /** All states to undo and to redo, the next one last in each list. */
+  get entries(): { undo: Checkpoint<State>[]; redo: Checkpoint<State>[] } {
+    return { undo: this.#past, redo: this.#future };
+  }
+
+  set entries({ undo, redo }) {
+    this.#past = [...undo];
+    this.#future = [...redo];
+    this.#trim();
+  }
+
   /** Adds the state before a change to the undo stack, and clears the redo stack. */
   push(checkpoint: Checkpoint<State>): void {
     this.#future = [];

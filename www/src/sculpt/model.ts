@@ -5,7 +5,7 @@ import type { Surface } from '../protocol';
 import { copySurface, emptyArrays, texturedSurface } from '../worker/surface-buffers';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
-import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';
+import type { Facts, MeshSource, Pose, SavedPose, SceneSource, SculptQuantity, Setup } from './protocol';
 import { computedMesh, readMesh } from './shapes';
 
 /**
@@ -77,6 +77,18 @@ export function firstModel(scene: Scene, setup: Setup): { model: Multiresolution
     }
   }
   throw refusal;
+}
+
+/** Builds the first model of a scene with the state of a saved one. */
+export function restoredModel(scene: Scene, setup: Setup, { state, start }: SavedPose): ReturnType<typeof firstModel> {
+  const model = buildModel(scene, start, setup);
+  try {
+    model.restore(state);
+  } catch (error) {
+    model.free();
+    throw error;
+  }
+  return { model, start };
 }
 
 /** Builds a model of a scene's meshes with its ellipsoids in the pose `start`; the caller then sets the target pose. */

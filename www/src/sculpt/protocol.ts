@@ -113,6 +113,8 @@ export interface FrameContents {
 /** A saved model, from which the worker can restore it; kept by the page for undo. */
 export interface SavedPose {
   state: Uint8Array;
+  /** The ellipsoids with which the model was built. */
+  start: Pose;
   iteration: number;
   /** Frame of the film, from 0, at which the model was saved. */
   frame: number;
@@ -143,8 +145,8 @@ export interface Facts {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens meshes and builds a model of them. On failure, the previous model stays in use. */
-  open: { body: { source: SceneSource; setup: Setup }; reply: OpenedScene };
+  /** Opens meshes and builds a model of them, or with `saved` restores one. On failure, the previous model stays in use. */
+  open: { body: { source: SceneSource; setup: Setup; saved?: SavedPose | undefined }; reply: OpenedScene };
   /** Builds a new model of the same meshes. On failure, the previous model stays in use. */
   rebuild: { body: Setup; reply: Ready };
   /** Loads a film and goes to one of its frames, at most the last, without playing it; undefined removes the film. */

@@ -10,6 +10,7 @@ import {
   factsOf,
   firstModel,
   freeScene,
+  restoredModel,
   type Scene,
   sceneFrom,
   surfaceOf,
@@ -103,13 +104,13 @@ class Session {
     else this.#begin();
   }
 
-  async #open({ source, setup }: Requests['open']['body']): Promise<OpenedScene> {
+  async #open({ source, setup, saved }: Requests['open']['body']): Promise<OpenedScene> {
     await this.#run.stop();
     await this.#recording.stop();
     const scene = await sceneFrom(source);
     const began = performance.now();
     try {
-      const { model, start } = firstModel(scene, setup);
+      const { model, start } = saved ? restoredModel(scene, setup, saved) : firstModel(scene, setup);
       const ready = this.#adopt(model, start, setup.pose);
       freeScene(this.#scene);
       this.#scene = scene;
@@ -314,7 +315,12 @@ class Session {
 
   #save(): SavedPose {
     this.#preview.end(this.#current());
-    return { state: this.#current().save(), iteration: this.#last?.iteration ?? 0, frame: this.#path.frame };
+    return {
+      state: this.#current().save(),
+      start: this.#start,
+      iteration: this.#last?.iteration ?? 0,
+      frame: this.#path.frame,
+    };
   }
 
   async #restore({ state, frame }: SavedPose): Promise<Ready> {

@@ -170,8 +170,14 @@ export interface ComparedTrack {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** Opens an image and builds a tracker of it. On failure, the previous image and tracker stay in use. */
-  open: { body: { name: string; source: ImageSource; setup: Setup }; reply: OpenedImage };
+  /**
+   * Opens an image and builds a tracker of it, or with `saved` restores a run of it. On failure, the previous image and
+   * tracker stay in use.
+   */
+  open: {
+    body: { name: string; source: ImageSource; setup: Setup; saved?: SavedTrack | undefined };
+    reply: OpenedImage;
+  };
   /** Builds a new tracker of the same image. On failure, the previous one stays in use. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };

@@ -86,6 +86,7 @@ function factorsOf({ spacing }: Volume, binning: number): [number, number, numbe
 export function buildTracker(
   volume: Volume,
   { box, at, params }: Setup,
+  state?: Uint8Array,
 ): { tracker: SurfaceTracker; suggested: number } {
   const { threshold, ...others } = params;
   const region = box && voxelsOf(box, invert(volume.affine), volume.dims);
@@ -95,6 +96,7 @@ export function buildTracker(
   try {
     const suggested = tracker.params.threshold;
     if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });
+    if (state) tracker.restore(state);
     return { tracker, suggested };
   } catch (error) {
     tracker.free();

@@ -78,7 +78,7 @@ class Session {
     cancelCompare: () => this.#comparison.stop(),
   };
 
-  async #open({ name, source, setup }: Requests['open']['body']): Promise<OpenedImage> {
+  async #open({ name, source, setup, saved }: Requests['open']['body']): Promise<OpenedImage> {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
@@ -88,7 +88,7 @@ class Session {
     try {
       made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
-      const ready = this.#adopt(made, setup);
+      const ready = this.#adopt(made, setup, saved);
       const { dims, spacing } = original;
       this.#freeImage();
       this.#loaded = { name, original, spec, preparedVolume: made, preparation: setup.preparation };
@@ -125,14 +125,14 @@ class Session {
     }
   }
 
-  #adopt(volume: Volume, setup: Setup): Omit<Ready, 'volume'> {
-    const { tracker, suggested } = buildTracker(volume, setup);
+  #adopt(volume: Volume, setup: Setup, saved?: SavedTrack): Omit<Ready, 'volume'> {
+    const { tracker, suggested } = buildTracker(volume, setup, saved?.state);
     this.#tracker?.free();
     this.#tracker = tracker;
     this.#setup = setup;
     this.#suggested = suggested;
     this.#boundaryState = undefined;
-    this.#setProgress(0, false);
+    this.#setProgress(saved?.iteration ?? 0, saved?.done ?? false);
     return this.#ready();
   }
 

@@ -9,8 +9,8 @@ export { nameOf } from './folders';
 export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.dicom,.ima,.tif,.tiff';
 
 /**
- * Creates a button with the given label that chooses one file, or several that belong together; by default files of
- * volumes.
+ * Creates a button with the given label that chooses one file, or several that belong together, of the endings in `accept`,
+ * by default those of volumes, or a session.
  */
 export function fileChooser(
   onFiles: (files: File[]) => void,
@@ -18,7 +18,7 @@ export function fileChooser(
   label = text('controls.openFile'),
 ): HTMLElement {
   const id = uniqueId('file');
-  const input = h('input', { type: 'file', id, multiple: true, accept, class: 'visually-hidden' });
+  const input = h('input', { type: 'file', id, multiple: true, accept: `${accept},.zip`, class: 'visually-hidden' });
   input.addEventListener('change', () => {
     const files = [...(input.files ?? [])];
     // Makes choosing the same file again a change.

@@ -1,7 +1,7 @@
 import { type TextKey, text } from '../texts';
 import type { DisplayWindow } from '../view/slicing';
-import { h, uniqueId } from './dom';
-import { choice } from './view-options';
+import { h } from './dom';
+import { labelFor, selectFrom } from './field';
 
 /** The part of the surface that is cut away in the 3D view: the patient's right, left, front, back, top or bottom. */
 export type CutSide = 'none' | 'R' | 'L' | 'A' | 'P' | 'S' | 'I';
@@ -68,18 +68,14 @@ export class SliceBar {
     this.#window = suggested;
     this.#presets = presetsFor(range, suggested);
     const choices = [...this.#presets, { name: 'custom', label: text('slices.custom') }];
-    const preset = choice(
-      text('slices.contrast'),
-      'window',
+    this.#preset = selectFrom(
       choices.map(({ name, label }) => ({ value: name, label })),
-      'suggested',
-      (name) => this.#choose(name),
+      { 'data-view': 'window', onchange: () => this.#choose(this.#preset.value) },
     );
-    this.#preset = preset.select;
-    const [width, level] = [this.#field(text('slices.width'), 'width'), this.#field(text('slices.level'), 'level')];
-    [this.#width, this.#level] = [width.input, level.input];
-    const cut = choice(text('slices.cut'), 'cut', SIDES, 'none', onCut);
-    this.#cut = cut.select;
+    [this.#width, this.#level] = [this.#number('width'), this.#number('level')];
+    this.#cut = selectFrom(SIDES, { 'data-view': 'cut', onchange: () => onCut(this.#cut.value as CutSide) });
+    const placed = (label: string, control: HTMLElement) =>
+      h('span', { class: 'placement' }, labelFor(control, label), control);
     this.#reset = h('button', { type: 'button', disabled: true, onclick: onResetZoom }, text('slices.resetZoom'));
     this.element = h(
       'div',
@@ -92,11 +88,11 @@ export class SliceBar {
         h(
           'div',
           { class: 'slice-options' },
-          preset.element,
-          width.element,
-          level.element,
+          placed(text('slices.contrast'), this.#preset),
+          placed(text('slices.width'), this.#width),
+          placed(text('slices.level'), this.#level),
           h('label', { class: 'check' }, this.#adjusting, text('slices.adjust')),
-          cut.element,
+          placed(text('slices.cut'), this.#cut),
           this.#reset,
         ),
         this.#error,
@@ -134,11 +130,9 @@ export class SliceBar {
     this.#preset.value = preset?.name ?? 'custom';
   }
 
-  #field(label: string, name: string): { element: HTMLElement; input: HTMLInputElement } {
-    const id = uniqueId(name);
-    const input = h('input', { type: 'number', id, step: 'any', inputmode: 'decimal', 'data-slices': name });
-    input.addEventListener('change', () => this.#enter());
-    return { element: h('span', { class: 'placement' }, h('label', { for: id }, label), input), input };
+  #number(name: string): HTMLInputElement {
+    const attributes = { type: 'number', step: 'any', inputmode: 'decimal', 'data-slices': name };
+    return h('input', { ...attributes, onchange: () => this.#enter() });
   }
 
   #choose(name: string): void {

@@ -9,7 +9,7 @@ import type { PictureSubject } from '../ui/pictures';
 import { EllipsoidHandles, type HandleMode } from './handles';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
-import { Viewport } from './viewport';
+import { type CameraPose, Viewport } from './viewport';
 
 /** Distance between the centres of adjacent meshes shown in a row, relative to their width. */
 const ROW_SPACING = 1.25;
@@ -104,6 +104,15 @@ export class SculptureView {
         event,
         this.#viewport.directions().map((direction) => direction.toArray()),
       );
+  }
+
+  /** Pose of the camera. */
+  get pose(): CameraPose {
+    return this.#viewport.pose;
+  }
+
+  set pose(pose: CameraPose) {
+    this.#viewport.pose = pose;
   }
 
   /**

@@ -10,8 +10,15 @@ import { SlicePanel } from './panel';
 import { diverging, QUANTITIES, quantityTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
-import { Viewport } from './viewport';
+import { type CameraPose, Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
+
+/** What the user looks at in a {@link Stage}. */
+export interface StageView {
+  camera: CameraPose;
+  /** World position of the crosshair. */
+  crosshair: Vec3;
+}
 
 /** The 3D view and the three slices of a volume in the Extract lab, synchronised by a common crosshair. */
 export class Stage {
@@ -159,6 +166,16 @@ export class Stage {
     const scene = this.#scene;
     if (!scene) return;
     this.#moveTo(nearestVoxel(toWorld(scene.inverse, point), scene.volume.dims));
+  }
+
+  /** Pose of the camera and position of the crosshair, to return to. */
+  get view(): StageView {
+    return { camera: this.#viewport.pose, crosshair: this.crosshair };
+  }
+
+  set view({ camera, crosshair }: StageView) {
+    this.goTo(crosshair);
+    this.#viewport.pose = camera;
   }
 
   /** World position of the crosshair, the voxel in which the three slices intersect. */

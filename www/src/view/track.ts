@@ -13,6 +13,7 @@ import { Lines } from './lines';
 import { SlicePanel } from './panel';
 import { RegionGrips, regionEdges } from './region';
 import { greysOf, pictureSize, projectSegments } from './slicing';
+import type { StageView } from './stage';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
@@ -186,6 +187,16 @@ export class TrackView {
 
   goToVoxel(voxel: Vec3): void {
     this.#moveTo(voxel);
+  }
+
+  /** Pose of the camera and position of the crosshair, to return to. */
+  get pose(): StageView {
+    return { camera: this.#viewport.pose, crosshair: this.crosshair.point };
+  }
+
+  set pose({ camera, crosshair }: StageView) {
+    this.goTo(crosshair);
+    this.#viewport.pose = camera;
   }
 
   /** The crosshair, where the three slices intersect: as a world point and as a voxel index. */

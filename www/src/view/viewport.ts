@@ -32,6 +32,13 @@ const KEY_ZOOM = 1.12;
  */
 const CLICK_TOLERANCE = 4;
 
+/** Pose of the orbit camera in a square view, in the scene's coordinates. */
+export interface CameraPose {
+  position: Vec3;
+  /** The point that the camera looks at and rotates around. */
+  target: Vec3;
+}
+
 /** A 3D view: a canvas, an orbit camera for mouse, touch and keyboard, and lights attached to the camera. */
 export class Viewport {
   readonly canvas: HTMLCanvasElement;
@@ -255,6 +262,22 @@ export class Viewport {
     const target = new Vector3(...point).applyMatrix4(this.#world.matrixWorld);
     this.#camera.position.sub(this.#controls.target).add(target);
     this.#controls.target.copy(target);
+    this.#controls.update();
+    this.invalidate();
+  }
+
+  /** Pose of the orbit camera; in a view of another shape it shows the same objects. */
+  get pose(): CameraPose {
+    const { target } = this.#controls;
+    const position = this.#camera.position.clone().sub(target).multiplyScalar(this.#cappedAspect).add(target);
+    return { position: position.toArray(), target: target.toArray() };
+  }
+
+  set pose({ position, target }: CameraPose) {
+    this.lookThrough(undefined);
+    this.#controls.target.fromArray(target);
+    this.#camera.position.fromArray(position).sub(this.#controls.target).divideScalar(this.#cappedAspect);
+    this.#camera.position.add(this.#controls.target);
     this.#controls.update();
     this.invalidate();
   }

@@ -3,13 +3,14 @@
  * coloured.
  */
 import { DeformableModel, type Volume } from 'vesicle';
-import type { Setup, VertexQuantity } from '../protocol';
+import type { SavedRun, Setup, VertexQuantity } from '../protocol';
 import { otsu } from '../threshold';
 import { HISTOGRAM_BINS } from './volumes';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
 
-function startOf({ start }: Setup, iso: number): Options['start'] {
+/** Returns the initial surface of a set-up, whose iso value is `iso`. */
+export function startOf({ start }: Setup, iso: number): Options['start'] {
   switch (start.kind) {
     case 'contour':
     case 'enclosing':
@@ -38,6 +39,8 @@ export function modelOptions(volume: Volume, setup: Setup) {
 /** Builds the model of a set-up with the attractors in it; `make` is called without them. */
 export function withAttractors(setup: Setup, make: () => DeformableModel): DeformableModel {
   const model = make();
+  // Setting none would wake the model, which then takes more iterations from a contour.
+  if (setup.attractors.length === 0) return model;
   try {
     model.setAttractors(setup.attractors);
   } catch (error) {
@@ -49,6 +52,18 @@ export function withAttractors(setup: Setup, make: () => DeformableModel): Defor
 
 export function buildModel(volume: Volume, setup: Setup): DeformableModel {
   return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup), volume }));
+}
+
+/** Builds a model with the state of a saved run; its own initial surface is replaced at once. */
+export function restoredModel(volume: Volume, { state, levels }: SavedRun): DeformableModel {
+  const model = new DeformableModel({ volume, levels, start: 'enclosing' });
+  try {
+    model.restore(state);
+  } catch (error) {
+    model.free();
+    throw error;
+  }
+  return model;
 }
 
 /**

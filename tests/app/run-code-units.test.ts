@@ -1,0 +1,142 @@
+/** Runs of the Extract lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
+import { mkdir, mkdtemp, readFile, rm, symlink, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import init, { Volume } from '../../pkg/index.js';
+import { at, must } from '../../scripts/shell.mjs';
+import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
+import { uniform } from '../../www/src/random';
+import { literal } from '../../www/src/worker/code';
+import { startWorker } from './worker-in-node';
+
+const worker = await startWorker<Requests>(() => import('../../www/src/worker'));
+await worker.request('hello', undefined);
+
+/** Returns a file with a tooth, of few voxels, and the source that the lab opens. */
+async function tooth() {
+  const volume = Volume.parse(new Uint8Array(await readFile(at('www/public/data/tooth.nrrd'))));
+  const bytes = volume.pyramid(4).at(-1)?.toBytes('nrrd') ?? new Uint8Array();
+  return { name: 'tooth.nrrd', bytes, source: (): VolumeSource => ({ files: [{ name: 'tooth.nrrd', bytes }] }) };
+}
+
+/** Returns linked rings, which the lab computes, as the file that the lab saves. */
+async function rings() {
+  const source = (): VolumeSource => ({ shape: 'linked rings' });
+  await worker.request('load', { name: 'linked rings', source: source(), setup: SETUP });
+  return { name: 'linked rings.nii', bytes: await worker.request('volume', undefined), source };
+}
+
+let folder = '';
+beforeAll(async () => {
+  await init();
+  folder = await mkdtemp(join(tmpdir(), 'run-code-'));
+  await mkdir(join(folder, 'node_modules'));
+  await symlink(at('pkg'), join(folder, 'node_modules/vesicle'));
+});
+afterAll(() => rm(folder, { recursive: true }));
+
+const SETUP: Setup = { start: { kind: 'contour' }, levels: 1, edge: undefined, params: {}, attractors: [] };
+
+/** What a user may do between two steps, each with random values. */
+function actions(random: () => number, bounds: { middle: number[]; size: number }) {
+  const pick = <T>(list: readonly T[]): T => list[Math.floor(random() * list.length)] as T;
+  const point = () => bounds.middle.map((x) => x + (random() - 0.5) * bounds.size) as [number, number, number];
+  const saves: SavedRun[] = [];
+  const attractor = (): Attractor => ({ point: point(), strength: random(), radius: (0.1 + random()) * bounds.size });
+  const setParams = () =>
+    worker.request(
+      'setParams',
+      pick([
+        { rigidity: random() },
+        { stiffness: 0.1 * random(), damping: random() },
+        { isoForce: -0.5 - 2 * random() },
+        { restLength: pick(['zero', 'mean']) },
+        { integrator: pick(['implicit', 'euler', 'runge-kutta']) },
+        { adaptivity: pick([0, 0.5, 1]) },
+        { gradientTangent: random() - 0.5 },
+      ]),
+    );
+  const start = (): StartShape =>
+    pick<() => StartShape>([
+      () => ({ kind: 'contour' }),
+      () => ({ kind: 'enclosing' }),
+      () => ({ kind: 'isosurface' }),
+      () => ({ kind: 'bubbles', count: 2 }),
+      () => ({ kind: 'sphere', center: point(), radius: 0.2 * bounds.size }),
+    ])();
+  return {
+    step: () => worker.request('step', { count: 1 + Math.floor(4 * random()) }),
+    setParams,
+    setAttractors: () => worker.request('setAttractors', random() < 0.3 ? [] : [attractor(), attractor()]),
+    seed: () => worker.request('seed', undefined),
+    save: async () => saves.push(await worker.request('save', undefined)),
+    restore: async () => saves.length > 0 && worker.request('restore', pick(saves)),
+    rebuild: () =>
+      worker.request('rebuild', {
+        ...{ start: start(), levels: Math.floor(2 * random()), edge: undefined },
+        ...{ params: { rigidity: random() }, attractors: random() < 0.5 ? [] : [attractor()] },
+      }),
+    refused: () => worker.request('setParams', { rigidity: -1, isoForce: 1 }).catch(() => undefined),
+    // While the model runs, at an iteration that only the worker knows.
+    setParamsOfRun: async () => {
+      await worker.request('play', undefined);
+      await setParams();
+      await worker.request('pause', undefined);
+    },
+  };
+}
+
+/** Opens a volume, acts at random, and writes code of the run; returns the surface. */
+async function interactiveRun(seed: number, source: VolumeSource, file: string): Promise<Uint8Array> {
+  const random = uniform(seed);
+  const { volume } = await worker.request('load', { name: file, source, setup: SETUP });
+  const size = Math.min(...volume.dims.map((n, axis) => n * (volume.spacing[axis] ?? 1)));
+  const middle = [0, 1, 2].map((row) =>
+    [0, 1, 2, 3].reduce(
+      (sum, column) => sum + (volume.affine[4 * column + row] ?? 0) * (column < 3 ? (volume.dims[column] ?? 0) / 2 : 1),
+      0,
+    ),
+  );
+  const can = Object.values(actions(random, { middle, size }));
+  for (let i = 0; i < 14; i++) {
+    await can[Math.floor(random() * can.length)]?.();
+    await can[0]?.();
+  }
+  await writeFile(join(folder, `${seed}.mjs`), await worker.request('code', { files: [file] }));
+  return worker.request('export', { format: 'ply' });
+}
+
+/** Runs the code of each run in a Node of its own, and returns the surfaces. */
+async function repeated(file: string, seeds: number[]): Promise<Uint8Array[]> {
+  const program = `import { readFile, writeFile } from 'node:fs/promises';
+    for (const seed of ${JSON.stringify(seeds)}) {
+      const { run } = await import('./' + seed + '.mjs');
+      await writeFile(seed + '.ply', await run(new Uint8Array(await readFile(${JSON.stringify(file)}))));
+    }`;
+  await writeFile(join(folder, 'all.mjs'), program);
+  await must(process.execPath, ['all.mjs'], { cwd: folder });
+  return Promise.all(seeds.map((seed) => readFile(join(folder, `${seed}.ply`))));
+}
+
+const SEEDS = Array.from({ length: 10 }, (_, index) => index + 1);
+
+test.each([
+  ['a file', tooth],
+  ['a computed volume', rings],
+])('the code of random runs on %s gives the same surfaces', async (_, open) => {
+  const { name, bytes, source } = await open();
+  await writeFile(join(folder, name), bytes);
+  const made: Uint8Array[] = [];
+  for (const seed of SEEDS) made.push(await interactiveRun(seed, source(), name));
+  const again = await repeated(name, SEEDS);
+  for (const [index, seed] of SEEDS.entries())
+    expect(Buffer.compare(again[index] ?? new Uint8Array(), made[index] ?? new Uint8Array()), `seed ${seed}`).toBe(0);
+  expect(new Set(made.map(({ length }) => length)).size).toBeGreaterThan(5);
+});
+
+test('values are written so that they are read as the same, whatever they contain', () => {
+  const value = { a: [0.1 + 0.2, -0, 1e-300, 5], 'b*/': "it's\n`#{x}`", c: true, d: Number.NaN, e: {} };
+  // biome-ignore lint/security/noGlobalEval: what the user does with the code
+  expect(eval(`(${literal(value)})`)).toStrictEqual(value);
+});

@@ -1,0 +1,144 @@
+/** Sessions of the labs: saved, and opened in a new browser, they go on as if nothing had been in between. */
+import { readFile } from 'node:fs/promises';
+import type { Page } from 'playwright-core';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import init, { Volume } from '../../pkg/index.js';
+import { at } from '../../scripts/shell.mjs';
+import { readSession } from '../../www/src/session/file';
+import { type App, afterRun, drop, open, openApp, reach } from './browser';
+
+let app: App;
+/** A file of the user's: a tooth, of few voxels. */
+let tooth: { name: string; bytes: Uint8Array };
+
+beforeAll(async () => {
+  await init();
+  const volume = Volume.parse(new Uint8Array(await readFile(at('www/public/data/tooth.nrrd'))));
+  tooth = { name: 'tooth.nrrd', bytes: volume.pyramid(4).at(-1)?.toBytes('nrrd') ?? new Uint8Array() };
+  app = await openApp();
+});
+afterAll(async () => {
+  expect(app.complaints).toEqual([]);
+  await app.close();
+});
+
+/** Clicks what saves a file, and returns its content. */
+async function saved(page: Page, selector: string): Promise<Uint8Array> {
+  const download = page.waitForEvent('download');
+  await page.click(selector);
+  return new Uint8Array(await readFile(await (await download).path()));
+}
+
+const surface = (page: Page) => saved(page, '[data-export=ply]');
+const session = (page: Page) => saved(page, '[data-action=session]');
+const asFile = (bytes: Uint8Array) => [{ name: 'a.vesicle.zip', bytes }];
+const banner = (page: Page) => expect.poll(() => page.textContent('.banner:not([hidden]) [data-error]'));
+
+/** Opens the app in a new browser at a lab, calls `work`, and closes the browser. */
+async function elsewhere(hash: string, work: (page: Page) => Promise<void>): Promise<void> {
+  const another = await openApp(undefined, `#${hash}`);
+  try {
+    await reach(another.page, 'running', 'done');
+    await work(another.page);
+    expect(another.complaints).toEqual([]);
+  } finally {
+    await another.close();
+  }
+}
+
+/** Opens files that another lab takes, and waits until it has, in a state that is not running. */
+async function reopened(page: Page, files: { name: string; bytes: Uint8Array }[], lab: string): Promise<void> {
+  await drop(page, files);
+  await page.waitForSelector(`#lab.${lab}[data-state=paused], #lab.${lab}[data-state=done]`);
+}
+
+test('a run that was interrupted opens in a new browser as it was, and ends at the same bits', async () => {
+  const { page } = app;
+  await open(app, 'extract?example=linked-rings&v=2&p.iso=100');
+  await reach(page, 'done');
+  await page.press('canvas', 'r');
+  await reach(page, 'paused');
+  for (const key of ['d', 's', 's']) await page.press('canvas', key);
+  await page.getByLabel('Rigidity').first().fill('0.3');
+  await page.getByLabel('Rigidity').first().press('Enter');
+  await page.press('canvas', 's');
+  await page.check('[data-view=edges]');
+  await page.selectOption('[data-view=color]', 'mean curvature');
+  await page.press('canvas', 'ArrowLeft');
+  const file = await session(page);
+  const before = await surface(page);
+  await elsewhere('track?example=ventricle', async (other) => {
+    await reopened(other, asFile(file), 'extract');
+    expect(Buffer.compare(await surface(other), before)).toBe(0);
+    // All that is in a session: state, undo, reports, view.
+    expect(await readSession(await session(other))).toEqual(await readSession(file));
+    for (const one of [page, other]) await afterRun(one, () => one.press('canvas', ' '));
+    expect(Buffer.compare(await surface(other), await surface(page))).toBe(0);
+  });
+});
+
+test('undo goes back beyond the opening of a session', async () => {
+  const { page } = app;
+  await open(app, 'extract?example=linked-rings&v=2');
+  await reach(page, 'done');
+  const before = await surface(page);
+  await afterRun(page, () => page.getByLabel('Rigidity').first().fill('0.4'));
+  const file = await session(page);
+  await open(app, 'extract?example=sponge&v=2');
+  await reach(page, 'running', 'done');
+  await reopened(page, asFile(file), 'extract');
+  await page.click('[data-transport=undo]');
+  await expect.poll(() => page.getByLabel('Rigidity').first().inputValue()).toBe('0.1');
+  expect(Buffer.compare(await surface(page), before)).toBe(0);
+});
+
+test('a session asks for a file of the user’s, and refuses one with other content', async () => {
+  const { page } = app;
+  await open(app, 'extract?example=linked-rings&v=2');
+  await reach(page, 'done');
+  await afterRun(page, () => drop(page, [tooth]));
+  const file = await session(page);
+  const before = await surface(page);
+  await open(app, 'track?example=ventricle');
+  await reach(page, 'running', 'done');
+  await drop(page, asFile(file));
+  await page.waitForSelector('#lab.extract');
+  await banner(page).toContain('Open tooth.nrrd from your disk');
+  await drop(page, [{ name: 'tooth.nrrd', bytes: tooth.bytes.slice(1) }]);
+  await banner(page).toContain('made with another file tooth.nrrd');
+  await drop(page, [{ name: 'other.nrrd', bytes: tooth.bytes.slice(1) }]);
+  await banner(page).toContain('It needs the file tooth.nrrd');
+  await drop(page, [{ ...tooth, name: 'renamed.nrrd' }]);
+  await page.waitForSelector('.banner[hidden]', { state: 'attached' });
+  await reach(page, 'done');
+  expect(await page.textContent('.facts')).toContain('tooth.nrrd');
+  expect(Buffer.compare(await surface(page), before)).toBe(0);
+});
+
+test('a session with its data opens anywhere, and one that cannot be read changes nothing', async () => {
+  const { page } = app;
+  await page.check('[data-session=included]');
+  const file = await session(page);
+  const before = await surface(page);
+  await elsewhere('extract?example=linked-rings&v=2', async (other) => {
+    await afterRun(other, () => other.getByLabel('Rigidity').first().fill('0.4'));
+    const own = await surface(other);
+    await drop(other, asFile(file.slice(0, -100)));
+    await banner(other).toContain('It is damaged, or no ZIP');
+    await other.click('.banner button');
+    expect(Buffer.compare(await surface(other), own)).toBe(0);
+    await reopened(other, asFile(file), 'extract');
+    await expect.poll(() => other.textContent('.facts')).toContain('tooth.nrrd');
+    expect(Buffer.compare(await surface(other), before)).toBe(0);
+  });
+});
+
+test('a file of version 1 opens', async () => {
+  const { page } = app;
+  const bytes = new Uint8Array(await readFile(at('tests/app/data/version-1.vesicle.zip')));
+  const { content } = await readSession(bytes);
+  await reopened(page, asFile(bytes), 'extract');
+  const now = (await readSession(await session(page))).content;
+  expect(now.state).toEqual(content.state);
+  expect(now.undo).toEqual(content.undo);
+});

@@ -1,0 +1,111 @@
+import type { Session, SourceFile } from '../session/file';
+import { isSession } from '../session/recognise';
+import { text } from '../texts';
+import { readFiles } from '../ui/files';
+import type { ErrorBanner, StatusLine } from '../ui/status';
+import type { LAB_IDS } from './address';
+import type { LabStates } from './lab-states';
+import type { Handoff, OpenInLab } from './labs';
+import type { Opening, Source } from './opening';
+import type { Saving } from './saving';
+
+/** A lab, as its sessions need it. */
+interface SessionLab {
+  id: (typeof LAB_IDS)[number];
+  ui: { banner: ErrorBanner; status: StatusLine; saving: Saving };
+  states: LabStates;
+  // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
+  opening: Opening<any, any, any, any>;
+  passOn: OpenInLab;
+  // biome-ignore lint/suspicious/noExplicitAny: as above
+  address: (source: Source<any, any, any>) => string;
+  content: () => Promise<Record<string, unknown> | undefined>;
+}
+
+const format = () => import('../session/file');
+
+/** Saves a lab's sessions as files, and opens such files, in the right lab and with the right data. */
+export class Sessions {
+  readonly #lab: SessionLab;
+  /** The session that waits until the user opens its data. */
+  #waiting: Session | undefined;
+
+  constructor(lab: SessionLab) {
+    this.#lab = lab;
+  }
+
+  /** Opens files: a session, the data that one waits for, or other data. */
+  async files(files: File[]): Promise<void> {
+    const [file] = files;
+    const { states, opening } = this.#lab;
+    try {
+      if (file && files.length === 1 && (await isSession(file))) await this.#read(file);
+      else if (this.#waiting) await this.#complete(this.#waiting, files);
+      else await opening.files(files);
+    } catch (error) {
+      states.fail(text('labs.openFailed', { name: file?.name ?? '' }), error);
+    }
+  }
+
+  /** Opens a session that another lab passes on; returns undefined if it passes on something else. */
+  passedOn({ session }: Handoff): Promise<void> | undefined {
+    return session && this.#open(session);
+  }
+
+  /** Forgets the session that waits for its data, if one does. */
+  forget(): void {
+    this.#waiting = undefined;
+  }
+
+  /** Saves the session as a file; `included`: with its data. */
+  async save(included: boolean): Promise<void> {
+    const { id: lab, opening, ui, states, address, content } = this.#lab;
+    const { source } = opening;
+    if (!source || !states.canChange) return;
+    try {
+      ui.status.say(text('sessions.saving'));
+      const [{ describe, writeSession }, body, data] = await Promise.all([format(), content(), source.load()]);
+      if (!body) throw new Error(text('sessions.notSaved'));
+      const files = await describe(opening.filesOf(data), included || source.isMade === true);
+      const example: string | undefined = source.example?.id;
+      const from = { name: source.name, files, ...(example !== undefined && { example }) };
+      const bytes = await writeSession({ lab, hash: address(source), source: from, content: body });
+      ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
+    } catch (error) {
+      states.fail(text('sessions.saveFailed'), error);
+    }
+  }
+
+  async #read(file: File): Promise<void> {
+    const { readSession } = await format();
+    const session = await readSession(new Uint8Array(await file.arrayBuffer()));
+    if (session.lab === this.#lab.id) await this.#open(session);
+    else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
+  }
+
+  /** Opens a session, or asks for its data if it has none. */
+  async #open(session: Session): Promise<void> {
+    const { opening, ui } = this.#lab;
+    const { example, files, name } = session.source;
+    this.#waiting = undefined;
+    if (files.every(({ content }) => content)) return opening.session(session, files.map(fileOf));
+    if (example !== undefined) return opening.session(session, []);
+    if (!opening.source) await opening.default();
+    this.#waiting = session;
+    ui.banner.show(text('sessions.needsData'), text('sessions.needsDataHint', { name }));
+  }
+
+  /** Opens the session that waits for its data, if these are among `files`. */
+  async #complete(session: Session, files: File[]): Promise<void> {
+    const { matching } = await format();
+    const named = await readFiles(files);
+    const found = await matching(session.source.files, named);
+    this.#waiting = undefined;
+    await this.#lab.opening.session(
+      session,
+      found.map(({ name, bytes }) => new File([bytes as BlobPart], name)),
+    );
+  }
+}
+
+const fileOf = ({ name, content }: SourceFile) => new File([content as BlobPart], name);

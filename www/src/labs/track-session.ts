@@ -1,0 +1,34 @@
+/** The Track lab's own part of a session. */
+import { type Moments, mapMoments, packMoments, unpackMoments } from '../session/moments';
+import { isRecord } from '../session/recognise';
+import type { TrackedFrame } from '../track/protocol';
+import type { TrackMoment } from './track-settings';
+
+/** Returns saved states as plain data, in which all share one list of tracked frames. */
+export function packTrack(moments: Moments<TrackMoment>): Record<string, unknown> {
+  const frames: TrackedFrame[] = [];
+  const indexOf = (frame: TrackedFrame) => {
+    const known = frames.indexOf(frame);
+    return known === -1 ? frames.push(frame) - 1 : known;
+  };
+  const flat = ({ saved, page: { record } }: TrackMoment) => ({
+    saved,
+    page: { mark: record.mark, closing: record.closing, frames: record.frames.map(indexOf) },
+  });
+  return { ...packMoments(mapMoments(moments, flat)), frames };
+}
+
+/** Returns the saved states in the content of a session; throws an Error if they are damaged. */
+export function unpackTrack(content: Record<string, unknown>): Moments<TrackMoment> {
+  const all = Array.isArray(content.frames) ? (content.frames as TrackedFrame[]) : [];
+  type Flat = {
+    saved: TrackMoment['saved'];
+    page: Omit<TrackMoment['page']['record'], 'frames'> & { frames: number[] };
+  };
+  const isMoment = ({ setup, done }: Record<string, unknown>, { frames }: Record<string, unknown>) =>
+    isRecord(setup) && typeof done === 'boolean' && Array.isArray(frames) && frames.every((index) => all[index]);
+  return mapMoments(unpackMoments<Flat>(content, isMoment), ({ saved, page: { frames, ...page } }) => ({
+    saved,
+    page: { record: { ...page, frames: frames.flatMap((index) => all[index] ?? []) } },
+  }));
+}

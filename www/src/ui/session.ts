@@ -1,0 +1,47 @@
+import { text } from '../texts';
+import { h, uniqueId, wideButton } from './dom';
+
+/** The user's wishes that {@link SessionControls} reports. */
+export interface SessionEvents {
+  /** Saves a session; `included`: with the data that it was made from. */
+  onSaveSession: (included: boolean) => void;
+  /** Copies the run as code; without it, the lab has none. */
+  onCopyCode?: () => void;
+  /** Saves the volume as a file that the code reads; without it, the lab has none. */
+  onSaveVolume?: () => void;
+}
+
+/** Controls that save the session, and copy the run as code. */
+export class SessionControls {
+  readonly element: HTMLElement;
+  readonly #buttons: HTMLButtonElement[] = [];
+
+  constructor({ onSaveSession, onCopyCode, onSaveVolume }: SessionEvents) {
+    const included = h('input', { type: 'checkbox', 'data-session': 'included' });
+    this.element = h(
+      'div',
+      { class: 'session' },
+      ...this.#action('session', text('sessions.save'), text('sessions.saveHelp'), () =>
+        onSaveSession(included.checked),
+      ),
+      h('label', { class: 'check' }, included, text('sessions.include')),
+      ...(onCopyCode ? this.#action('code', text('sessions.copyCode'), text('sessions.copyCodeHelp'), onCopyCode) : []),
+      ...(onSaveVolume
+        ? this.#action('volume', text('sessions.saveVolume'), text('sessions.saveVolumeHelp'), onSaveVolume)
+        : []),
+    );
+  }
+
+  set enabled(enabled: boolean) {
+    for (const button of this.#buttons) button.disabled = !enabled;
+  }
+
+  #action(name: string, label: string, help: string, onclick: () => void): HTMLElement[] {
+    const id = uniqueId('session');
+    const button = wideButton(label, name, onclick);
+    button.setAttribute('aria-describedby', id);
+    button.disabled = true;
+    this.#buttons.push(button);
+    return [button, h('p', { class: 'help', id }, help)];
+  }
+}

@@ -1,0 +1,68 @@
+/** Writes the log of a run as JavaScript that repeats the run to the same bits with the package alone. */
+import type { ParamValues, Setup } from '../protocol';
+import { text } from '../texts';
+import { startOf } from './models';
+import { Refusal } from './refusal';
+import type { RunLog } from './run-log';
+
+/** What the code of a run depends on besides its log. */
+export interface CodeContext {
+  /** Name of the file that the volume is read from and, if that is a header, of the file with its voxels. */
+  files: readonly string[];
+  /** Version of the library that made the run. */
+  version: string;
+  /** Default parameters of the method, which the code omits. */
+  defaults: ParamValues;
+}
+
+/**
+ * Returns the code of an ES module for Node and browsers, which exports a function that repeats a run of the deformable
+ * model.
+ */
+export function toCode({ setup, calls }: RunLog<Setup>, { files, version, defaults }: CodeContext): string {
+  const { levels, edge, attractors, params } = setup;
+  const chosen = Object.entries(params).filter(([name, value]) => !Object.is(defaults[name], value));
+  const start = startOf(setup, Number(params.iso));
+  const options = { start, levels, ...(edge !== undefined && { edge }), params: Object.fromEntries(chosen) };
+  const [given, read] = files.length > 1 ? ['bytes, data', 'bytes, { data }'] : ['bytes', 'bytes'];
+  const names = files.map(literal).join(' and ');
+  const lines = [
+    'await init();',
+    `const model = new DeformableModel({ volume: Volume.parse(${read}), ${literal(options).slice(2)});`,
+    ...(attractors.length > 0 ? [`model.setAttractors(${literal(attractors)});`] : []),
+    ...calls.map(lineOf),
+    `return model.mesh.toBytes('ply');`,
+  ];
+  return [
+    `// A run of Vesicle ${version}, to be repeated with the same version of the package for the same bits.`,
+    `import init, { DeformableModel, Volume } from 'vesicle';`,
+    '',
+    `/** Returns the surface as a PLY file, given the bytes of ${names.replaceAll('*/', '* /')} as Uint8Array. */`,
+    `export async function run(${given}) {`,
+    ...lines.map((line) => `  ${line}`),
+    '}',
+    '',
+  ].join('\n');
+}
+
+/** Methods in code. A log may come from a file of anyone, who must not choose what the user runs. */
+const METHODS = ['step', 'setParams', 'setAttractors', 'seed'];
+
+function lineOf({ call, given }: RunLog<Setup>['calls'][number]): string {
+  if (!METHODS.includes(call)) throw new Refusal('bad-file', text('sessions.unknownCall', { call }));
+  return `model.${call}(${given === undefined ? '' : literal(given)});`;
+}
+
+/** Returns JavaScript for a value of plain data; numbers are written so that they are read as the same numbers. */
+export function literal(value: unknown): string {
+  if (value instanceof Float32Array) return `new Float32Array(${literal([...value])})`;
+  if (Array.isArray(value)) return `[${value.map(literal).join(', ')}]`;
+  if (typeof value === 'object' && value !== null) {
+    const entries = Object.entries(value).map(([name, one]) => `${property(name)}: ${literal(one)}`);
+    return entries.length > 0 ? `{ ${entries.join(', ')} }` : '{}';
+  }
+  if (typeof value === 'string') return /^[\w .-]*$/.test(value) ? `'${value}'` : JSON.stringify(value);
+  return Object.is(value, -0) ? '-0' : String(value);
+}
+
+const property = (name: string) => (/^[a-z]\w*$/i.test(name) ? name : JSON.stringify(name));
