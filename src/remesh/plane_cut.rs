@@ -49,7 +49,7 @@ pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
     let offsets: Vec<f64> = offsets(margin).collect();
     let is_clear = |offset: &&f64| present().all(|height| (height - **offset).abs() >= margin);
     // In a very fine mesh no position is clear; then those near the given one may do as well.
-    let clear = offsets.iter().filter(is_clear).take(4);
+    let clear = offsets.iter().filter(is_clear);
     for offset in clear.chain(&offsets[..2]) {
         let heights: Vec<f64> = heights.iter().map(|height| height - offset).collect();
         if let Some(cut) = cut_at(mesh, &heights, plane.normal) {

@@ -135,7 +135,7 @@ fn random_planes_through_difficult_shapes() {
             }
             Err(MeshError::InvalidArgument { .. }) => {}
             Err(error) => {
-                println!("{name}, seed {seed}: {error}");
+                println!("{name}: {error}");
                 refusals += 1;
             }
         }

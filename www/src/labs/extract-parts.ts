@@ -114,7 +114,7 @@ export class ExtractParts extends RunParts<Example> {
     this.layOut({
       name: 'extract',
       options: this.options.element,
-      over: [this.stage.legend.element],
+      over: [this.stage.legend.element, this.stage.editing.legend.element],
       stage: (view, status) => [view, this.transport.element, status, this.#slices],
       setup: [
         section(text('extract.sectionData'), this.data.element, this.#figure.element),
@@ -128,6 +128,7 @@ export class ExtractParts extends RunParts<Example> {
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
         this.saveSection(this.exports.element, this.#sculpt),
+        ...this.finishSections(this.stage.editing, this.measures),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
@@ -143,6 +144,7 @@ export class ExtractParts extends RunParts<Example> {
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
+    if (this.finish) this.finish.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
     this.large.showTotal(volume.large?.bytes);
@@ -192,7 +194,8 @@ export class ExtractParts extends RunParts<Example> {
     this.coverage.enabled = idle;
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.stage.dispose();
   }
 

@@ -77,7 +77,7 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
-      onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
     };
   }
 

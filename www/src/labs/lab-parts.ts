@@ -1,3 +1,5 @@
+import { Finish } from '../finish';
+import type { EditedView } from '../finish/edited-view';
 import type { MeshFormat, ParamSpec, ParamValues } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
@@ -5,6 +7,7 @@ import { folded, h, section, wideButton } from '../ui/dom';
 import { ExportButtons } from '../ui/exports';
 import { acceptDrops } from '../ui/files';
 import type { History } from '../ui/history';
+import type { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
@@ -170,6 +173,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
   protected readonly history: History;
+  readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  finish: Finish | undefined;
 
   constructor(
     root: HTMLElement,
@@ -179,9 +184,10 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   ) {
     super(root, signal, events, options);
     this.history = history;
+    this.#fetchMesh = fetchMesh;
     this.transport = new Transport(events);
     this.exports = new ExportButtons((format, type) => {
-      fetchMesh(format)
+      this.surfaceFile(format)
         .then((bytes) => this.saving.bytes(format, bytes, type, this.suffix))
         .catch((error) => events.onError(text('labs.saveFailed'), error));
     });
@@ -192,6 +198,18 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     );
   }
 
+  /** Returns the surface, edited if it is, as a file. */
+  surfaceFile(format: MeshFormat): Promise<Uint8Array> {
+    return this.finish?.exported(format) ?? this.#fetchMesh(format);
+  }
+
+  /** Creates the sections that edit the surface after a run and compare it with a reference. */
+  protected finishSections(view: EditedView, measures: MeasurePanel): HTMLElement[] {
+    const mesh = () => this.#fetchMesh('ply');
+    this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
+    return this.finish.elements;
+  }
+
   /**
    * Enables and disables controls according to the lab's state, and that of the model `beneath` an error. Returns
    * whether nothing is being loaded.
@@ -200,7 +218,13 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     const idle = this.showLoading(state, ready);
     this.transport.showState(beneath, ready);
     this.exports.enabled = idle;
+    if (!idle || state === 'running') this.finish?.reset();
+    if (this.finish) this.finish.enabled = idle && state !== 'running';
     return idle;
+  }
+
+  dispose(): void {
+    this.finish?.close();
   }
 
   /** Added to the names of saved surfaces, to distinguish several of the same data. */

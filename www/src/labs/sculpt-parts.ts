@@ -133,7 +133,8 @@ export class SculptParts extends RunParts<SculptExample> {
     this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.#texture?.dispose();
     this.view.dispose();
   }

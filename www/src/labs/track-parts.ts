@@ -109,6 +109,7 @@ export class TrackParts extends RunParts<TrackExample> {
     this.layOut({
       name: 'track',
       options: this.options.element,
+      over: [this.view.editing.legend.element],
       stage: (view, status) => [
         ...[view, this.frames.element, this.transport.element, status],
         ...[this.#slices, this.stills.element],
@@ -124,6 +125,7 @@ export class TrackParts extends RunParts<TrackExample> {
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
         this.saveSection(this.exports.element, ...this.#saves, this.#sculpt),
+        ...this.finishSections(this.view.editing, this.measures),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
         folded(text('labs.sectionExercise'), exercises(TRACK_EXERCISES, events.onExampleId)),
@@ -152,6 +154,7 @@ export class TrackParts extends RunParts<TrackExample> {
     const unit = example?.unit ?? 'mm';
     this.saving.name = example?.id ?? name;
     this.measures.unit = unit;
+    if (this.finish) this.finish.unit = unit;
     this.data.show(factsOf(opened, name, unit), example);
   }
 
@@ -177,12 +180,14 @@ export class TrackParts extends RunParts<TrackExample> {
   showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
     const idle = this.showRunState(state, beneath, ready);
     this.exports.enabled = idle && here;
+    if (this.finish) this.finish.enabled = idle && here && state !== 'running';
     this.#sculpt.disabled = !idle || !here;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.frames.stop();
     this.view.dispose();
   }
