@@ -67,7 +67,8 @@ test('an edit that is refused says why, and changes nothing', async () => {
 test('a reference is compared in both directions, also after an edit; a bad file changes nothing', async () => {
   await panel('Compare with a reference').locator('summary').click();
   await choose('own.ply', await saved('[data-export=ply]'));
-  const values = async () => JSON.parse((await app.page.getAttribute('[data-reference=result]', 'data-values')) ?? '{}');
+  const values = async () =>
+    JSON.parse((await app.page.getAttribute('[data-reference=result]', 'data-values')) ?? '{}');
   await expect.poll(async () => (await values()).dice).toBe(1);
   expect((await values()).both.max).toBeLessThan(1e-5);
   await press('cut');
@@ -88,7 +89,8 @@ test('a mask is a reference, too', async () => {
   const { bounds } = Mesh.parse(await saved('[data-export=ply]')).info();
   const dims = bounds.max.map((x) => Math.ceil(x) + 2) as [number, number, number];
   const data = new Uint8Array(dims[0] * dims[1] * dims[2]);
-  for (let z = 4; z < 12; z++) for (let y = 4; y < 12; y++) data.fill(1, (z * dims[1] + y) * dims[0] + 4, (z * dims[1] + y) * dims[0] + 12);
+  for (let z = 4; z < 12; z++)
+    for (let y = 4; y < 12; y++) data.fill(1, (z * dims[1] + y) * dims[0] + 4, (z * dims[1] + y) * dims[0] + 12);
   await choose('mask.nii', new Volume({ data, dims }).toNifti());
   await expect.poll(() => app.page.locator('[data-reference=status]').textContent()).toBe('mask.nii');
   await expect.poll(() => app.page.locator('[data-reference=result]').textContent()).toContain('Dice coefficient');

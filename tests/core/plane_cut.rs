@@ -107,7 +107,7 @@ fn self_intersections_at_the_plane_are_refused() {
     shifted.positions.iter_mut().for_each(|p| p.x += 0.7);
     let two = joined(&[ball(1.0), shifted]);
     assert_eq!(cut(&two, plane([0.0; 3], [0.0, 0.0, 1.0])), Err(MeshError::CannotCut));
-    // Where it does not intersect itself, it can be cut, and the rest stays as it is.
+    // Where it does not intersect itself, it can be cut, and the rest is unchanged.
     let rest = cut(&two, plane([1.4, 0.0, 0.0], [1.0, 0.0, 0.0])).unwrap();
     assert_eq!(count_self_intersections(&rest), count_self_intersections(&two));
 }

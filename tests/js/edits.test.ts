@@ -7,7 +7,11 @@ const UP = { origin: [0, 0, 0.1] as [number, number, number], normal: [0, 0, 2] 
 
 /** Returns a ball of radius 3 with a cavity of radius 1, and beside it one of radius 1: three components. */
 function hollow(): Mesh {
-  const parts = [Mesh.icosphere([0, 0, 0], 3, 0.5), Mesh.icosphere([0, 0, 0], 1, 0.5), Mesh.icosphere([6, 0, 0], 1, 0.5)];
+  const parts = [
+    Mesh.icosphere([0, 0, 0], 3, 0.5),
+    Mesh.icosphere([0, 0, 0], 1, 0.5),
+    Mesh.icosphere([6, 0, 0], 1, 0.5),
+  ];
   const arrays = parts.map((part) => part.arrays());
   // Reversed, the triangles of the cavity face inwards.
   arrays[1]?.indices.reverse();
@@ -69,7 +73,11 @@ test('components are kept by their indices, and cavities filled', () => {
 
 test('the mesh of a model is not edited', () => {
   const model = new DeformableModel({ volume: ball(12, 4) });
-  for (const edit of [() => model.mesh.cut(UP), () => model.mesh.keepComponents([0]), () => model.mesh.removeCavities()])
+  for (const edit of [
+    () => model.mesh.cut(UP),
+    () => model.mesh.keepComponents([0]),
+    () => model.mesh.removeCavities(),
+  ])
     expect(failure(edit).message).toContain('clone()');
   model.free();
 });

@@ -46,7 +46,11 @@ export class ReferencePanel {
   constructor(finishing: Finishing, events: ComparePanelEvents) {
     this.#finishing = finishing;
     this.#events = events;
-    const chooser = fileChooser((files) => void this.#open(files), `.ply,.stl,.obj,.glb,${VOLUME_FILES}`, text('finish.openReference'));
+    const chooser = fileChooser(
+      (files) => void this.#open(files),
+      `.ply,.stl,.obj,.glb,${VOLUME_FILES}`,
+      text('finish.openReference'),
+    );
     this.#label.addEventListener('change', () => void this.compare());
     this.#labelRow = h('div', { class: 'row' }, h('label', { for: this.#label.id }, text('finish.label')), this.#label);
     this.#colors.addEventListener('change', () => this.#color());
@@ -55,7 +59,8 @@ export class ReferencePanel {
       { hidden: true },
       this.#labelRow,
       this.#result,
-      h('label', { class: 'row' }, this.#colors, ' ', text('finish.colors')),
+      h('label', {}, this.#colors, ' ', text('finish.colors')),
+
       h('button', { type: 'button', 'data-reference': 'csv', onclick: () => this.#save() }, text('finish.csv')),
     );
     this.element = h(
@@ -119,16 +124,21 @@ export class ReferencePanel {
       const option = (value: string, name: string) => h('option', { value }, name);
       this.#label.append(option('', text('finish.allLabels')), ...found.labels.map((n) => option(`${n}`, `${n}`)));
     }
-    const heads = ['', ...MEASURES.map(([, label]) => label)].map((label) => h('th', { scope: 'col' }, label));
-    const rows = DIRECTIONS.map(([name, label]) => {
-      const cells = MEASURES.map(([measure]) => h('td', {}, `${figure(found[name][measure])} ${this.unit}`.trim()));
+    const heads = ['', ...DIRECTIONS.map(([, label]) => label)].map((label) => h('th', { scope: 'col' }, label));
+    const rows = MEASURES.map(([measure, label]) => {
+      const cells = DIRECTIONS.map(([name]) => h('td', {}, `${figure(found[name][measure])} ${this.unit}`.trim()));
       return h('tr', {}, h('th', { scope: 'row' }, label), ...cells);
     });
-    const table = h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...heads)), h('tbody', {}, ...rows));
+    const table = h(
+      'table',
+      { class: 'times distances' },
+      h('thead', {}, h('tr', {}, ...heads)),
+      h('tbody', {}, ...rows),
+    );
     const { dice } = found;
     const overlap = dice === undefined ? text('finish.noDice') : text('finish.dice', { value: dice.toFixed(4) });
     this.#result.dataset.values = JSON.stringify({ ...found, values: undefined });
-    this.#result.replaceChildren(h('div', { class: 'scroll' }, table), h('p', {}, overlap));
+    this.#result.replaceChildren(h('div', { class: 'scroll' }, table), h('p', { class: 'help' }, overlap));
     this.#color();
   }
 

@@ -32,8 +32,9 @@ export class ComponentList {
     this.#edited = edited;
     this.#chosen.clear();
     this.#boxes.clear();
+    const all = edited?.components ?? [];
     const items = this.#ranked().slice(0, MOST);
-    this.element.replaceChildren(...items.map((index, rank) => this.#item(index, rank, unit)));
+    this.element.replaceChildren(...items.map((index, rank) => this.#item(index, rank, all[index], unit)));
   }
 
   /** Chooses the component of a triangle, or no longer chooses it. */
@@ -56,8 +57,8 @@ export class ComponentList {
     return [...parts.keys()].sort((i, j) => size(j) - size(i) || i - j);
   }
 
-  #item(index: number, rank: number, unit: string): HTMLElement {
-    const { vertices, volume, area } = this.#edited?.components[index] as Component;
+  #item(index: number, rank: number, part: Component | undefined, unit: string): HTMLElement {
+    const { vertices = 0, volume = 0, area = 0 } = part ?? {};
     const box = h('input', { type: 'checkbox', 'data-component': index });
     box.addEventListener('change', () => this.#choose(index, box.checked));
     this.#boxes.set(index, box);

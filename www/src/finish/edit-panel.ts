@@ -44,6 +44,7 @@ export class EditPanel {
   readonly #choosing: HTMLInputElement;
   #from: SurfacePoint | undefined;
   #enabled = false;
+  #unfolded = false;
   #busy = false;
 
   constructor(finishing: Finishing, view: EditedView) {
@@ -60,8 +61,9 @@ export class EditPanel {
     const save = this.#button('save-initial', text('finish.saveInitial'), async () => this.#saveInitial());
     const copy = this.#button('copy', text('finish.copy'), () => this.#copy());
     this.#codeHolder = h(
-      'div',
+      'details',
       { hidden: true },
+      h('summary', {}, text('finish.code')),
       this.#code,
       h('div', { class: 'buttons' }, copy, save),
       h('p', { class: 'help' }, text('finish.codeHelp')),
@@ -84,6 +86,13 @@ export class EditPanel {
   set enabled(enabled: boolean) {
     this.#enabled = enabled;
     this.#enable();
+    void this.#open();
+  }
+
+  /** Whether the panel is unfolded: it then shows the components of the surface. */
+  set unfolded(unfolded: boolean) {
+    this.#unfolded = unfolded;
+    void this.#open();
   }
 
   /** Shows the surface after an edit; undefined if there is none. */
@@ -101,6 +110,11 @@ export class EditPanel {
     this.#enable();
   }
 
+  async #open(): Promise<void> {
+    if (this.#enabled && this.#unfolded && !this.#busy && !this.#finishing.edited)
+      await this.#attempt(() => this.#finishing.open());
+  }
+
   #operations(): HTMLElement[] {
     const smoothing = form(this.#smoothing, [
       spec('iterations', 'integer', text('finish.iterations'), text('finish.smoothHelp'), { min: 0 }),
@@ -110,7 +124,11 @@ export class EditPanel {
       this.#cutting,
       [
         spec('axis', 'choice', text('finish.axis'), text('finish.axisHelp'), { choices: AXES }),
-        spec('position', 'number', text('finish.position'), text('finish.positionHelp'), { min: 0, max: 100, unit: '%' }),
+        spec('position', 'number', text('finish.position'), text('finish.positionHelp'), {
+          min: 0,
+          max: 100,
+          unit: '%',
+        }),
         spec('side', 'choice', text('finish.side'), text('finish.sideHelp'), { choices: SIDES }),
       ],
       () => void this.#preview(),
@@ -131,14 +149,14 @@ export class EditPanel {
         edit('keep-largest', text('finish.keepLargest'), () => keep([this.#components.largest])),
         edit('fill', text('finish.fill'), () => ({ op: 'removeCavities' })),
       ]),
-      h('label', { class: 'row' }, this.#choosing, ' ', text('finish.choose')),
+      h('label', {}, this.#choosing, ' ', text('finish.choose')),
       h('p', { class: 'help' }, text('finish.componentsHelp')),
       group(text('finish.cutting'), cutting.element, [
         this.#button('preview', text('finish.preview'), () => this.#preview()),
         edit('cut', text('finish.cut'), () => ({ op: 'cut', ...this.#plane() })),
       ]),
       h('h3', {}, text('finish.measuring')),
-      h('label', { class: 'row' }, this.#measuring, ' ', text('finish.measure')),
+      h('label', {}, this.#measuring, ' ', text('finish.measure')),
       this.#distance,
       h('p', { class: 'help' }, text('finish.measureHelp')),
     ];
@@ -192,7 +210,8 @@ export class EditPanel {
     await this.#attempt(async () => {
       await this.#finishing.change(kind, edit as never);
       const { info } = this.#finishing.edited?.measures ?? {};
-      if (info) this.#status.textContent = text('finish.done', { triangles: plural('counts.triangle', info.triangles) });
+      if (info)
+        this.#status.textContent = text('finish.done', { triangles: plural('counts.triangle', info.triangles) });
     });
   }
 
@@ -208,7 +227,9 @@ export class EditPanel {
       return true;
     } catch (error) {
       this.#status.textContent = '';
-      this.#error.textContent = text('finish.refused', { reason: error instanceof Error ? error.message : String(error) });
+      this.#error.textContent = text('finish.refused', {
+        reason: error instanceof Error ? error.message : String(error),
+      });
       return false;
     } finally {
       this.#busy = false;

@@ -18,7 +18,7 @@ export class EditedView {
   readonly #surface: SurfaceObject;
   readonly #onChange: () => void;
   readonly #lines = new Lines(token('--attractor'));
-  /** What the view does with clicks while none is taken here. */
+  /** The view's own handler of clicks, while these are taken here. */
   #onClick: ((ray: Raycaster) => void) | undefined;
 
   /** `onChange` is called when another surface is shown, to update legend and outlines. */
@@ -29,7 +29,7 @@ export class EditedView {
     // In front of the surface, through which a straight line passes.
     this.#lines.object.material.depthTest = false;
     this.#lines.object.renderOrder = 1;
-    viewport.add(this.#lines.object);
+    surface.object.add(this.#lines.object);
   }
 
   /** Shows an edited surface, with its values as colours if it has some; undefined shows the lab's own again. */
@@ -61,6 +61,7 @@ export class EditedView {
 
   #click(ray: Raycaster, take: (at: SurfacePoint) => void): void {
     const [hit] = ray.intersectObject(this.#surface.target, false);
-    if (hit) take({ triangle: hit.faceIndex ?? 0, point: this.#viewport.toWorld(hit.point).toArray() });
+    const local = hit && this.#surface.object.worldToLocal(hit.point.clone());
+    if (hit && local) take({ triangle: hit.faceIndex ?? 0, point: local.toArray() });
   }
 }

@@ -9,7 +9,7 @@ import type { EditedView } from './edited-view';
 import { Finishing } from './finishing';
 import type { Edited } from './protocol';
 
-/** What the tools need of a lab. */
+/** Parts of a lab that the tools use. */
 export interface FinishHost {
   /** Returns the lab's surface as a PLY file. */
   mesh: () => Promise<Uint8Array>;
@@ -38,10 +38,11 @@ export class Finish {
       },
       onSave: host.save,
     });
-    this.elements = [
-      folded(text('finish.title'), this.#edits.element),
-      folded(text('finish.compareTitle'), this.#reference.element),
-    ];
+    const edits = folded(text('finish.title'), this.#edits.element);
+    edits.addEventListener('toggle', () => {
+      this.#edits.unfolded = edits.open;
+    });
+    this.elements = [edits, folded(text('finish.compareTitle'), this.#reference.element)];
   }
 
   /** Unit of length of the surface, or empty. */

@@ -22,7 +22,7 @@ type Handlers = {
 let states: { mesh: Mesh; log: Edit[] }[] = [];
 /** Index of the surface shown. */
 let present = 0;
-/** What is compared with: a mesh, or a label map of which surfaces are made. */
+/** The reference of comparisons: a mesh, or a label map, whose surface is compared. */
 let reference: Mesh | Volume | undefined;
 
 function current(): { mesh: Mesh; log: Edit[] } {

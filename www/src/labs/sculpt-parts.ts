@@ -71,7 +71,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.layOut({
       name: 'sculpt',
       options: this.options.element,
-      over: [this.view.legend.element, this.previewNote, this.#captions],
+      over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions],
       stage: (view, status) => [view, this.transport.element, status],
       setup: [
         section(text('sculpt.sectionScene'), this.data.element, this.#figure.element),
@@ -82,6 +82,7 @@ export class SculptParts extends RunParts<SculptExample> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         this.saveSection(this.exports.element),
+        ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
         folded(text('labs.sectionExercise'), exercises(SCULPT_EXERCISES, events.onExampleId)),
       ],

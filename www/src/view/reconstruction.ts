@@ -1,6 +1,6 @@
 import { Box3, Plane, type Raycaster, Vector3 } from 'three';
-import type { Surface, Vec3 } from '../protocol';
 import { EditedView } from '../finish/edited-view';
+import type { Surface, Vec3 } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { CameraMarks } from './cameras';

@@ -1,6 +1,6 @@
 import type { Raycaster, Vector3 } from 'three';
-import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { EditedView } from '../finish/edited-view';
+import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { crossSection } from '../track/cross-section';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
@@ -200,9 +200,7 @@ export class Stage {
   #updateSections(): void {
     if (!this.#scene) return;
     const { volume, inverse } = this.#scene;
-    const planes = ([0, 1, 2] as const).map((axis) =>
-      slicePlane(volume.affine, inverse, axis, this.#crosshair[axis]),
-    );
+    const planes = ([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, this.#crosshair[axis]));
     const { edited } = this.#surface;
     if (edited) this.#drawSections(planes.map((plane) => crossSection(edited, plane)));
     else this.#onPlanes(planes);

@@ -1,8 +1,8 @@
 import { Box3, Vector3 } from 'three';
+import { EditedView } from '../finish/edited-view';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { sliceVotes } from '../track/clusters';
-import { EditedView } from '../finish/edited-view';
 import { crossSection } from '../track/cross-section';
 import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
