@@ -4,7 +4,7 @@ import { importVolume } from '../importers';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
-import { reply, withTransfer } from '../worker/serving';
+import { type Handlers, reply, withTransfer } from '../worker/serving';
 import { copySurface, emptyArrays } from '../worker/surface-buffers';
 import { readFiles } from '../worker/volumes';
 import { apply } from './code';
@@ -13,10 +13,6 @@ import type { Comparison, Edit, Edited, RequestKind, Requests, SurfacePoint } fr
 
 /** Number of triangles in all surfaces that are kept for undo. */
 const KEPT_TRIANGLES = 5_000_000;
-
-type Handlers = {
-  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
 
 /** The surfaces after each edit, as far as they are kept, from the oldest to the newest, those undone included. */
 let states: { mesh: Mesh; log: Edit[] }[] = [];
@@ -146,7 +142,7 @@ function compareWith(surface: Mesh, mesh: Mesh, mask: Volume | undefined, labels
   return withTransfer(found, [found.values]);
 }
 
-const handlers: Handlers = {
+const handlers: Handlers<Requests> = {
   open,
   edit,
   undo: () => travel(-1),
