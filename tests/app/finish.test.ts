@@ -18,7 +18,7 @@ afterEach(() => {
 
 const press = (name: string) => app.page.click(`[data-finish=${name}]`);
 const log = () => app.page.locator('.edit-log li').allTextContents();
-const panel = (title: string) => app.page.locator('details', { hasText: title });
+const unfold = (title: string) => app.page.getByRole('heading', { name: title }).click();
 
 async function saved(selector: string): Promise<Uint8Array> {
   const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click(selector)]);
@@ -27,19 +27,19 @@ async function saved(selector: string): Promise<Uint8Array> {
 
 /** Chooses a file as the reference. */
 function choose(name: string, bytes: Uint8Array): Promise<void> {
-  const input = panel('Compare with a reference').locator('input[type=file]');
+  const input = app.page.locator('.reference input[type=file]');
   return input.setInputFiles({ name, mimeType: '', buffer: Buffer.from(bytes) });
 }
 
 test('edits change the surface, its measures and the saved files; undo and redo', async () => {
   const before = await measures(app.page);
   expect(before.components).toBeGreaterThan(1);
-  await panel('Edit the surface').locator('summary').click();
+  await unfold('Edit the surface');
   await press('keep-largest');
   await expect.poll(async () => (await measures(app.page)).components).toBe(1);
   await press('cut');
   await expect.poll(async () => (await log()).length).toBe(2);
-  await app.page.getByLabel('Target').fill('400');
+  await app.page.locator('.finish').getByLabel('Target').fill('400');
   await press('decimate');
   await expect.poll(async () => (await measures(app.page)).triangles).toBeLessThanOrEqual(400);
   const edited = await measures(app.page);
@@ -57,7 +57,7 @@ test('edits change the surface, its measures and the saved files; undo and redo'
 
 test('an edit that is refused says why, and changes nothing', async () => {
   const before = await measures(app.page);
-  await app.page.getByLabel('Edge length', { exact: true }).last().fill('-1');
+  await app.page.locator('.finish').getByLabel('Edge length').fill('-1');
   await press('remesh');
   const error = app.page.locator('.finish > .field-error');
   await expect.poll(() => error.textContent()).toContain('Nothing has changed. edge.min');
@@ -65,7 +65,7 @@ test('an edit that is refused says why, and changes nothing', async () => {
 });
 
 test('a reference is compared in both directions, also after an edit; a bad file changes nothing', async () => {
-  await panel('Compare with a reference').locator('summary').click();
+  await unfold('Compare with a reference');
   await choose('own.ply', await saved('[data-export=ply]'));
   const values = async () =>
     JSON.parse((await app.page.getAttribute('[data-reference=result]', 'data-values')) ?? '{}');
