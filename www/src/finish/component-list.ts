@@ -1,6 +1,7 @@
+import type { Unit } from '../examples';
 import { plural, text } from '../texts';
 import { h } from '../ui/dom';
-import { figure } from '../ui/format';
+import { sized } from '../ui/measures';
 import { componentRoots } from '../view/components';
 import type { Component, Edited } from './protocol';
 
@@ -28,7 +29,7 @@ export class ComponentList {
     return this.#ranked()[0] ?? 0;
   }
 
-  show(edited: Edited | undefined, unit: string): void {
+  show(edited: Edited | undefined, unit: Unit): void {
     this.#edited = edited;
     this.#chosen.clear();
     this.#boxes.clear();
@@ -57,14 +58,12 @@ export class ComponentList {
     return [...parts.keys()].sort((i, j) => size(j) - size(i) || i - j);
   }
 
-  #item(index: number, rank: number, part: Component | undefined, unit: string): HTMLElement {
+  #item(index: number, rank: number, part: Component | undefined, unit: Unit): HTMLElement {
     const { vertices = 0, volume = 0, area = 0 } = part ?? {};
     const box = h('input', { type: 'checkbox', 'data-component': index });
     box.addEventListener('change', () => this.#choose(index, box.checked));
     this.#boxes.set(index, box);
-    const cube = unit && `${unit}³`;
-    const square = unit && `${unit}²`;
-    const sizes = { rank: rank + 1, volume: `${figure(volume)} ${cube}`, area: `${figure(area)} ${square}` };
+    const sizes = { rank: rank + 1, volume: sized(volume, 3, unit), area: sized(area, 2, unit) };
     const size = text('finish.component', { ...sizes, vertices: plural('counts.vertex', vertices) });
     return h('li', {}, h('label', {}, box, ' ', size));
   }

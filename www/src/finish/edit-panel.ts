@@ -1,3 +1,4 @@
+import type { Unit } from '../examples';
 import type { ParamSpec, ParamValues, Vec3 } from '../protocol';
 import { plural, text } from '../texts';
 import { h } from '../ui/dom';
@@ -21,7 +22,7 @@ const SIDES = [text('finish.below'), text('finish.above')];
 export class EditPanel {
   readonly element: HTMLElement;
   /** Unit of length, or empty. */
-  unit = '';
+  unit: Unit = '';
   readonly #finishing: Finishing;
   readonly #view: EditedView;
   readonly #buttons: HTMLButtonElement[] = [];

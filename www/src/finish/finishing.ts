@@ -14,6 +14,8 @@ export class Finishing {
   #client: FinishClient | undefined;
   #opening: Promise<void> | undefined;
   #edited: Edited | undefined;
+  /** Counts the lab's surfaces. */
+  #surface = 0;
   /** The surface before the edits, as a PLY file. */
   initial: Uint8Array | undefined;
 
@@ -43,7 +45,9 @@ export class Finishing {
   }
 
   async change<K extends 'edit' | 'undo' | 'redo'>(kind: K, body: Requests[K]['body']): Promise<void> {
-    this.#adopt(await this.request(kind, body));
+    const surface = this.#surface;
+    const edited = await this.request(kind, body);
+    if (surface === this.#surface) this.#adopt(edited);
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */
@@ -53,6 +57,7 @@ export class Finishing {
 
   /** Forgets the edits, as the lab's surface has changed. */
   reset(): void {
+    this.#surface += 1;
     this.#opening = undefined;
     this.initial = undefined;
     if (this.#edited) this.#adopt(undefined);
@@ -63,12 +68,12 @@ export class Finishing {
   }
 
   async #open(): Promise<void> {
-    const opening = this.#opening;
+    const surface = this.#surface;
     const bytes = await this.#mesh();
     this.#client ??= new FinishClient(() => this.#lose());
     const edited = await this.#client.request('open', bytes);
     // Forgotten while it was being opened.
-    if (opening !== this.#opening) return;
+    if (surface !== this.#surface) return;
     this.initial = bytes;
     this.#adopt(edited);
   }

@@ -1,4 +1,5 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
+import type { Unit } from '../examples';
 import type { MeshFormat } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
@@ -46,7 +47,7 @@ export class Finish {
   }
 
   /** Unit of length of the surface, or empty. */
-  set unit(unit: string) {
+  set unit(unit: Unit) {
     this.#edits.unit = unit;
     this.#reference.unit = unit;
     this.#host.view.unit = unit;
