@@ -452,6 +452,55 @@ export class Mesh {
   }
 
   /**
+   * Cuts the mesh by a plane and closes it along the plane: keeps the side away from the normal. New triangles face
+   * along the normal, and are a Delaunay triangulation of the cross-section. The mesh stays closed, and one without
+   * self-intersections remains free of them; nothing changes if all of it is on the side that is kept.
+   *
+   * The plane is moved by less than 0.01 % of the largest coordinate where a vertex is on it. Vertices are renumbered.
+   * Texture coordinates and colours are removed.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param plane - `origin`: a point on the plane. `normal`: of any length but 0.
+   * @throws {@link VesicleError} `not-closed`; `self-intersecting` if the mesh intersects itself at the plane, or parts
+   *   of it are too near each other there; `invalid-argument`, also if nothing would be left, and for the mesh of a
+   *   model: `clone()` it first. The mesh is then unchanged.
+   */
+  cut(plane: { origin: Vec3; normal: Vec3 }): void {
+    const { origin, normal } = checkProperties('plane', shallowCopy('plane', plane), ['origin', 'normal']);
+    const point = vec3('plane.origin', origin);
+    const across = nonZero('plane.normal', vec3('plane.normal', normal));
+    this.#handle.use((raw) => raw.cut(point, across));
+  }
+
+  /**
+   * Removes all connected components but those of the given indices, as numbered by {@link Mesh.components}. Texture
+   * coordinates and colours of these stay. The mesh may be open.
+   *
+   * Entry points with one method lack it.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no index, an index of no component, or the mesh of a model:
+   *   `clone()` it first.
+   */
+  keepComponents(indices: readonly number[]): void {
+    const kept = denseCopy('indices', indices).map((index) => integer('indices', index));
+    if (kept.length === 0) throw invalid('indices', 'must name at least one component');
+    this.#handle.use((raw) => raw.keepComponents(Uint32Array.from(kept)));
+  }
+
+  /**
+   * Fills all cavities: removes the connected components that a larger one encloses, whether they face outwards or
+   * inwards. The mesh must be closed.
+   *
+   * Entry points with one method lack it.
+   *
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first.
+   */
+  removeCavities(): void {
+    this.#handle.use((raw) => raw.removeCavities());
+  }
+
+  /**
    * Tests for each point whether it is inside the mesh; returns 1 for inside and 0 for outside. Inside is where the
    * winding number, the number of times the surface encloses a point, is not 0, whether triangles face outwards or
    * inwards. The mesh must be closed, but may intersect itself.

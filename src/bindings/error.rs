@@ -51,7 +51,7 @@ impl From<MeshError> for Failure {
         let code = match error {
             MeshError::InvalidArgument { .. } => "invalid-argument",
             MeshError::NotClosed { .. } => "not-closed",
-            MeshError::SelfIntersecting { .. } => "self-intersecting",
+            MeshError::SelfIntersecting { .. } | MeshError::CannotCut => "self-intersecting",
             MeshError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())

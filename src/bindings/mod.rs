@@ -9,6 +9,8 @@ mod animation;
 mod convert;
 #[cfg(feature = "deformable")]
 mod deformable;
+#[cfg(feature = "labels")]
+mod editing;
 #[cfg(feature = "enrich")]
 mod enrich;
 mod error;

@@ -46,6 +46,11 @@ impl Bounds {
         self.overlaps(&Self { min: p, max: p })
     }
 
+    /// Returns whether `other` is inside the box or touches it from inside.
+    pub fn contains_box(&self, other: &Self) -> bool {
+        self.contains(other.min) && self.contains(other.max)
+    }
+
     /// Returns whether the boxes share a point; they do even if they only touch.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {

@@ -1,6 +1,5 @@
-//! Geometry and numerics shared by all layers: vector types, bounding boxes, triangles, exact predicates, quadric
-//! errors, eigenvectors of symmetric matrices, linear systems, sorting, grouping and
-//! random numbers.
+//! Geometry and numerics shared by all layers: vector types, bounding boxes, triangles, exact predicates, polygons,
+//! quadric errors, eigenvectors of symmetric matrices, linear systems, sorting, grouping and random numbers.
 
 mod bounds;
 mod conjugate_gradients;
@@ -8,6 +7,7 @@ pub mod crossing;
 mod groups;
 mod min_max;
 pub mod order;
+mod polygon;
 mod position_index;
 pub mod predicates;
 mod quadric;
@@ -21,6 +21,7 @@ pub use conjugate_gradients::ConjugateGradients;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
 pub use groups::Groups;
 pub use min_max::{higher, lower};
+pub use polygon::triangulate;
 pub use position_index::PositionIndex;
 pub use quadric::Quadric;
 pub use random::Random;

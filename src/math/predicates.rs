@@ -40,6 +40,13 @@ pub fn orient2d([a, b, c]: [DVec2; 3]) -> f64 {
     robust::orient2d(a, b, c)
 }
 
+/// Returns a positive number if `d` is inside the circle through `a`, `b` and `c`, which are counter-clockwise, a
+/// negative one if it is outside, zero on the circle. The sign is exact as that of [`orient2d`].
+pub fn in_circle([a, b, c]: [DVec2; 3], d: DVec2) -> f64 {
+    let [a, b, c, d] = [a, b, c, d].map(|p| Coord { x: p.x, y: p.y });
+    robust::incircle(a, b, c, d)
+}
+
 /// Returns whether the three points are exactly collinear, so that the triangle has no area.
 pub fn collinear([a, b, c]: [Vec3; 3]) -> bool {
     Axis::ALL.into_iter().all(|axis| axis.orient(a, b, c) == 0.0)

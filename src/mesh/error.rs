@@ -26,6 +26,11 @@ pub enum MeshError {
         /// The number of pairs of triangles that intersect.
         pairs: usize,
     },
+    /// A cut that would make the mesh intersect itself; the mesh is unmodified.
+    #[error(
+        "the mesh cannot be cut there: it intersects itself at the plane, or parts of it are too near each other"
+    )]
+    CannotCut,
     /// The mesh needs more memory, or more vertices, than are available.
     #[error("the mesh needs {bytes} bytes, more than is available")]
     TooLarge {

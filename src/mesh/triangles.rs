@@ -108,16 +108,39 @@ impl TriangleMesh {
     /// Components are connected through edges; a vertex where two of them touch is copied to both. Unused vertices are
     /// dropped.
     pub fn components(&self) -> Vec<Self> {
+        let mut slots = vec![u32::MAX; self.positions.len()];
+        let members = self.component_triangles();
+        members.iter().map(|component| self.triangle_subset(component, &mut slots)).collect()
+    }
+
+    /// Returns the mesh with the connected components of the given indices alone, as numbered by [`Self::components`].
+    /// Triangles keep their order; unused vertices are dropped.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] for an index that no component has.
+    pub fn with_components(&self, indices: &[u32]) -> Result<Self, MeshError> {
+        let members = self.component_triangles();
+        let mut kept = Vec::new();
+        for &index in indices {
+            let Some(component) = members.get(index as usize) else {
+                let problem = format!("there is no component {index}; there are {}", members.len());
+                return Err(MeshError::InvalidArgument { parameter: "indices", problem });
+            };
+            kept.extend_from_slice(component);
+        }
+        kept.sort_unstable();
+        kept.dedup();
+        Ok(self.triangle_subset(&kept, &mut vec![u32::MAX; self.positions.len()]))
+    }
+
+    /// Returns the triangles of each connected component, in the order of their first ones.
+    fn component_triangles(&self) -> Vec<Vec<usize>> {
         let mut groups = DisjointSets::new(self.triangles.len());
         groups.join_across_edges(&sorted_half_edges(&self.triangles));
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.triangles.len()];
         (0..self.triangles.len()).for_each(|t| members[groups.find(t)].push(t));
-        let mut slots = vec![u32::MAX; self.positions.len()];
+        members.retain(|component| !component.is_empty());
         members
-            .iter()
-            .filter(|component| !component.is_empty())
-            .map(|component| self.triangle_subset(component, &mut slots))
-            .collect()
     }
 
     /// Returns the triangles with the given indices as a mesh, its vertices numbered in order of first use. `slots` is

@@ -7,7 +7,7 @@
 //! [`Embedding`] keeps the mesh free of self-intersections.
 //!
 //! [`decimate()`] reduces a static mesh, [`remesh`] remeshes it isotropically, with even edge lengths and well-shaped
-//! triangles; [`smooth`] removes noise. None of them changes topology.
+//! triangles; [`smooth`] removes noise. None of them changes topology. [`cut_by_plane`] removes one side of a plane.
 
 mod changes;
 mod clustering;
@@ -18,6 +18,7 @@ mod embedding;
 mod isotropic;
 mod necks;
 mod obstacles;
+mod plane_cut;
 mod resolve;
 mod restructure;
 mod sampling;
@@ -30,6 +31,7 @@ pub use clustering::clustered;
 pub use decimate::decimate;
 pub use embedding::Embedding;
 pub use isotropic::remesh;
+pub use plane_cut::{Plane, cut_by_plane};
 pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};
 pub use restructure::{
     EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,

@@ -1,6 +1,7 @@
 //! Spatial queries: neighbours of points, pairs of vertices near each other, closest points and ray intersections of
 //! surfaces, inside tests, cross-sections, and distances from and between surfaces.
 
+mod cavities;
 mod cells;
 mod contains;
 mod cylinder_tree;
@@ -14,6 +15,7 @@ mod sweep;
 mod tree;
 mod vertex_grid;
 
+pub use cavities::outer_components;
 pub use cells::CellSet;
 pub use contains::contains;
 pub use distance::{SurfaceDistance, surface_distance};

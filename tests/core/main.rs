@@ -29,6 +29,7 @@ mod mesh_edits;
 mod mesh_files;
 mod multires;
 mod multires_fuzz;
+mod plane_cut;
 mod refresh;
 mod remesh;
 mod scenes;

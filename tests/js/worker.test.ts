@@ -90,11 +90,16 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const smoothed = await found.clone();
     await smoothed.smooth({ iterations: 2 });
     await smoothed.transform([-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2, 0, 24, 0, 0, 1]);
+    const half = await found.clone();
+    await half.cut({ origin: [12, 12, 12], normal: [1, 2, 3] });
+    await half.removeCavities();
+    await half.keepComponents([0]);
     const grid = new Volume({ data, dims: DIMS });
     const distances = await smoothed.toVolume(grid, { kind: 'distance' });
     return [
       await parsed.arrays(),
       await (await textured.splitAtSeams()).arrays(),
+      await half.arrays(),
       await Promise.all((await found.components()).map((part) => part.info())),
       [moved, await copy.check(), await copy.curvature('mean'), await copy.geodesic(0)],
       await Promise.all([found.vertexCount, found.triangleCount, found.topologyVersion, found.geometryVersion]),

@@ -124,7 +124,7 @@ export class ExtractParts extends RunParts<Example> {
     this.layOut({
       name: 'extract',
       options: this.options.element,
-      over: [this.stage.legend.element],
+      over: [this.stage.legend.element, this.stage.editing.legend.element],
       stage: (view, status) => [view, this.transport.element, status, this.#slices],
       setup: [
         section(text('extract.sectionData'), this.data.element, this.#figure.element),
@@ -138,6 +138,7 @@ export class ExtractParts extends RunParts<Example> {
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
         this.saveSection(this.stage.subject, this.exports.element, this.#sculpt, this.session.element),
+        ...this.finishSections(this.stage.editing, this.measures),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
@@ -205,7 +206,8 @@ export class ExtractParts extends RunParts<Example> {
     this.coverage.enabled = idle;
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.stage.dispose();
   }
 

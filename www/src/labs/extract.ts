@@ -83,7 +83,7 @@ export class ExtractLab extends RunLab<Example> {
       onSeed: () => void this.#settings.seed(),
       onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
       onSaveVolume: () => this.ask(this.#saveVolume(), text('sessions.volumeFailed')),
-      onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
     };
   }
 

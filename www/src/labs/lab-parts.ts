@@ -1,4 +1,6 @@
 import type { Unit } from '../examples';
+import { Finish } from '../finish';
+import type { EditedView } from '../finish/edited-view';
 import type { MeshFormat, ParamSpec, ParamValues } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
@@ -6,6 +8,7 @@ import { folded, h, section, wideButton } from '../ui/dom';
 import { ExportButtons } from '../ui/exports';
 import { acceptDrops } from '../ui/files';
 import type { History } from '../ui/history';
+import type { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { PicturePanel, type PictureSubject } from '../ui/pictures';
 import { ErrorBanner, StatusLine } from '../ui/status';
@@ -74,8 +77,6 @@ export abstract class LabParts<Example extends Listed> {
   readonly banner: ErrorBanner;
   readonly data: ExamplePanel<Example>;
   readonly saving = new Saving((message) => this.status.say(message));
-  /** Unit of length of the data; empty if unknown. */
-  unit: Unit = '';
   /** Starts or continues the run, in labs whose model runs. */
   protected onRun: (() => void) | undefined;
   protected readonly root: HTMLElement;
@@ -87,6 +88,7 @@ export abstract class LabParts<Example extends Listed> {
   readonly #ownControls: string[];
   readonly #onParam: LabEvents<Example>['onParam'];
   #params: ParamControls | undefined;
+  #unit: Unit = '';
   #pictures: PicturePanel | undefined;
   readonly #signal: AbortSignal;
 
@@ -112,6 +114,15 @@ export abstract class LabParts<Example extends Listed> {
     );
     this.#drop = h('div', { class: 'drop', hidden: true }, drop);
     acceptDrops(this.#drop, events.onFiles, signal, onFolder);
+  }
+
+  /** Unit of length of the data; empty if unknown. */
+  get unit(): Unit {
+    return this.#unit;
+  }
+
+  set unit(unit: Unit) {
+    this.#unit = unit;
   }
 
   protected layOut({ name, options, over = [], beside = [], stage, setup, results }: Layout): void {
@@ -188,6 +199,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
   protected readonly history: History;
+  readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  finish: Finish | undefined;
 
   constructor(
     root: HTMLElement,
@@ -197,10 +210,11 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   ) {
     super(root, signal, events, options);
     this.history = history;
+    this.#fetchMesh = fetchMesh;
     this.transport = new Transport(events);
     this.onRun = events.onToggle;
     this.exports = new ExportButtons((format, type) => {
-      fetchMesh(format)
+      this.surfaceFile(format)
         .then((bytes) => this.saving.bytes(format, bytes, type, this.suffix))
         .catch((error) => events.onError(text('labs.saveFailed'), error));
     });
@@ -211,6 +225,27 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     );
   }
 
+  override get unit(): Unit {
+    return super.unit;
+  }
+
+  override set unit(unit: Unit) {
+    super.unit = unit;
+    if (this.finish) this.finish.unit = unit;
+  }
+
+  /** Returns the surface, edited if it is, as a file. */
+  surfaceFile(format: MeshFormat): Promise<Uint8Array> {
+    return this.finish?.exported(format) ?? this.#fetchMesh(format);
+  }
+
+  /** Creates the sections that edit the surface after a run and compare it with a reference. */
+  protected finishSections(view: EditedView, measures: MeasurePanel): HTMLElement[] {
+    const mesh = () => this.#fetchMesh('ply');
+    this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
+    return this.finish.elements;
+  }
+
   /**
    * Enables and disables controls according to the lab's state, and that of the model `beneath` an error. Returns
    * whether nothing is being loaded.
@@ -219,7 +254,13 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     const idle = this.showLoading(state, ready);
     this.transport.showState(beneath, ready);
     this.exports.enabled = idle;
+    if (!idle || state === 'running') this.finish?.reset();
+    if (this.finish) this.finish.enabled = idle && state !== 'running';
     return idle;
+  }
+
+  dispose(): void {
+    this.finish?.close();
   }
 
   /** Added to the names of saved surfaces, to distinguish several of the same data. */

@@ -93,7 +93,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
     this.layOut({
       name: 'reconstruct',
       options: this.options.element,
-      over: [this.view.legend.element],
+      over: [this.view.legend.element, this.view.editing.legend.element],
       beside: [this.photos.large],
       stage: (view, status) => [view, this.transport.element, status, this.warning, this.photos.element],
       setup: [
@@ -105,6 +105,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
         section(text('labs.sectionProgress'), this.phases.element),
         section(text('labs.sectionSurface'), this.measures.element),
         this.saveSection(this.view.subject, this.exports.element, ...this.#uses),
+        ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
         folded(text('reconstruct.sectionTiming'), this.timing.element),
       ],
@@ -145,10 +146,12 @@ export class ReconstructParts extends RunParts<CloudExample> {
   showState(state: LabState, beneath: LabState, ready: boolean, surface: boolean): void {
     this.timing.enabled = this.showRunState(state, beneath, ready);
     this.exports.enabled = surface;
+    if (this.finish) this.finish.enabled = surface;
     for (const button of this.#uses) button.disabled = !surface;
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.view.dispose();
   }
 

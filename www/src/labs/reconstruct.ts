@@ -66,7 +66,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
       onPhotograph: () => this.updateAddress(),
       onSaveVolume: () => this.#saveVolume(),
       onPassOn: () => this.#toExtract(),
-      onSculpt: () => this.toSculpt(this.client.request('export', { format: 'ply' })),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
     };
   }
 

@@ -73,7 +73,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.layOut({
       name: 'sculpt',
       options: this.options.element,
-      over: [this.view.legend.element, this.previewNote, this.#captions],
+      over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions],
       stage: (view, status) => [view, this.transport.element, status],
       setup: [
         section(text('sculpt.sectionScene'), this.data.element, this.#figure.element),
@@ -84,6 +84,7 @@ export class SculptParts extends RunParts<SculptExample> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         this.saveSection(this.view.subject, this.exports.element, this.#session.element),
+        ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
       ],
     });
@@ -134,7 +135,8 @@ export class SculptParts extends RunParts<SculptExample> {
     this.#session.enabled = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.#texture?.dispose();
     this.view.dispose();
   }

@@ -111,6 +111,7 @@ export class TrackParts extends RunParts<TrackExample> {
     this.layOut({
       name: 'track',
       options: this.options.element,
+      over: [this.view.editing.legend.element],
       stage: (view, status) => [
         ...[view, this.frames.element, this.transport.element, status],
         ...[this.#slices, this.stills.element],
@@ -126,6 +127,7 @@ export class TrackParts extends RunParts<TrackExample> {
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
         this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt, this.#session.element),
+        ...this.finishSections(this.view.editing, this.measures),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
       ],
@@ -179,13 +181,15 @@ export class TrackParts extends RunParts<TrackExample> {
   showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
     const idle = this.showRunState(state, beneath, ready);
     this.exports.enabled = idle && here;
+    if (this.finish) this.finish.enabled = idle && here && state !== 'running';
     this.#sculpt.disabled = !idle || !here;
     this.#session.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }
 
-  dispose(): void {
+  override dispose(): void {
+    super.dispose();
     this.frames.stop();
     this.view.dispose();
   }

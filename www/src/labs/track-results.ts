@@ -153,7 +153,10 @@ export class TrackResults {
   show(frame: number): void {
     const { view, frames: bar, measures } = this.#ui;
     const count = this.#image?.volume.frames ?? 1;
-    this.#frame = Math.min(frame, count - 1);
+    const shown = Math.min(frame, count - 1);
+    // The edits are of the frame that was displayed.
+    if (shown !== this.#frame) this.#ui.finish?.reset();
+    this.#frame = shown;
     const tracked = this.#frames[this.#frame];
     view.showFrame(this.#frame, tracked?.surface);
     bar.show(this.#frame, count, this.#frames.length);

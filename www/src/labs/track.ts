@@ -213,8 +213,7 @@ export class TrackLab extends RunLab<TrackExample> {
 
   #frameToSculpt(): void {
     const { frame } = this.#results;
-    const mesh = this.client.request('export', { frame, format: 'ply' });
-    this.toSculpt(mesh, text('track.frameName', { name: this.ui.saving.name, frame: frame + 1 }));
+    this.toSculpt(this.ui.surfaceFile('ply'), text('track.frameName', { name: this.ui.saving.name, frame: frame + 1 }));
   }
 
   async #compare(other: Alternative): Promise<void> {

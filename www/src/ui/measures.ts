@@ -63,6 +63,8 @@ export class MeasurePanel {
   readonly #cells = new Map<Name, HTMLElement>();
   #unit: Unit = 'mm';
   #values: Partial<MeasureValues> = {};
+  /** Measures of an edited surface, shown in place of the others. */
+  #edited: Partial<MeasureValues> | undefined;
   readonly #extra: { measure: ExtraMeasure; cell: HTMLElement }[];
   #extraValues: Record<string, unknown> = {};
 
@@ -97,7 +99,7 @@ export class MeasurePanel {
   }
 
   #publish(): void {
-    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#extraValues });
+    this.element.dataset.measures = JSON.stringify({ ...(this.#edited ?? this.#values), ...this.#extraValues });
   }
 
   /** Unit of length, by which volume and area are formatted. */
@@ -124,27 +126,34 @@ export class MeasurePanel {
     this.#show(known);
   }
 
-  showMeasures({ info, report }: Measures): void {
-    const { vertices, triangles, components, genus, volume, area } = info;
-    const known: Partial<MeasureValues> = { vertices, triangles, components, chi: info.euler, genus, volume, area };
-    if (report) {
-      known.closed = report.closed;
-      known.oriented = report.oriented;
-      known.crossings = report.selfIntersections;
-    }
-    this.#show(known);
+  showMeasures(measures: Measures): void {
+    this.#show(valuesOf(measures));
+  }
+
+  /** Shows the measures of an edited surface in place of the others; undefined shows these again. */
+  showEdited(measures: Measures | undefined): void {
+    this.#edited = measures && valuesOf(measures);
+    this.#show(this.#values);
   }
 
   #show(values: Partial<MeasureValues>): void {
     this.#values = values;
     this.#publish();
+    const shown = this.#edited ?? values;
     for (const [name, cell] of this.#cells) {
-      const value = values[name];
+      const value = shown[name];
       const text = value === undefined ? '–' : textOf(name, value, this.#unit);
       if (cell.textContent !== text) cell.textContent = text;
       cell.classList.toggle('bad', value === false || (name === 'crossings' && Number(value) > 0));
     }
   }
+}
+
+function valuesOf({ info, report }: Measures): Partial<MeasureValues> {
+  const { vertices, triangles, components, genus, volume, area } = info;
+  const known: Partial<MeasureValues> = { vertices, triangles, components, chi: info.euler, genus, volume, area };
+  if (!report) return known;
+  return { ...known, closed: report.closed, oriented: report.oriented, crossings: report.selfIntersections };
 }
 
 function textOf(name: Name, value: number | boolean, unit: Unit): string {

@@ -13,13 +13,14 @@ export class Lines {
   /** Shows segments given as pairs of points, packed xyz; they are copied. */
   show(points: Float32Array): void {
     const count = points.length / 3;
+    this.object.visible = count > 0;
+    if (count === 0) return;
     const position = this.#reserve(count);
     (position.array as Float32Array).set(points);
     position.clearUpdateRanges();
     position.addUpdateRange(0, points.length);
     position.needsUpdate = true;
     this.object.geometry.setDrawRange(0, count);
-    this.object.visible = count > 0;
   }
 
   dispose(): void {

@@ -1,4 +1,5 @@
 import { Box3, Plane, type Raycaster, Vector3 } from 'three';
+import { EditedView } from '../finish/edited-view';
 import type { Surface, Vec3 } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
@@ -59,6 +60,8 @@ export class ReconstructionView {
   readonly #outsideByHand = new PointCloud();
   readonly #cameras = new CameraMarks();
   readonly legend = new Legend(diverging);
+  /** Shows an edited surface in place of the reconstructed one. */
+  readonly editing: EditedView;
   /** Called with the position of a click on the surface or beside it; undefined if clicks have no effect. */
   onPick: ((hit: Hit) => void) | undefined;
   #options: CloudViewOptions;
@@ -72,6 +75,7 @@ export class ReconstructionView {
     for (const { object } of [this.#surface, ...this.#clouds, this.#cameras]) this.#viewport.add(object);
     this.#viewport.add(this.#cameras.chosenObject);
     this.#viewport.onClick = (ray) => this.#pick(ray);
+    this.editing = new EditedView(this.#viewport, this.#surface, () => this.#showLegend());
     this.#viewport.onDraw = (_, hurried) => {
       this.#surface.coarse = hurried;
     };
@@ -172,6 +176,7 @@ export class ReconstructionView {
   }
 
   dispose(): void {
+    this.editing.dispose();
     for (const part of [this.#surface, ...this.#clouds, this.#cameras]) part.dispose();
     this.#viewport.dispose();
   }

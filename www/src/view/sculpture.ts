@@ -1,4 +1,5 @@
 import { Box3, Group, type Raycaster, type Texture, Vector3 } from 'three';
+import { EditedView } from '../finish/edited-view';
 import type { Surface, Vec3 } from '../protocol';
 import { boxOf } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Layout, Pose } from '../sculpt/protocol';
@@ -56,6 +57,8 @@ const CAPTIONS: Partial<Record<MeshName, string>> = {
  */
 export class SculptureView {
   readonly legend = new Legend(diverging);
+  /** Shows an edited surface in place of the deformed one. */
+  readonly editing: EditedView;
   readonly handles: EllipsoidHandles;
   /** Called when the view is clicked, with the index of the ellipsoid there, or undefined if there is none. */
   onPick: (index: number | undefined) => void = () => undefined;
@@ -86,6 +89,8 @@ export class SculptureView {
     this.handles.onHover = (hovered) => canvas.toggleAttribute('data-handle', hovered);
     this.#viewport.add(this.handles.object);
     this.#viewport.onClick = (ray) => this.#pick(ray);
+    const deformed = this.#meshes.get('S1dash')?.surface ?? new SurfaceObject();
+    this.editing = new EditedView(this.#viewport, deformed, () => this.#showLegend());
     this.#viewport.onDraw = (_, hurried) => {
       for (const { surface } of this.#meshes.values()) surface.coarse = hurried;
       this.#placeInRow();

@@ -3,7 +3,7 @@ import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 
 /** Quantities with a value at each vertex that can be shown as colours. */
-export type ShownQuantity = VertexQuantity | 'distance' | 'area distortion' | 'angle distortion';
+export type ShownQuantity = VertexQuantity | 'distance' | 'deviation' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
@@ -47,6 +47,14 @@ export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
     title: text('view.pointDistance'),
     power: -1,
     below: text('view.atPoint'),
+    above: text('view.far'),
+    least: 1e-9,
+    positive: true,
+  },
+  deviation: {
+    title: text('finish.deviation'),
+    power: -1,
+    below: text('finish.onReference'),
     above: text('view.far'),
     least: 1e-9,
     positive: true,

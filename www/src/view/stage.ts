@@ -1,5 +1,7 @@
 import type { Raycaster, Vector3 } from 'three';
+import { EditedView } from '../finish/edited-view';
 import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
+import { crossSection } from '../track/cross-section';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { PictureSubject } from '../ui/pictures';
@@ -27,6 +29,8 @@ export class Stage {
   readonly #surface: SurfaceObject;
   readonly #marks = new AttractorMarks();
   readonly #uncoveredMarks = new UncoveredMarks();
+  /** Shows an edited surface in place of that of the run. */
+  readonly editing: EditedView;
   /** Legend of the surface's colours. */
   readonly legend = new Legend(diverging);
   /** If set, receives the world point clicked in a slice or on the surface; used for placing attractors. */
@@ -65,6 +69,10 @@ export class Stage {
       this.#surface.coarse = hurried;
       this.#placeSlices(viewer);
     };
+    this.editing = new EditedView(this.#viewport, this.#surface, () => {
+      this.#showLegend();
+      this.#updateSections();
+    });
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }
@@ -101,6 +109,10 @@ export class Stage {
 
   /** Shows the cross-sections of the surface with the slice planes last passed to `onPlanes`, in the same order. */
   showSections(sections: Float32Array[]): void {
+    if (!this.#surface.edited) this.#drawSections(sections);
+  }
+
+  #drawSections(sections: Float32Array[]): void {
     sections.forEach((section, axis) => {
       this.#scene?.panels[axis]?.setOutline(section);
       this.#scene?.planes[axis]?.showSection(section);
@@ -187,6 +199,7 @@ export class Stage {
   dispose(): void {
     this.#clear();
     this.#surface.dispose();
+    this.editing.dispose();
     this.#viewport.dispose();
   }
 
@@ -202,8 +215,17 @@ export class Stage {
     this.#crosshair = index;
     scene.moveTo(index);
     this.onMoved();
-    const { volume, inverse } = scene;
-    this.#onPlanes(([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, index[axis])));
+    this.#updateSections();
+  }
+
+  /** Updates the cross-sections of the surface: that of the run is in the worker. */
+  #updateSections(): void {
+    if (!this.#scene) return;
+    const { volume, inverse } = this.#scene;
+    const planes = ([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, this.#crosshair[axis]));
+    const { edited } = this.#surface;
+    if (edited) this.#drawSections(planes.map((plane) => crossSection(edited, plane)));
+    else this.#onPlanes(planes);
   }
 
   /**

@@ -92,6 +92,9 @@ export class SurfaceObject {
   #colors: Float32Array = new Float32Array(0);
   /** Magnitude of the values at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
+  /** The surface shown last, and an edited one that is shown in its place, if there is one. */
+  #own: Surface | undefined;
+  #edited: Surface | undefined;
 
   /** `clipping` are the planes that cut the surface, as in `Viewport.clipping`. */
   constructor(clipping: Plane[] = []) {
@@ -109,6 +112,22 @@ export class SurfaceObject {
 
   /** Shows another surface; its arrays are used without a copy until the next one is shown. */
   show(surface: Surface): void {
+    this.#own = surface;
+    if (!this.#edited) this.#display(surface);
+  }
+
+  /** An edited surface, shown in place of the other until it is undefined again. Its values are distances. */
+  set edited(surface: Surface | undefined) {
+    this.#edited = surface;
+    const shown = surface ?? this.#own;
+    if (shown) this.#display(shown);
+  }
+
+  get edited(): Surface | undefined {
+    return this.#edited;
+  }
+
+  #display(surface: Surface): void {
     this.#dropCoarse();
     this.#vertices = surface.vertices;
     this.#corners = 3 * surface.triangles;
@@ -126,6 +145,7 @@ export class SurfaceObject {
    * this is only a preview until the next surface is shown.
    */
   move(positions: Float32Array): void {
+    if (this.#edited) return;
     refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
   }
 
@@ -138,9 +158,17 @@ export class SurfaceObject {
     else if (this.#corners > 3 * SMOOTH && !this.#coarse) this.#makeCoarse();
   }
 
-  /** Magnitude of the values at the ends of the colour scale, for the legend; 0 if the colours represent no values. */
+  /**
+   * Magnitude of the values at the ends of the colour scale, for the legend; 0 if the colours represent no values, or
+   * those of an edited surface.
+   */
   get range(): number {
-    return this.#range;
+    return this.#edited ? 0 : this.#range;
+  }
+
+  /** The same as `range` for the distances of an edited surface from its reference. */
+  get editedRange(): number {
+    return this.#edited ? this.#range : 0;
   }
 
   /** The full mesh, to test for intersections with a ray; reading this ends the drawing of a simplified one. */
@@ -200,7 +228,7 @@ export class SurfaceObject {
   set color(mode: SurfaceColor) {
     if (mode === this.#color) return;
     this.#color = mode;
-    this.#values = new Float32Array(0);
+    if (!this.#edited) this.#values = new Float32Array(0);
     this.#fillColors();
   }
 
@@ -283,7 +311,7 @@ export class SurfaceObject {
 
   /** Colours the surface as chosen. A quantity whose values have not arrived yet is drawn plain. */
   #fillColors(): void {
-    const mode = this.#color;
+    const mode = this.#edited?.values ? 'deviation' : this.#color;
     const shaded = isQuantity(mode) && this.#values.length === this.#vertices;
     const own = mode === 'own' && this.#colors.length === 3 * this.#vertices;
     const on = shaded || own || mode === 'component';

@@ -1,4 +1,5 @@
 import { Box3, Vector3 } from 'three';
+import { EditedView } from '../finish/edited-view';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { sliceVotes } from '../track/clusters';
@@ -62,6 +63,8 @@ export class TrackView {
     () => this.#redraw(),
     (region) => this.onRegion(region),
   );
+  /** Shows an edited surface in place of that of the displayed frame. */
+  readonly editing: EditedView;
   #options: TrackViewOptions;
   #scene: VolumeScene | undefined;
   #shown: Surface | undefined;
@@ -81,6 +84,7 @@ export class TrackView {
     this.#options = options;
     for (const { object } of [this.#surface, this.#cloud, this.#box]) this.#viewport.add(object);
     this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
+    this.editing = new EditedView(this.#viewport, this.#surface, () => this.#updateSections());
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }
@@ -224,6 +228,7 @@ export class TrackView {
 
   dispose(): void {
     this.#clear();
+    this.editing.dispose();
     for (const part of [this.#surface, this.#cloud, this.#box]) part.dispose();
     this.#viewport.dispose();
   }
@@ -251,9 +256,10 @@ export class TrackView {
   #updateSections(): void {
     const scene = this.#scene;
     if (!scene) return;
+    const shown = this.#surface.edited ?? this.#shown;
     for (const axis of [0, 1, 2] as const) {
       const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
-      const section = this.#shown ? crossSection(this.#shown, plane) : new Float32Array(0);
+      const section = shown ? crossSection(shown, plane) : new Float32Array(0);
       scene.panels[axis]?.setOutline(section);
       scene.planes[axis]?.showSection(section);
     }

@@ -85,7 +85,7 @@ export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBu
 }
 
 /** Runs the handler for a request of the page, and replies with the handler's result, or with its failure. */
-async function reply(
+export async function reply(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },
 ): Promise<void> {

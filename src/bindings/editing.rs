@@ -1,0 +1,39 @@
+//! Bindings of cuts by planes, and of the selection of connected components.
+
+use std::rc::Rc;
+
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::convert::point;
+use super::error::Failure;
+use super::mesh::{MeshKind, RawMesh, read_only};
+use crate::remesh::{Plane, cut_by_plane};
+use crate::spatial::outer_components;
+
+#[wasm_bindgen]
+impl RawMesh {
+    /// Cuts the mesh by a plane, and closes it; see [`cut_by_plane`].
+    pub fn cut(&mut self, origin: &[f64], normal: &[f64]) -> Result<(), JsValue> {
+        let plane = Plane { origin: point(origin)?, normal: point(normal)? };
+        Ok(cut_by_plane(self.editable()?, plane).map_err(Failure::from)?)
+    }
+
+    /// Removes all connected components but those of the given indices.
+    #[wasm_bindgen(js_name = keepComponents)]
+    pub fn keep_components(&mut self, indices: &[u32]) -> Result<(), JsValue> {
+        if matches!(self.0, MeshKind::Live(_)) {
+            return Err(read_only().into());
+        }
+        let kept = self.triangles().with_components(indices).map_err(Failure::from)?;
+        let [topology, geometry] = [self.topology_version(), self.geometry_version()];
+        self.0 = MeshKind::Triangles(Rc::new(kept), [topology.wrapping_add(1), geometry.wrapping_add(1)]);
+        Ok(())
+    }
+
+    /// Removes the connected components that others enclose.
+    #[wasm_bindgen(js_name = removeCavities)]
+    pub fn remove_cavities(&mut self) -> Result<(), JsValue> {
+        let outer = outer_components(&self.triangles()).map_err(Failure::from)?;
+        self.keep_components(&outer)
+    }
+}

@@ -1,0 +1,290 @@
+//! Triangulation of polygons with holes in the plane: holes are connected with their surroundings by bridges, then ears
+//! are clipped. All decisions are exact, so the triangles cover the polygon without overlap, and none is degenerate.
+
+use super::DVec2;
+use super::predicates::orient2d;
+
+/// Returns triangles that cover the interior of polygons, which is on the left of their edges: outer loops are
+/// counter-clockwise, holes clockwise, and a hole may contain further polygons. Each loop lists indices into `points`;
+/// all of them become corners, and no others. Triangles are counter-clockwise.
+///
+/// Returns `None` if a loop has fewer than three points or intersects itself or another one. The time is quadratic in
+/// the number of points.
+pub fn triangulate(points: &[DVec2], loops: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
+    let mut polygon = Polygon::new(points, loops)?;
+    polygon.bridge_holes()?;
+    polygon.clip_ears()
+}
+
+/// Corners of loops, doubly linked. A point has several corners once bridges end in it.
+struct Polygon<'a> {
+    points: &'a [DVec2],
+    /// The point of each corner.
+    point: Vec<u32>,
+    next: Vec<usize>,
+    previous: Vec<usize>,
+    /// The lowest corner of each loop, by x, then y. The loop turns there in the direction in which it is oriented.
+    loops: Vec<usize>,
+}
+
+impl<'a> Polygon<'a> {
+    fn new(points: &'a [DVec2], loops: &[Vec<u32>]) -> Option<Self> {
+        let mut polygon =
+            Self { points, point: Vec::new(), next: Vec::new(), previous: Vec::new(), loops: Vec::new() };
+        for corners in loops {
+            let (first, count) = (polygon.point.len(), corners.len());
+            if count < 3 {
+                return None;
+            }
+            polygon.point.extend(corners);
+            polygon.next.extend((0..count).map(|k| first + (k + 1) % count));
+            polygon.previous.extend((0..count).map(|k| first + (k + count - 1) % count));
+            let lowest = (first..first + count).min_by(|&i, &j| polygon.compare(i, j))?;
+            polygon.loops.push(lowest);
+        }
+        Some(polygon)
+    }
+
+    fn at(&self, corner: usize) -> DVec2 {
+        self.points[self.point[corner] as usize]
+    }
+
+    fn compare(&self, i: usize, j: usize) -> std::cmp::Ordering {
+        let (p, q) = (self.at(i), self.at(j));
+        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y))
+    }
+
+    fn turn(&self, a: usize, b: usize, c: usize) -> f64 {
+        orient2d([self.at(a), self.at(b), self.at(c)])
+    }
+
+    /// Returns the corners of a loop, from `first` on.
+    fn corners(&self, first: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::successors(Some(first), move |&corner| {
+            Some(self.next[corner]).filter(|&next| next != first)
+        })
+    }
+
+    /// Connects each hole with a loop of lower corners, from the lowest hole on, so that only outer loops are left.
+    fn bridge_holes(&mut self) -> Option<()> {
+        let mut holes = Vec::new();
+        for &first in &self.loops {
+            let turn = self.turn(self.previous[first], first, self.next[first]);
+            if turn == 0.0 {
+                return None;
+            }
+            if turn < 0.0 {
+                holes.push(first);
+            }
+        }
+        self.loops.retain(|first| !holes.contains(first));
+        holes.sort_by(|&i, &j| self.compare(i, j));
+        for hole in holes {
+            let end = self.bridge_end(hole)?;
+            self.bridge(hole, end);
+        }
+        Some(())
+    }
+
+    /// Returns the nearest corner that is visible from the lowest corner of a hole, among those that are lower: such a
+    /// corner always exists, and is of an outer loop, or of a lower hole.
+    fn bridge_end(&self, hole: usize) -> Option<usize> {
+        let mut lower: Vec<usize> =
+            (0..self.point.len()).filter(|&corner| self.compare(corner, hole).is_lt()).collect();
+        let square = |corner: usize| self.at(corner).distance_squared(self.at(hole));
+        lower.sort_by(|&i, &j| square(i).total_cmp(&square(j)).then(i.cmp(&j)));
+        lower.into_iter().find(|&end| self.sees(hole, end) && self.sees(end, hole) && self.is_free(hole, end))
+    }
+
+    /// Returns whether the direction from one corner to another points into the interior of the polygon.
+    fn sees(&self, from: usize, to: usize) -> bool {
+        let (previous, next) = (self.previous[from], self.next[from]);
+        let (in_turn, out_turn) = (self.turn(previous, from, to), self.turn(from, next, to));
+        if self.turn(previous, from, next) > 0.0 {
+            in_turn > 0.0 && out_turn > 0.0
+        } else {
+            in_turn > 0.0 || out_turn > 0.0
+        }
+    }
+
+    /// Returns whether the segment between two corners touches no edge but those at its ends.
+    fn is_free(&self, from: usize, to: usize) -> bool {
+        let [p, q] = [self.point[from], self.point[to]];
+        (0..self.point.len()).all(|start| {
+            let end = self.next[start];
+            let has_end = |point| self.point[start] == point || self.point[end] == point;
+            has_end(p) || has_end(q) || !self.segments_touch([from, to], [start, end])
+        })
+    }
+
+    fn segments_touch(&self, [a, b]: [usize; 2], [c, d]: [usize; 2]) -> bool {
+        let (p, q, r, s) = (self.at(a), self.at(b), self.at(c), self.at(d));
+        let are_apart = |low: DVec2, high: DVec2| low.x > high.x || low.y > high.y;
+        if are_apart(p.min(q), r.max(s)) || are_apart(r.min(s), p.max(q)) {
+            return false;
+        }
+        let is_one_side = |x: f64, y: f64| (x > 0.0 && y > 0.0) || (x < 0.0 && y < 0.0);
+        !is_one_side(self.turn(a, b, c), self.turn(a, b, d))
+            && !is_one_side(self.turn(c, d, a), self.turn(c, d, b))
+    }
+
+    /// Joins two loops by two opposite edges between their corners `a` and `b`, each of which gets a copy.
+    fn bridge(&mut self, a: usize, b: usize) {
+        let copy_of_a = self.point.len();
+        let copy_of_b = copy_of_a + 1;
+        self.point.extend([self.point[a], self.point[b]]);
+        let (after_a, after_b) = (self.next[a], self.next[b]);
+        self.next.extend([after_a, after_b]);
+        self.previous.extend([copy_of_b, copy_of_a]);
+        // a -> b's copy -> after b … b -> a's copy -> after a …
+        self.next[a] = copy_of_b;
+        self.previous[copy_of_b] = a;
+        self.next[copy_of_b] = after_b;
+        self.previous[after_b] = copy_of_b;
+        self.next[b] = copy_of_a;
+        self.previous[copy_of_a] = b;
+        self.previous[after_a] = copy_of_a;
+    }
+
+    fn clip_ears(&mut self) -> Option<Vec<[u32; 3]>> {
+        let mut triangles = Vec::with_capacity(self.point.len());
+        for first in self.loops.clone() {
+            self.clip_ears_of(first, &mut triangles)?;
+        }
+        Some(triangles)
+    }
+
+    fn clip_ears_of(&mut self, first: usize, triangles: &mut Vec<[u32; 3]>) -> Option<()> {
+        let mut left = self.corners(first).count();
+        let (mut corner, mut misses) = (first, 0);
+        while left > 3 {
+            let (previous, next) = (self.previous[corner], self.next[corner]);
+            if self.is_ear(corner) {
+                triangles.push([previous, corner, next].map(|corner| self.point[corner]));
+                self.next[previous] = next;
+                self.previous[next] = previous;
+                (left, misses) = (left - 1, 0);
+                // Not the neighbour: fans of needles would develop.
+                corner = self.next[next];
+            } else {
+                misses += 1;
+                if misses > left {
+                    return None;
+                }
+                corner = next;
+            }
+        }
+        let last = [self.previous[corner], corner, self.next[corner]];
+        triangles.push(last.map(|corner| self.point[corner]));
+        (self.turn(last[0], last[1], last[2]) > 0.0).then_some(())
+    }
+
+    /// Returns whether the triangle of a corner and its neighbours is inside the polygon and touches none of its other
+    /// points.
+    fn is_ear(&self, corner: usize) -> bool {
+        let (a, c) = (self.previous[corner], self.next[corner]);
+        if self.turn(a, corner, c) <= 0.0 || !self.sees(a, c) || !self.sees(c, a) {
+            return false;
+        }
+        let points = [a, corner, c].map(|corner| self.point[corner]);
+        let [p, q, r] = [a, corner, c].map(|corner| self.at(corner));
+        let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+        let is_inside = |other: usize| {
+            let at = self.at(other);
+            let is_near = at.x >= low.x && at.x <= high.x && at.y >= low.y && at.y <= high.y;
+            is_near
+                && !points.contains(&self.point[other])
+                && [[p, q], [q, r], [r, p]].iter().all(|&[from, to]| orient2d([from, to, at]) >= 0.0)
+        };
+        !self.corners(self.next[c]).take_while(|&other| other != a).any(is_inside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn area(points: &[DVec2], corners: &[u32]) -> f64 {
+        let at = |k: usize| points[corners[k % corners.len()] as usize];
+        0.5 * (0..corners.len()).map(|k| at(k).perp_dot(at(k + 1))).sum::<f64>()
+    }
+
+    /// Triangulates, and checks that the triangles face upwards, use all points, and cover the polygon's area.
+    fn assert_covers(points: &[DVec2], loops: &[Vec<u32>]) {
+        let triangles = triangulate(points, loops).expect("the polygon is simple");
+        assert!(triangles.iter().all(|t| area(points, t) > 0.0));
+        let covered: f64 = triangles.iter().map(|t| area(points, t)).sum();
+        let enclosed: f64 = loops.iter().map(|corners| area(points, corners)).sum();
+        assert!((covered - enclosed).abs() < 1e-9 * enclosed, "{covered} of {enclosed}");
+        let mut used: Vec<u32> = triangles.into_iter().flatten().collect();
+        used.sort_unstable();
+        used.dedup();
+        assert_eq!(used.len(), loops.iter().map(Vec::len).sum::<usize>());
+    }
+
+    /// Appends a square with `per_side` points a side, counter-clockwise or clockwise, and returns its loop.
+    fn square(points: &mut Vec<DVec2>, corner: DVec2, side: f64, per_side: u32, is_hole: bool) -> Vec<u32> {
+        let first = points.len() as u32;
+        for (from, to) in [([0, 0], [1, 0]), ([1, 0], [1, 1]), ([1, 1], [0, 1]), ([0, 1], [0, 0])] {
+            let [from, to] = [from, to].map(|[x, y]: [i32; 2]| DVec2::new(x.into(), y.into()));
+            let along = |k: u32| corner + side * from.lerp(to, f64::from(k) / f64::from(per_side));
+            points.extend((0..per_side).map(along));
+        }
+        let corners = first..points.len() as u32;
+        if is_hole { corners.rev().collect() } else { corners.collect() }
+    }
+
+    #[test]
+    fn squares_with_points_on_their_sides_and_nested_holes() {
+        let mut points = Vec::new();
+        let mut loops = vec![square(&mut points, DVec2::ZERO, 12.0, 3, false)];
+        for (x, y) in [(1.0, 1.0), (5.0, 1.0), (1.0, 5.0), (9.0, 9.0)] {
+            loops.push(square(&mut points, DVec2::new(x, y), 2.0, 2, true));
+        }
+        loops.push(square(&mut points, DVec2::new(5.0, 5.0), 3.0, 4, true));
+        loops.push(square(&mut points, DVec2::new(6.0, 6.0), 1.0, 1, false));
+        assert_covers(&points, &loops);
+    }
+
+    #[test]
+    fn random_stars_with_random_holes() {
+        for seed in 0..300 {
+            let mut random = Random::new(seed);
+            let mut points = Vec::new();
+            let mut star = |centre: DVec2, least: f64, most: f64, is_hole: bool| {
+                let (first, count) = (points.len() as u32, 3 + random.below(40) as u32);
+                for k in 0..count {
+                    let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
+                    let (sine, cosine) = libm::sincos(angle);
+                    let radius = least + (most - least) * random.unit();
+                    points.push(centre + radius * DVec2::new(cosine, sine));
+                }
+                let corners = first..first + count;
+                if is_hole { corners.rev().collect() } else { corners.collect() }
+            };
+            let mut loops: Vec<Vec<u32>> = vec![star(DVec2::ZERO, 20.0, 40.0, false)];
+            for (x, y) in [(0.0, 0.0), (4.5, 0.0), (0.0, -4.5), (-3.0, 3.0)] {
+                loops.push(star(DVec2::new(x, y), 0.3, 2.0, true));
+            }
+            let outer = loops[0].len();
+            // A triangle's inner circle has half its radius: holes near its corner would not be inside.
+            if outer > 4 {
+                assert_covers(&points, &loops);
+            }
+        }
+    }
+
+    #[test]
+    fn loops_that_intersect_are_rejected() {
+        let points = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]].map(DVec2::from);
+        assert_eq!(triangulate(&points, &[vec![0, 1, 2, 3]]), None);
+        assert_eq!(triangulate(&points, &[vec![0, 1]]), None);
+        let mut points = Vec::new();
+        let outer = square(&mut points, DVec2::ZERO, 4.0, 1, false);
+        let beside = square(&mut points, DVec2::new(5.0, 0.0), 1.0, 1, true);
+        assert_eq!(triangulate(&points, &[outer, beside]), None);
+    }
+}

@@ -1,0 +1,11 @@
+import { Channel } from '../channel';
+import type { Requests } from './protocol';
+
+const spawn = () => new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle edits' });
+
+/** The page's connection to the worker that edits and compares surfaces; all labs have the same. */
+export class FinishClient extends Channel<Requests, never> {
+  constructor(onFailure: () => void) {
+    super(spawn, onFailure);
+  }
+}

@@ -1,0 +1,174 @@
+import { text } from '../texts';
+import { h, uniqueId } from '../ui/dom';
+import { fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
+import { figure } from '../ui/format';
+import type { Finishing } from './finishing';
+import type { Comparison, Distances } from './protocol';
+
+const MEASURES = [
+  ['mean', text('finish.mean')],
+  ['rms', text('finish.rms')],
+  ['p95', text('finish.p95')],
+  ['max', text('finish.hausdorff')],
+] as const satisfies [keyof Distances, string][];
+const DIRECTIONS = [
+  ['toReference', text('finish.toReference')],
+  ['fromReference', text('finish.fromReference')],
+  ['both', text('finish.both')],
+] as const satisfies [keyof Comparison, string][];
+
+export interface ComparePanelEvents {
+  /** Called with the distance of each vertex from the reference, to be shown as colours; undefined for none. */
+  onValues: (values: Float32Array | undefined) => void;
+  onSave: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
+}
+
+/** Panel that compares the surface with a reference, a mesh or a label map, from files. */
+export class ReferencePanel {
+  readonly element: HTMLElement;
+  /** Unit of length, or empty. */
+  unit = '';
+  readonly #finishing: Finishing;
+  readonly #events: ComparePanelEvents;
+  readonly #status = h('p', { class: 'help', role: 'status', 'data-reference': 'status' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #result = h('div', { 'data-reference': 'result' });
+  readonly #label = h('select', { id: uniqueId('label') });
+  readonly #labelRow: HTMLElement;
+  readonly #colors = h('input', { type: 'checkbox', checked: true });
+  readonly #more: HTMLElement;
+  /** Name of the reference; undefined if there is none. */
+  #name: string | undefined;
+  #comparison: Comparison | undefined;
+  /** Counts comparisons, so that only the newest is shown. */
+  #asked = 0;
+
+  constructor(finishing: Finishing, events: ComparePanelEvents) {
+    this.#finishing = finishing;
+    this.#events = events;
+    const chooser = fileChooser(
+      (files) => void this.#open(files),
+      `.ply,.stl,.obj,.glb,${VOLUME_FILES}`,
+      text('finish.openReference'),
+    );
+    this.#label.addEventListener('change', () => void this.compare());
+    this.#labelRow = h('div', { class: 'row' }, h('label', { for: this.#label.id }, text('finish.label')), this.#label);
+    this.#colors.addEventListener('change', () => this.#color());
+    this.#more = h(
+      'div',
+      { hidden: true },
+      this.#labelRow,
+      this.#result,
+      h('label', {}, this.#colors, ' ', text('finish.colors')),
+
+      h('button', { type: 'button', 'data-reference': 'csv', onclick: () => this.#save() }, text('finish.csv')),
+    );
+    this.element = h(
+      'div',
+      { class: 'reference' },
+      h('p', { class: 'help' }, text('finish.referenceHelp')),
+      h('div', { class: 'row' }, chooser),
+      this.#status,
+      this.#error,
+      this.#more,
+    );
+    this.#acceptDrops();
+  }
+
+  /** Compares the present surface with the reference, if there is one. */
+  async compare(): Promise<void> {
+    if (this.#name === undefined) return;
+    const asked = ++this.#asked;
+    const label = this.#label.value === '' ? {} : { label: Number(this.#label.value) };
+    await this.#attempt(async () => {
+      const found = await this.#finishing.request('compare', label);
+      if (asked === this.#asked) this.#show(found);
+    });
+  }
+
+  /** Removes the results, as the surface has changed; the reference stays. */
+  clear(): void {
+    this.#asked += 1;
+    this.#comparison = undefined;
+    this.#more.hidden = true;
+    this.#color();
+  }
+
+  async #open(files: File[]): Promise<void> {
+    await this.#attempt(async () => {
+      await this.#finishing.request('reference', await readFiles(files));
+      this.#name = nameOf(files);
+      this.#label.replaceChildren();
+      await this.compare();
+    });
+  }
+
+  async #attempt(work: () => Promise<void>): Promise<void> {
+    this.#error.textContent = '';
+    this.#status.textContent = text('controls.comparing');
+    try {
+      await work();
+      this.#status.textContent = this.#name ?? '';
+    } catch (error) {
+      this.#status.textContent = this.#name ?? '';
+      const reason = error instanceof Error ? error.message : String(error);
+      this.#error.textContent = text('finish.referenceFailed', { reason });
+    }
+  }
+
+  #show(found: Comparison): void {
+    this.#comparison = found;
+    this.#more.hidden = false;
+    this.#labelRow.hidden = found.labels.length < 2;
+    if (this.#label.options.length === 0) {
+      const option = (value: string, name: string) => h('option', { value }, name);
+      this.#label.append(option('', text('finish.allLabels')), ...found.labels.map((n) => option(`${n}`, `${n}`)));
+    }
+    const heads = ['', ...DIRECTIONS.map(([, label]) => label)].map((label) => h('th', { scope: 'col' }, label));
+    const rows = MEASURES.map(([measure, label]) => {
+      const cells = DIRECTIONS.map(([name]) => h('td', {}, `${figure(found[name][measure])} ${this.unit}`.trim()));
+      return h('tr', {}, h('th', { scope: 'row' }, label), ...cells);
+    });
+    const table = h(
+      'table',
+      { class: 'times distances' },
+      h('thead', {}, h('tr', {}, ...heads)),
+      h('tbody', {}, ...rows),
+    );
+    const { dice } = found;
+    const overlap = dice === undefined ? text('finish.noDice') : text('finish.dice', { value: dice.toFixed(4) });
+    this.#result.dataset.values = JSON.stringify({ ...found, values: undefined });
+    this.#result.replaceChildren(h('div', { class: 'scroll' }, table), h('p', { class: 'help' }, overlap));
+    this.#color();
+  }
+
+  #color(): void {
+    this.#events.onValues(this.#colors.checked ? this.#comparison?.values : undefined);
+  }
+
+  #save(): void {
+    const found = this.#comparison;
+    if (!found) return;
+    const head = ['direction', ...MEASURES.map(([name]) => (name === 'max' ? 'hausdorff' : name))];
+    const lines = DIRECTIONS.map(([name]) => [name, ...MEASURES.map(([measure]) => found[name][measure])]);
+    const all = [head, ...lines, ['dice', found.dice ?? '']].map((line) => line.join(','));
+    this.#events.onSave('csv', new TextEncoder().encode(`${all.join('\n')}\n`), 'text/csv', '-comparison');
+  }
+
+  /** Accepts files dropped on the panel, before the page takes them for data of the lab. */
+  #acceptDrops(): void {
+    const { element } = this;
+    element.addEventListener('dragover', (event) => {
+      event.preventDefault();
+      event.stopPropagation();
+    });
+    element.addEventListener('drop', (event) => {
+      event.preventDefault();
+      event.stopPropagation();
+      // Hides what the page shows while files are dragged.
+      window.dispatchEvent(new DragEvent('dragleave'));
+      const files = [...(event.dataTransfer?.files ?? [])];
+      if (files.length > 0) void this.#open(files);
+    });
+  }
+}

@@ -1,0 +1,67 @@
+import type { Raycaster } from 'three';
+import type { Surface } from '../protocol';
+import { token } from '../ui/dom';
+import { Legend } from '../ui/legend';
+import { Lines } from '../view/lines';
+import { diverging, QUANTITIES, quantityTitle } from '../view/shading';
+import type { SurfaceObject } from '../view/surface';
+import type { Viewport } from '../view/viewport';
+import type { SurfacePoint } from './protocol';
+
+/** Shows an edited surface in place of the one in a lab's 3D view, draws lines, and takes clicks on the surface. */
+export class EditedView {
+  /** Legend of the distances from a reference. */
+  readonly legend = new Legend(diverging);
+  /** Unit of length, or empty. */
+  unit = '';
+  readonly #viewport: Viewport;
+  readonly #surface: SurfaceObject;
+  readonly #onChange: () => void;
+  readonly #lines = new Lines(token('--attractor'));
+  /** The view's own handler of clicks, while these are taken here. */
+  #onClick: ((ray: Raycaster) => void) | undefined;
+
+  /** `onChange` is called when another surface is shown, to update legend and outlines. */
+  constructor(viewport: Viewport, surface: SurfaceObject, onChange: () => void) {
+    this.#viewport = viewport;
+    this.#surface = surface;
+    this.#onChange = onChange;
+    // In front of the surface, through which a straight line passes.
+    this.#lines.object.material.depthTest = false;
+    this.#lines.object.renderOrder = 1;
+    surface.object.add(this.#lines.object);
+  }
+
+  /** Shows an edited surface, with its values as colours if it has some; undefined shows the lab's own again. */
+  show(edited: Surface | undefined): void {
+    if (!edited && !this.#surface.edited) return;
+    this.#surface.edited = edited;
+    const range = this.#surface.editedRange;
+    if (range > 0) this.legend.show({ ...QUANTITIES.deviation, title: quantityTitle('deviation', this.unit) }, range);
+    else this.legend.hide();
+    this.#onChange();
+    this.#viewport.invalidate();
+  }
+
+  /** Draws line segments, pairs of points. */
+  showLines(points: Float32Array): void {
+    this.#lines.show(points);
+    this.#viewport.invalidate();
+  }
+
+  /** Passes clicks on the surface to `take`; undefined ends that. */
+  pick(take: ((at: SurfacePoint) => void) | undefined): void {
+    this.#onClick ??= this.#viewport.onClick;
+    this.#viewport.onClick = take ? (ray) => this.#click(ray, take) : this.#onClick;
+  }
+
+  dispose(): void {
+    this.#lines.dispose();
+  }
+
+  #click(ray: Raycaster, take: (at: SurfacePoint) => void): void {
+    const [hit] = ray.intersectObject(this.#surface.target, false);
+    const local = hit && this.#surface.object.worldToLocal(hit.point.clone());
+    if (hit && local) take({ triangle: hit.faceIndex ?? 0, point: local.toArray() });
+  }
+}

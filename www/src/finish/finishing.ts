@@ -1,0 +1,92 @@
+import { RequestError } from '../channel';
+import type { MeshFormat } from '../protocol';
+import { text } from '../texts';
+import { FinishClient } from './client';
+import type { Edited, RequestKind, Requests } from './protocol';
+
+/**
+ * A surface that is edited after a run. Its worker starts with the first request, which also passes the lab's surface
+ * to it.
+ */
+export class Finishing {
+  readonly #mesh: () => Promise<Uint8Array>;
+  readonly #onChange: (edited: Edited | undefined) => void;
+  #client: FinishClient | undefined;
+  #opening: Promise<void> | undefined;
+  #edited: Edited | undefined;
+  /** Counts the lab's surfaces. */
+  #surface = 0;
+  /** The surface before the edits, as a PLY file. */
+  initial: Uint8Array | undefined;
+
+  /** `mesh` returns the lab's surface as a PLY file; `onChange` receives the edited one, or undefined if there is none. */
+  constructor(mesh: () => Promise<Uint8Array>, onChange: (edited: Edited | undefined) => void) {
+    this.#mesh = mesh;
+    this.#onChange = onChange;
+  }
+
+  get edited(): Edited | undefined {
+    return this.#edited;
+  }
+
+  /** Passes the lab's surface to the worker, unless that is done. */
+  open(): Promise<void> {
+    this.#opening ??= this.#open().catch((error) => {
+      this.#opening = undefined;
+      throw error;
+    });
+    return this.#opening;
+  }
+
+  async request<K extends RequestKind>(kind: K, body: Requests[K]['body']): Promise<Requests[K]['reply']> {
+    await this.open();
+    if (!this.#client) throw new RequestError({ code: 'page', message: text('finish.noSurface') });
+    return this.#client.request(kind, body);
+  }
+
+  async change<K extends 'edit' | 'undo' | 'redo'>(kind: K, body: Requests[K]['body']): Promise<void> {
+    const surface = this.#surface;
+    const edited = await this.request(kind, body);
+    if (surface === this.#surface) this.#adopt(edited);
+  }
+
+  /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */
+  exported(format: MeshFormat): Promise<Uint8Array> | undefined {
+    return this.#edited?.log.length ? this.#client?.request('export', format) : undefined;
+  }
+
+  /** Forgets the edits, as the lab's surface has changed. */
+  reset(): void {
+    this.#surface += 1;
+    this.#opening = undefined;
+    this.initial = undefined;
+    if (this.#edited) this.#adopt(undefined);
+  }
+
+  close(): void {
+    this.#client?.close();
+  }
+
+  async #open(): Promise<void> {
+    const surface = this.#surface;
+    const bytes = await this.#mesh();
+    this.#client ??= new FinishClient(() => this.#lose());
+    const edited = await this.#client.request('open', bytes);
+    // Forgotten while it was being opened.
+    if (surface !== this.#surface) return;
+    this.initial = bytes;
+    this.#adopt(edited);
+  }
+
+  #adopt(edited: Edited | undefined): void {
+    this.#edited = edited;
+    this.#onChange(edited);
+  }
+
+  /** After the worker broke, the next request starts another one. */
+  #lose(): void {
+    this.#client?.close();
+    this.#client = undefined;
+    this.reset();
+  }
+}

@@ -1,0 +1,90 @@
+/** Editing and comparison of a surface after a run, the same in all labs. */
+import type { Unit } from '../examples';
+import type { MeshFormat } from '../protocol';
+import { text } from '../texts';
+import { folded } from '../ui/dom';
+import type { MeasurePanel } from '../ui/measures';
+import { ReferencePanel } from './compare-panel';
+import { EditPanel } from './edit-panel';
+import type { EditedView } from './edited-view';
+import { Finishing } from './finishing';
+import type { Edited } from './protocol';
+
+/** Parts of a lab that the tools use. */
+export interface FinishHost {
+  /** Returns the lab's surface as a PLY file. */
+  mesh: () => Promise<Uint8Array>;
+  view: EditedView;
+  measures: MeasurePanel;
+  save: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
+}
+
+/** Panels that edit the surface of a lab and compare it with a reference. */
+export class Finish {
+  readonly elements: HTMLElement[];
+  readonly #host: FinishHost;
+  readonly #finishing: Finishing;
+  readonly #edits: EditPanel;
+  readonly #reference: ReferencePanel;
+  #values: Float32Array | undefined;
+
+  constructor(host: FinishHost) {
+    this.#host = host;
+    this.#finishing = new Finishing(host.mesh, (edited) => this.#adopt(edited));
+    this.#edits = new EditPanel(this.#finishing, host.view);
+    this.#reference = new ReferencePanel(this.#finishing, {
+      onValues: (values) => {
+        this.#values = values;
+        this.#show();
+      },
+      onSave: host.save,
+    });
+    const edits = folded(text('finish.title'), this.#edits.element);
+    edits.addEventListener('toggle', () => {
+      this.#edits.unfolded = edits.open;
+    });
+    this.elements = [edits, folded(text('finish.compareTitle'), this.#reference.element)];
+  }
+
+  /** Unit of length of the surface, or empty. */
+  set unit(unit: Unit) {
+    this.#edits.unit = unit;
+    this.#reference.unit = unit;
+    this.#host.view.unit = unit;
+  }
+
+  /** Whether the lab has a surface that does not change by itself. */
+  set enabled(enabled: boolean) {
+    this.#edits.enabled = enabled;
+  }
+
+  /** Returns the edited surface as a file; undefined if there are no edits. */
+  exported(format: MeshFormat): Promise<Uint8Array> | undefined {
+    return this.#finishing.exported(format);
+  }
+
+  /** Forgets the edits, as the lab's surface has changed. */
+  reset(): void {
+    this.#finishing.reset();
+  }
+
+  close(): void {
+    this.#finishing.close();
+  }
+
+  #adopt(edited: Edited | undefined): void {
+    this.#edits.show(edited);
+    this.#reference.clear();
+    this.#show();
+    if (edited) void this.#reference.compare();
+  }
+
+  /** Shows the edited surface, or the lab's own as long as there are neither edits nor colours. */
+  #show(): void {
+    const { edited } = this.#finishing;
+    const values = this.#values;
+    const isShown = edited && (values || edited.log.length > 0);
+    this.#host.view.show(isShown ? { ...edited.surface, ...(values && { values }) } : undefined);
+    this.#host.measures.showEdited(isShown ? edited.measures : undefined);
+  }
+}

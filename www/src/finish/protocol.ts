@@ -1,0 +1,79 @@
+/** Messages between the page and the worker that edits and compares surfaces after a run. */
+import type { Measures, MeshFormat, NamedBytes, Surface, Vec3 } from '../protocol';
+
+/** One edit of a surface: the name of a method of `Mesh`, and its arguments by name. */
+export type Edit =
+  | { op: 'remesh'; min: number; max: number }
+  | { op: 'decimate'; targetTriangles: number }
+  | { op: 'smooth'; iterations: number; keepVolume: boolean }
+  | { op: 'keepComponents'; indices: number[] }
+  | { op: 'removeCavities' }
+  | { op: 'cut'; origin: Vec3; normal: Vec3 };
+
+/** A connected component, in the order of {@link Edited.components}, which is that of `Mesh.components`. */
+export interface Component {
+  vertices: number;
+  /** Negative for the wall of a cavity. */
+  volume: number;
+  area: number;
+}
+
+/** The edited surface and everything the page shows of it. */
+export interface Edited {
+  surface: Surface;
+  measures: Measures;
+  components: Component[];
+  /** Edits so far, those that were undone left out. */
+  log: Edit[];
+  /** Whether the last edit can be undone: there is memory for some of the surfaces before. */
+  undoable: boolean;
+  /** Whether an edit was undone last, and can be redone. */
+  redoable: boolean;
+}
+
+/** A point on the surface, by the index of its triangle. */
+export interface SurfacePoint {
+  triangle: number;
+  point: Vec3;
+}
+
+/** Summary of the distances of points of one surface to another one, world units. */
+export interface Distances {
+  mean: number;
+  rms: number;
+  p95: number;
+  max: number;
+}
+
+/** Comparison of the edited surface with a reference. */
+export interface Comparison {
+  toReference: Distances;
+  fromReference: Distances;
+  /** Both directions together, as `Mesh.distanceTo` returns them. */
+  both: Distances;
+  /** Dice coefficient of the voxels inside; undefined where the reference is open. */
+  dice: number | undefined;
+  /** Labels of a reference that is a label map with several. */
+  labels: number[];
+  /** Distance of each vertex of the edited surface to the reference. */
+  values: Float32Array;
+}
+
+export interface Requests {
+  /** Takes over a surface as the bytes of a mesh file; edits of the one before are forgotten. */
+  open: { body: Uint8Array; reply: Edited };
+  edit: { body: Edit; reply: Edited };
+  undo: { body: undefined; reply: Edited };
+  redo: { body: undefined; reply: Edited };
+  export: { body: MeshFormat; reply: Uint8Array };
+  /** Cross-section of the surface with a plane: pairs of points. */
+  section: { body: { origin: Vec3; normal: Vec3 }; reply: Float32Array };
+  /** Distances between two points, straight and along the surface; the latter is Infinity between two components. */
+  measure: { body: [SurfacePoint, SurfacePoint]; reply: { straight: number; geodesic: number } };
+  /** Reads a mesh, or a label map, as the reference of `compare`. */
+  reference: { body: NamedBytes[]; reply: undefined };
+  /** Compares with the reference; of a label map, the voxels of one label, or of all. */
+  compare: { body: { label?: number }; reply: Comparison };
+}
+
+export type RequestKind = keyof Requests;

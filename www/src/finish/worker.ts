@@ -1,0 +1,162 @@
+/** Worker that edits a surface after a run, and compares it with a reference. */
+import init, { Mesh, Volume } from 'vesicle';
+import { importVolume } from '../importers';
+import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
+import { Refusal } from '../worker/refusal';
+import { type Handlers, reply, withTransfer } from '../worker/serving';
+import { copySurface, emptyArrays } from '../worker/surface-buffers';
+import { readFiles } from '../worker/volumes';
+import { apply } from './code';
+import { distancesBetween, gridAround } from './distances';
+import type { Comparison, Edit, Edited, RequestKind, Requests, SurfacePoint } from './protocol';
+
+/** Number of triangles in all surfaces that are kept for undo. */
+const KEPT_TRIANGLES = 5_000_000;
+
+/** The surfaces after each edit, as far as they are kept, from the oldest to the newest, those undone included. */
+let states: { mesh: Mesh; log: Edit[] }[] = [];
+/** Index of the surface shown. */
+let present = 0;
+/** The reference of comparisons: a mesh, or a label map, whose surface is compared. */
+let reference: Mesh | Volume | undefined;
+
+function current(): { mesh: Mesh; log: Edit[] } {
+  const state = states[present];
+  if (!state) throw new Refusal('page', text('finish.noSurface'));
+  return state;
+}
+
+function edited(): Edited {
+  const { mesh, log } = current();
+  const components = mesh.components().map((part) => {
+    const { vertices, volume, area } = part.info();
+    part.free();
+    return { vertices, volume, area };
+  });
+  const surface = copySurface(emptyArrays(), mesh);
+  const measures = { info: mesh.info(), report: mesh.check() };
+  const rest = { undoable: present > 0, redoable: present < states.length - 1 };
+  return withTransfer({ surface, measures, components, log, ...rest }, arraysOf(surface));
+}
+
+const arraysOf = ({ positions, normals, indices }: Edited['surface']) => [positions, normals, indices];
+
+function open(bytes: Uint8Array): Edited {
+  const mesh = Mesh.parse(bytes);
+  for (const state of states) state.mesh.free();
+  states = [{ mesh, log: [] }];
+  present = 0;
+  return edited();
+}
+
+function edit(change: Edit): Edited {
+  const { mesh, log } = current();
+  const changed = mesh.clone();
+  try {
+    apply(changed, change);
+  } catch (error) {
+    changed.free();
+    throw error;
+  }
+  for (const undone of states.splice(present + 1)) undone.mesh.free();
+  states.push({ mesh: changed, log: [...log, change] });
+  dropOldest();
+  present = states.length - 1;
+  return edited();
+}
+
+/** Frees the oldest surfaces beyond the limit, but the one before the last edit. */
+function dropOldest(): void {
+  let kept = states.reduce((sum, { mesh }) => sum + mesh.triangleCount, 0);
+  while (kept > KEPT_TRIANGLES && states.length > 2) {
+    const mesh = states.shift()?.mesh;
+    kept -= mesh?.triangleCount ?? 0;
+    mesh?.free();
+  }
+}
+
+function travel(step: 1 | -1): Edited {
+  present = Math.min(states.length - 1, Math.max(0, present + step));
+  return edited();
+}
+
+/**
+ * Returns the distances between two points on the surface. They are made vertices of a copy, each dividing its triangle
+ * into three, so that paths begin and end in them.
+ */
+function measure([from, to]: [SurfacePoint, SurfacePoint]): { straight: number; geodesic: number } {
+  const { positions, indices } = current().mesh.arrays();
+  const corners = [...indices];
+  const first = positions.length / 3;
+  const insert = (triangle: number, vertex: number) => {
+    const [a = 0, b = 0, c = 0] = corners.slice(3 * triangle, 3 * triangle + 3);
+    corners.splice(3 * triangle, 3, a, b, vertex);
+    corners.push(b, c, vertex, c, a, vertex);
+  };
+  insert(from.triangle, first);
+  // In the same triangle, the straight line is on the surface.
+  if (from.triangle !== to.triangle) insert(to.triangle, first + 1);
+  const points = Float32Array.from([...positions, ...from.point, ...to.point]);
+  const straight = Math.hypot(...from.point.map((x, axis) => x - (to.point[axis] ?? 0)));
+  if (from.triangle === to.triangle) return { straight, geodesic: straight };
+  const refined = Mesh.fromArrays(points, Uint32Array.from(corners));
+  try {
+    return { straight, geodesic: refined.geodesic(first)[first + 1] ?? Number.POSITIVE_INFINITY };
+  } finally {
+    refined.free();
+  }
+}
+
+async function readReference(files: NamedBytes[]): Promise<undefined> {
+  const [file] = files;
+  const isMesh = file && files.length === 1 && /\.(ply|stl|obj|glb)$/i.test(file.name);
+  const read = isMesh ? Mesh.parse(file.bytes) : new Volume((await importVolume(files)) ?? (await readFiles(files)));
+  reference?.free();
+  reference = read;
+}
+
+function compare({ label }: { label?: number }): Comparison {
+  if (!reference) throw new Refusal('page', text('finish.noReference'));
+  const { mesh } = current();
+  if (reference instanceof Mesh) {
+    const grid = reference.check().closed ? gridAround(mesh, reference) : undefined;
+    const mask = grid && reference.toVolume(grid);
+    return compareWith(reference, mesh, mask, []);
+  }
+  const labels = reference.labels().map(({ value }) => value);
+  const mask = label === undefined ? reference.label(labels) : reference.label(label);
+  const surface = Mesh.marchingCubes(mask, 0.5);
+  const found = compareWith(surface, mesh, mask, labels);
+  surface.free();
+  return found;
+}
+
+/** Compares with a surface and, if it is given, the mask of its voxels, which is freed. */
+function compareWith(surface: Mesh, mesh: Mesh, mask: Volume | undefined, labels: number[]): Comparison {
+  const own = mask && mesh.toVolume(mask);
+  const dice = own?.dice(mask as Volume);
+  own?.free();
+  mask?.free();
+  const found = { ...distancesBetween(mesh, surface), dice, labels };
+  return withTransfer(found, [found.values]);
+}
+
+const handlers: Handlers<Requests> = {
+  open,
+  edit,
+  undo: () => travel(-1),
+  redo: () => travel(1),
+  export: (format) => current().mesh.toBytes(format),
+  section: ({ origin, normal }) => current().mesh.crossSection(origin, normal),
+  measure,
+  reference: readReference,
+  compare,
+};
+
+const started = init();
+
+self.onmessage = async ({ data }: MessageEvent<{ id: number; kind: RequestKind; body: unknown }>) => {
+  await started;
+  await reply(handlers, data);
+};
