@@ -5,7 +5,7 @@ use super::awake::{Awake, ITERATIONS_TO_SLEEP, stillness};
 use super::domain::Domain;
 use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
-use crate::math::{Bounds, Vec3, higher};
+use crate::math::{Bounds, Vec3, higher, resize};
 use crate::mesh::{Mesh, VertexId};
 
 /// The speed of the mesh in one iteration, by which convergence is judged.
@@ -78,7 +78,7 @@ impl Motion {
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool, within: Option<Bounds>) {
         self.awake.find(mesh, keys.still_iterations, examine_all, within);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
-        self.displacements.resize(mesh.slots(), Vec3::ZERO);
+        resize(&mut self.displacements, mesh.slots(), Vec3::ZERO);
     }
 
     /// Moves the vertices by one iteration as far as `displace` allows, and returns their mean energy and largest
