@@ -5,8 +5,8 @@
 mod bounds;
 mod conjugate_gradients;
 pub mod crossing;
-mod growth;
 mod groups;
+mod growth;
 mod min_max;
 pub mod order;
 mod position_index;

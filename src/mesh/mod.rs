@@ -16,6 +16,7 @@ mod check;
 mod closed;
 mod component_volumes;
 mod components;
+mod connectivity;
 mod curvature;
 mod disjoint_sets;
 mod edge_table;
@@ -42,6 +43,7 @@ mod weld;
 
 pub use attributes::{ScalarKey, VectorKey};
 pub use check::InvariantViolation;
+pub use connectivity::Connectivity;
 pub use curvature::{Curvature, curvature};
 pub(crate) use disjoint_sets::DisjointSets;
 pub use edits::OppositeVertices;

@@ -121,6 +121,15 @@ impl Forces {
         self.cells = Vec::new();
     }
 
+    /// Frees all buffers but the normals, so that less memory is taken while vertices move on a sparse level.
+    pub(super) fn keep_normals(&mut self) {
+        *self = Self {
+            normal: std::mem::take(&mut self.normal),
+            milliseconds: self.milliseconds,
+            ..Self::default()
+        };
+    }
+
     /// Computes the normals of `vertices` and their Laplacians, the vectors to the means of their neighbours, from
     /// which the forces are evaluated.
     pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {

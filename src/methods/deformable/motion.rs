@@ -81,6 +81,12 @@ impl Motion {
         resize(&mut self.displacements, mesh.slots(), Vec3::ZERO);
     }
 
+    /// Frees the buffers of forces and displacements, which the next iteration fills anew.
+    pub(super) fn free_buffers(&mut self) {
+        self.forces = Forces::default();
+        self.displacements = Vec::new();
+    }
+
     /// Moves the vertices by one iteration as far as `displace` allows, and returns their mean energy and largest
     /// speed, by which convergence is judged; needs [`Self::prepare`] for the current mesh.
     ///
@@ -102,6 +108,9 @@ impl Motion {
             self.wake_unsettled(mesh, keys, context);
         }
         self.clamp_displacements(mesh, keys, context);
+        if context.field.image.bricks().is_some() {
+            self.forces.keep_normals();
+        }
         let held = displace(mesh, &self.awake.moving, &mut self.displacements);
         let velocities = mesh.vector_mut(keys.velocity);
         held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);
