@@ -360,6 +360,14 @@ impl DeformableModel {
         levels.for_each(|n| hash.mix(n as u64));
     }
 
+    /// Returns whether single vertices may still move when the current phase of a run on a sparse volume ends: not in the last
+    /// one. Finer levels do not begin on their contour, and in a noisy image fronts creep for hundreds of iterations; those
+    /// of a start on the contour are small, and go on later.
+    pub(super) fn leaves_fronts(&self) -> bool {
+        let is_last = self.level == 0 && (self.convergence.sized || !self.params.adapts_to_image());
+        self.pyramid.is_sparse() && self.from_contour && !is_last
+    }
+
     /// Returns whether the current level follows the surface at a vertex.
     pub(super) fn follows(&self, v: VertexId) -> bool {
         self.followed_bounds().is_none_or(|bounds| bounds.contains(self.mesh.position(v)))
@@ -481,4 +489,78 @@ fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follo
     let corner = |k: usize| DVec3::from([0, 1, 2].map(|axis| [min, max][k >> axis & 1][axis]));
     let corners: Vec<Vec3> = (0..8).map(|k| to_model.transform_point3(corner(k)).as_vec3()).collect();
     Ok(Some(Follow { bounds: Bounds::from_points(&corners), whole: whole - options.finest }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::volume::{SparseInit, SparseLevel, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Returns a volume of two levels, with the coarser one loaded, and a function for the voxels of its boxes: a ball with
+    /// a cavity, and eight specks that only the coarser level has.
+    fn volume() -> (SparseVolume, impl Fn(&BrickBox) -> Voxels) {
+        let level = |n: usize, voxel: f64| {
+            let translation = DVec3::splat(0.5 * (voxel - 1.0));
+            let affine = DAffine3 { translation, ..DAffine3::from_scale(DVec3::splat(voxel)) };
+            SparseLevel { dims: [n; 3], affine }
+        };
+        let levels = vec![level(64, 1.0), level(32, 2.0)];
+        let init = SparseInit { levels: levels.clone(), range: [0.0, 200.0], fill: Voxels::U8(vec![0]) };
+        let voxels = move |at: &BrickBox| {
+            let [nx, ny, _] = at.region.dims;
+            let value = |k: usize| {
+                let offset = [k % nx, k / nx % ny, k / nx / ny];
+                let index = [0, 1, 2].map(|axis| (at.region.min[axis] + offset[axis]) as f64);
+                let p = levels[at.level].affine.transform_point3(DVec3::from(index)) - 31.3;
+                let shell = (20.0 - p.length()).min(p.length() - 8.0);
+                let speck = 4.0 * at.level as f64 - (p.abs() - 27.0).length();
+                (100.0 + 60.0 * shell.max(speck)).clamp(0.0, 200.0) as u8
+            };
+            Voxels::U8((0..at.region.len()).map(value).collect())
+        };
+        let volume = SparseVolume::new(init).unwrap();
+        volume.missing(1).unwrap().iter().for_each(|at| volume.insert(*at, &voxels(at)).unwrap());
+        (volume, voxels)
+    }
+
+    /// With a negative reach nothing is asked for in advance: steps read missing bricks while vertices move, and then in
+    /// edits, and are undone.
+    #[test]
+    fn a_step_that_reads_a_missing_brick_is_undone() {
+        let (whole, voxels) = volume();
+        whole.missing(0).unwrap().iter().for_each(|at| whole.insert(*at, &voxels(at)).unwrap());
+        let mut expected = DeformableModel::on_sparse(&whole, SparseOptions::default()).unwrap();
+        let (volume, voxels) = volume();
+        let mut model = DeformableModel::on_sparse(&volume, SparseOptions::default()).unwrap();
+        if let Some(sparse) = &mut model.pyramid.sparse {
+            sparse.reach = -100.0;
+        }
+        let [mut while_moving, mut in_edits] = [0, 0];
+        loop {
+            let (before, versions) = (model.save(), model.mesh.versions());
+            match model.step() {
+                Ok(report) => {
+                    expected.step().unwrap();
+                    assert_eq!(model.mesh.positions(), expected.mesh.positions());
+                    assert!(model.save() == expected.save(), "iteration {}", report.iteration);
+                    if report.done {
+                        break;
+                    }
+                }
+                Err(MethodError::NeedsData { needs }) => {
+                    assert!(model.save() == before);
+                    assert_eq!(model.mesh.check(), Ok(()));
+                    let changed = [0, 1].map(|k| model.mesh.versions()[k] != versions[k]);
+                    while_moving += u32::from(changed == [false, true]);
+                    in_edits += u32::from(changed[0]);
+                    needs.iter().for_each(|at| volume.insert(*at, &voxels(at)).unwrap());
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+        assert!(while_moving > 0 && in_edits > 0, "{while_moving} and {in_edits}");
+    }
 }
