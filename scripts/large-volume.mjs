@@ -65,7 +65,11 @@ class ComputedStore {
   #compute(key) {
     const json = (value) => new TextEncoder().encode(JSON.stringify(value));
     if (key === '/zarr.json') {
-      return json({ zarr_format: 3, node_type: 'group', attributes: { ome: { version: '0.5', multiscales: [this.#image()] } } });
+      return json({
+        zarr_format: 3,
+        node_type: 'group',
+        attributes: { ome: { version: '0.5', multiscales: [this.#image()] } },
+      });
     }
     const [, level, rest] = /^\/(\d+)\/(.+)$/.exec(key) ?? [];
     if (rest === 'zarr.json') return json(this.#array(Number(level)));
@@ -103,7 +107,10 @@ class ComputedStore {
     const voxels = new Uint16Array(CHUNK ** 3);
     for (const block of cube(CHUNK / BLOCK)) {
       const first = block.map((k) => k * BLOCK);
-      const middle = from(first.map((k) => k + (BLOCK - 1) / 2), near);
+      const middle = from(
+        first.map((k) => k + (BLOCK - 1) / 2),
+        near,
+      );
       const isMixed = Math.abs(middle) < DIAGONAL * BLOCK + SOFT;
       if (!isMixed && middle > 0) continue;
       for (const [x, y, z] of cube(BLOCK)) {
@@ -118,7 +125,11 @@ class ComputedStore {
 
 /** Returns all indices within a cube. */
 function cube(side) {
-  return Array.from({ length: side ** 3 }, (_, k) => [k % side, Math.floor(k / side) % side, Math.floor(k / side ** 2)]);
+  return Array.from({ length: side ** 3 }, (_, k) => [
+    k % side,
+    Math.floor(k / side) % side,
+    Math.floor(k / side ** 2),
+  ]);
 }
 
 await script(async () => {
@@ -138,7 +149,9 @@ await script(async () => {
   const seconds = (performance.now() - began) / 1e3;
   const chunks = image.loaded().map(({ chunks }) => chunks);
   say(`${report.vertices} vertices, ${report.components} parts, χ ${report.euler}; chunks by level ${chunks}`);
-  say(`${(seconds - store.milliseconds / 1e3).toFixed(1)} s without the store, which took ${(store.milliseconds / 1e3).toFixed(1)} s`);
+  say(
+    `${(seconds - store.milliseconds / 1e3).toFixed(1)} s without the store, which took ${(store.milliseconds / 1e3).toFixed(1)} s`,
+  );
   say(`memory of the module: ${mb(memory)}`);
 });
 

@@ -1,7 +1,7 @@
 //! Growth of long lists.
 
-/// The part of a list that is reserved beyond its length when it grows: twice as much would be left unused in the mean,
-/// half as much would copy a growing list twice as often.
+/// The inverse of the share of its length that a list gets to spare when it grows: with half of this, twice as much is
+/// left unused; with twice of this, growing lists are copied twice as often.
 const SPARE: usize = 8;
 
 /// Makes room for `len` items in a list. Lists as long as a mesh take most of the memory: they get an eighth to spare

@@ -16,7 +16,7 @@ const SMALLEST_SPHERE: f32 = 2.18;
 /// The small components of a mesh, of at most [`MAX_VERTICES`] vertices, which are removed when they lose their volume.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallComponents {
-    /// The vertex of lowest id of each small component, in ascending order, so that a list found anew is the same, and
+    /// The vertex of lowest id of each small component, in ascending order, so that a recomputed list is the same, and
     /// whether the component is solid, that is of positive volume; the others are cavities.
     components: Vec<(VertexId, bool)>,
     /// The topology version of the mesh for which `components` is up to date.

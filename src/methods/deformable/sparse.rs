@@ -86,7 +86,7 @@ pub(super) struct Before {
     still_iterations: Vec<f32>,
     since_edit: Vec<f32>,
     reversals: Vec<f32>,
-    /// What only edits change; `None` while vertices are moved.
+    /// The part that only edits change; `None` while vertices are moved.
     edited: Option<BeforeEdits>,
     waiting: Pending,
     level: usize,
