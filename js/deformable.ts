@@ -386,7 +386,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Saves the whole state, for {@link DeformableModel.restore} of a model made with the same volume, frame and number
-   * of levels.
+   * of levels. Of a {@link LargeVolume}, what has been read is not saved: the next step asks for it again.
    */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
@@ -396,7 +396,7 @@ export class DeformableModel implements Stepper {
    * Restores a saved state, bit for bit.
    *
    * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a model with the same volume, frame
-   *   and number of levels; the model then stays unchanged; `invalid-argument` while a run is in progress.
+   *   and number of levels, or `finest` and `box`; the model then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

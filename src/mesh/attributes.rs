@@ -1,7 +1,7 @@
 //! Per-vertex attributes of a [`Mesh`](super::Mesh), such as data of a method, that edits keep up to date.
 
 use super::VertexId;
-use crate::math::Vec3;
+use crate::math::{Vec3, resize};
 use serde::{Deserialize, Serialize};
 
 /// A handle of a per-vertex 3D vector attribute, returned by [`Mesh::add_vector`](super::Mesh::add_vector).
@@ -57,9 +57,9 @@ impl Attributes {
         (&mut self.vectors[vector.0], &mut self.scalars[scalar.0])
     }
 
-    pub(super) fn grow(&mut self) {
-        self.vectors.iter_mut().for_each(|v| v.push(Vec3::ZERO));
-        self.scalars.iter_mut().for_each(|s| s.push(0.0));
+    pub(super) fn grow(&mut self, slots: usize) {
+        self.vectors.iter_mut().for_each(|v| resize(v, slots, Vec3::ZERO));
+        self.scalars.iter_mut().for_each(|s| resize(s, slots, 0.0));
     }
 
     /// Sets the attributes of slot `target` to those of `a` and `b`, interpolated linearly: those of `a` for `t` = 0,

@@ -16,6 +16,7 @@ mod check;
 mod closed;
 mod component_volumes;
 mod components;
+mod connectivity;
 mod curvature;
 mod disjoint_sets;
 mod edge_table;
@@ -42,6 +43,7 @@ mod weld;
 
 pub use attributes::{ScalarKey, VectorKey};
 pub use check::InvariantViolation;
+pub use connectivity::Connectivity;
 pub use curvature::{Curvature, curvature};
 pub(crate) use disjoint_sets::DisjointSets;
 pub use edits::OppositeVertices;
@@ -60,7 +62,7 @@ pub use texture::{ImageKind, Texture};
 pub use transform::invertible_map;
 pub use triangles::TriangleMesh;
 
-use crate::math::Vec3;
+use crate::math::{Vec3, make_room};
 use attributes::Attributes;
 use journal::Journal;
 use serde::{Deserialize, Serialize};
@@ -339,10 +341,17 @@ impl Mesh {
             self.positions[v.index()] = position;
             return v;
         }
+        self.push_slot(position);
+        VertexId::from_index(self.rings.len() - 1)
+    }
+
+    fn push_slot(&mut self, position: Vec3) {
+        let slots = self.slots() + 1;
+        make_room(&mut self.rings, slots);
+        make_room(&mut self.positions, slots);
         self.rings.push(Ring::default());
         self.positions.push(position);
-        self.attributes.grow();
-        VertexId::from_index(self.rings.len() - 1)
+        self.attributes.grow(slots);
     }
 
     fn has_ids_for(&self, vertices: usize) -> bool {

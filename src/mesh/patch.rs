@@ -108,9 +108,7 @@ impl Mesh {
             self.slot_freed();
         }
         for _ in pushed {
-            self.rings.push(Ring::default());
-            self.positions.push(Vec3::ZERO);
-            self.attributes.grow();
+            self.push_slot(Vec3::ZERO);
         }
         added.iter().zip(positions).for_each(|(v, &p)| self.positions[v.index()] = p);
     }

@@ -1,6 +1,7 @@
 //! √3 subdivision of a whole mesh.
 
 use super::{Mesh, MeshError, Ring, VertexId};
+use crate::math::make_room;
 
 impl Mesh {
     /// Subdivides all triangles: inserts a vertex at the centroid of each and replaces each old edge by the edge
@@ -24,6 +25,7 @@ impl Mesh {
             rings[u.index()] = Ring::new(ring.pairs().map(|(a, b)| points.id(&before, [u, a, b])));
         }
         self.place_face_points(&points.corners);
+        make_room(&mut rings, self.positions.len());
         for (k, &[a, b, c]) in points.corners.iter().enumerate() {
             let beyond = |from: VertexId, to: VertexId| points.across(&before, from, to);
             debug_assert_eq!(rings.len(), old + k, "face points are numbered in order");
@@ -36,10 +38,12 @@ impl Mesh {
     }
 
     fn place_face_points(&mut self, corners: &[[VertexId; 3]]) {
+        let slots = self.positions.len() + corners.len();
+        make_room(&mut self.positions, slots);
+        self.attributes.grow(slots);
         for &[a, b, c] in corners {
             let centre = (self.position(a) + self.position(b) + self.position(c)) * (1.0 / 3.0);
             self.positions.push(centre);
-            self.attributes.grow();
             let point = VertexId::from_index(self.positions.len() - 1);
             self.attributes.blend(point, a, b, 0.5);
             self.attributes.blend(point, point, c, 1.0 / 3.0);

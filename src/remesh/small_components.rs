@@ -3,7 +3,7 @@
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Mesh, VertexId, sort_distinct};
 
 /// The largest number of vertices of a small component. Larger ones are never removed: a volume below the thresholds
 /// alone does not show that a component is small, since the volume of a cavity is negative.
@@ -16,8 +16,8 @@ const SMALLEST_SPHERE: f32 = 2.18;
 /// The small components of a mesh, of at most [`MAX_VERTICES`] vertices, which are removed when they lose their volume.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallComponents {
-    /// One vertex of each small component, and whether the component is solid, that is of positive volume; the others
-    /// are cavities.
+    /// The vertex of lowest id of each small component, in ascending order, so that a recomputed list is the same, and
+    /// whether the component is solid, that is of positive volume; the others are cavities.
     components: Vec<(VertexId, bool)>,
     /// The topology version of the mesh for which `components` is up to date.
     topology_version: Option<u32>,
@@ -40,6 +40,7 @@ impl SmallComponents {
 
     fn find_among(&mut self, mesh: &Mesh, vertices: impl Iterator<Item = VertexId>) {
         self.components.clear();
+        let mut first = Vec::new();
         let mut seen = vec![false; mesh.slots()];
         for v in vertices {
             if seen[v.index()] {
@@ -49,9 +50,12 @@ impl SmallComponents {
             let found = mesh.component_of(v, MAX_VERTICES + 1);
             found.iter().for_each(|w| seen[w.index()] = true);
             if found.len() <= MAX_VERTICES {
-                self.components.push((v, volume(mesh, &found) > 0.0));
+                first.extend(found.into_iter().min());
             }
         }
+        sort_distinct(&mut first);
+        let is_solid = |v: VertexId| volume(mesh, &mesh.component_of(v, MAX_VERTICES)) > 0.0;
+        self.components.extend(first.into_iter().map(|v| (v, is_solid(v))));
         self.topology_version = Some(mesh.topology_version());
     }
 }

@@ -39,14 +39,19 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
-        let (class, larger): (Vec<VertexBall>, Vec<VertexBall>) =
-            left.into_iter().partition(|ball| ball.radius <= bound);
-        left = larger;
+        // Nearly all balls are in the first class, so that the others are copied.
+        let larger = left.iter().filter(|ball| ball.radius > bound).copied().collect();
+        let mut class = std::mem::replace(&mut left, larger);
+        class.retain(|ball| ball.radius <= bound);
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
             sweep_class(&class, &smaller, near, &mut found);
-            smaller.extend(class);
+            if smaller.is_empty() {
+                smaller = class;
+            } else {
+                smaller.extend(class);
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A hashed grid of the vertices of a moving mesh, for the broad phase of collision handling. Each vertex has a ball
 //! that contains its triangles.
 
-use crate::math::{Bounds, Vec3};
+use crate::math::{Bounds, Vec3, resize};
 use crate::mesh::VertexId;
 
 /// The number of levels of the grid, whose cell sizes differ by [`FACTOR`]. Vertices whose longest edge is at most the
@@ -126,7 +126,7 @@ impl VertexGrid {
     /// Inserts `v`, or updates its position and the length `radius` of its longest edge.
     pub fn set(&mut self, v: VertexId, position: Vec3, radius: f32) {
         if v.index() >= self.entries.len() {
-            self.entries.resize(v.index() + 1, ABSENT_ENTRY);
+            resize(&mut self.entries, v.index() + 1, ABSENT_ENTRY);
             // The lists are too long: cells are unlinked, so that the next `link_cells` builds more buckets.
             self.linked &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }

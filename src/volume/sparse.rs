@@ -45,7 +45,7 @@ pub struct BrickBox {
     pub region: Region,
 }
 
-/// A multiscale volume of which only parts are in memory: the coarsest level, and bricks of 16³ voxels of the others. A
+/// A multiscale volume of which only parts are in memory: the coarsest level, and bricks of 8³ voxels of the others. A
 /// missing brick has no value. Cheap to clone: clones share their bricks.
 #[derive(Clone, Debug)]
 pub struct SparseVolume {

@@ -213,6 +213,25 @@ test('a run that is aborted or loses its connection keeps the surface, and anoth
   expect(bits(model) === REFERENCE).toBe(true);
 });
 
+test('a saved run continues in a model of the same image, which reads what it needs', async () => {
+  const model = new DeformableModel({ volume: await open(16), params: PARAMS });
+  const saved: Uint8Array[] = [];
+  await model.run({ onStep: () => void saved.push(model.save()) });
+  const middle = saved[Math.floor(saved.length / 2)] as Uint8Array;
+  const image = await open(13);
+  const restored = new DeformableModel({ volume: image });
+  restored.restore(middle);
+  expect(restored.save()).toEqual(middle);
+  expect((await restored.run()).done).toBe(true);
+  expect(bits(restored) === REFERENCE).toBe(true);
+  // Undo: back to the same state.
+  restored.restore(middle);
+  expect((await restored.run()).done).toBe(true);
+  expect(bits(restored) === REFERENCE).toBe(true);
+  const other = new DeformableModel({ volume: image, finest: 1 });
+  expect(failure(() => other.restore(middle)).code).toBe('bad-file');
+});
+
 test('a run ends at the level that is asked for', async () => {
   const image = await open(16);
   const model = new DeformableModel({ volume: image, finest: 1, params: PARAMS });

@@ -3,7 +3,7 @@
 use super::contour::ObjectIs;
 use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator, RestLength};
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, resize};
 use crate::mesh::{Ring, VertexId};
 use crate::volume::CellCache;
 
@@ -106,7 +106,8 @@ pub(super) struct Forces {
     /// The absolute difference of the intensity Π, in 0..1, over one voxel of the finest level along the normal of each
     /// vertex; the stiffness of the image force is proportional to it.
     pub(super) slope: Vec<f32>,
-    /// The image cell around each vertex at its last sample, cached because the next sample often reuses it.
+    /// The image cell around each vertex at its last sample, cached because the next sample often reuses it; empty on
+    /// sparse levels, where they would take more memory than they save time.
     cells: Vec<CellCache>,
     /// The sum of all forces on each vertex, in model units.
     pub(super) force: Vec<Vec3>,
@@ -117,17 +118,25 @@ pub(super) struct Forces {
 impl Forces {
     /// Discards the cached image cells of all vertices, which is necessary when the pyramid level changes.
     pub(super) fn forget_image(&mut self) {
-        self.cells.fill(CellCache::default());
+        self.cells = Vec::new();
+    }
+
+    /// Frees all buffers but the normals, so that less memory is taken while vertices move on a sparse level.
+    pub(super) fn keep_normals(&mut self) {
+        *self = Self {
+            normal: std::mem::take(&mut self.normal),
+            milliseconds: self.milliseconds,
+            ..Self::default()
+        };
     }
 
     /// Computes the normals of `vertices` and their Laplacians, the vectors to the means of their neighbours, from
     /// which the forces are evaluated.
     pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
-        self.laplacian.resize(rings.len(), Vec3::ZERO);
-        self.normal.resize(rings.len(), Vec3::ZERO);
-        self.force.resize(rings.len(), Vec3::ZERO);
-        self.slope.resize(rings.len(), 0.0);
-        self.cells.resize(rings.len(), CellCache::default());
+        resize(&mut self.laplacian, rings.len(), Vec3::ZERO);
+        resize(&mut self.normal, rings.len(), Vec3::ZERO);
+        resize(&mut self.force, rings.len(), Vec3::ZERO);
+        resize(&mut self.slope, rings.len(), 0.0);
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
             let Some(&last) = ring.as_slice().last() else { continue };
@@ -157,6 +166,9 @@ impl Forces {
     ) {
         let &Field { image, ref scale, attractors } = field;
         let rest = rest_length(rings, positions, scale);
+        if image.bricks().is_none() {
+            resize(&mut self.cells, rings.len(), CellCache::default());
+        }
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
             let x = positions[v];
@@ -243,7 +255,11 @@ impl Forces {
     #[inline]
     fn iso_difference(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let p = if scale.adapts_to_image { self.mean_of_triangles(v, x) } else { x };
-        scale.iso - image.intensity(p, scale.background, &mut self.cells[v])
+        let known = match image.bricks() {
+            None => &mut self.cells[v],
+            Some(_) => &mut CellCache::default(),
+        };
+        scale.iso - image.intensity(p, scale.background, known)
     }
 
     /// Returns the image force, which moves a vertex along its normal n towards the iso-surface: f_I = δ α_I (π_I −

@@ -3,6 +3,7 @@
 //! Model space is the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second way);
 //! the volume's affine transform maps it to world space.
 
+use super::DeformableParams;
 use crate::math::Vec3;
 use crate::math::order::median;
 use crate::methods::MethodError;
@@ -81,7 +82,7 @@ impl LevelImage {
     }
 
     /// Returns ∇Π, the gradient of the intensity by the Sobel operator, at a position in model space, for the gradient
-    /// force; per voxel of this level and with a length of at most `bound`; zero if [`Self::prepare_gradient`] was not
+    /// force; per voxel of this level and with a length of at most `bound`; zero if [`Self::prepare_gradient_for`] was not
     /// called.
     #[inline]
     pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
@@ -91,9 +92,10 @@ impl LevelImage {
         if length > bound { gradient * (bound / length) } else { gradient }
     }
 
-    /// Computes the gradient image that [`Self::gradient`] samples, unless that was done before.
-    pub(super) fn prepare_gradient(&mut self) -> Result<(), MethodError> {
-        if self.gradient.is_none() {
+    /// Computes the gradient image that [`Self::gradient`] samples if a gradient force acts, unless that was done before.
+    pub(super) fn prepare_gradient_for(&mut self, params: &DeformableParams) -> Result<(), MethodError> {
+        let is_needed = params.gradient_normal != 0.0 || params.gradient_tangent != 0.0;
+        if is_needed && self.gradient.is_none() {
             self.gradient = Some(self.grid.sobel()?);
         }
         Ok(())
@@ -207,6 +209,8 @@ pub(super) struct SparseLevels {
     pub(super) volume: SparseVolume,
     /// The index of the pyramid's finest level in the volume.
     pub(super) finest: usize,
+    /// The distance from a vertex, in δ, within which the bricks of a level are loaded before a step.
+    pub(super) reach: f32,
 }
 
 impl Pyramid {
@@ -268,7 +272,7 @@ impl Pyramid {
         if let Some(level) = levels.last_mut() {
             *level = LevelImage { grid: coarsest, bricks: None, ..level.clone() };
         }
-        let sparse = Some(SparseLevels { volume: volume.clone(), finest });
+        let sparse = Some(SparseLevels { volume: volume.clone(), finest, reach: super::sparse::REACH });
         let axes = first.affine.matrix3;
         let spacing = [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()];
         Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse })

@@ -79,7 +79,7 @@ use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
 use motion::{Motion, MotionContext, SpeedSummary};
 use schedule::Convergence;
-use sparse::Follow;
+use sparse::{Before, Follow};
 use start::{StartContext, contour_mesh};
 use std::ops::RangeInclusive;
 
@@ -334,14 +334,20 @@ impl DeformableModel {
     /// long; other parameters may reduce it again. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate() }
+        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None) }
     }
 
-    fn iterate(&mut self) -> Result<StepReport, MethodError> {
+    /// Makes one iteration; on a sparse volume `before` is completed, by which it can be undone.
+    fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
             self.move_vertices(&mut times);
+            if self.pyramid.is_sparse()
+                && let Some(before) = before
+            {
+                self.prepare_edits(before)?;
+            }
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
                 changes += self.restore_bounds(&active, &mut times);
@@ -507,10 +513,7 @@ impl DeformableModel {
     /// [`MethodError::InvalidArgument`] for values out of range, [`MethodError::Volume`] if the gradient image does not
     /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
-        params.validate()?;
-        if self.pyramid.is_sparse() {
-            sparse::check_params(&params)?;
-        }
+        self.check_params(&params)?;
         let before = std::mem::replace(&mut self.params, params);
         if let Err(error) = self.prepare_level() {
             self.params = before;
@@ -518,6 +521,11 @@ impl DeformableModel {
         }
         self.wake_all();
         Ok(())
+    }
+
+    fn check_params(&self, params: &DeformableParams) -> Result<(), MethodError> {
+        params.validate()?;
+        if self.pyramid.is_sparse() { sparse::check_params(params) } else { Ok(()) }
     }
 
     /// The current parameters of the model.
@@ -530,6 +538,13 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if a number is not finite or too large, or a radius is not positive.
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
+        self.check_attractors(&attractors)?;
+        self.attractors = attractors;
+        self.wake_all();
+        Ok(())
+    }
+
+    fn check_attractors(&self, attractors: &[Attractor]) -> Result<(), MethodError> {
         let from_world = self.to_world.inverse();
         for (i, a) in attractors.iter().enumerate() {
             let local = from_world.transform_point3(a.point) / MAX_ATTRACTOR_DISTANCE;
@@ -543,8 +558,6 @@ impl DeformableModel {
                 return Err(MethodError::invalid("attractors", problem));
             }
         }
-        self.attractors = attractors;
-        self.wake_all();
         Ok(())
     }
 
@@ -561,9 +574,7 @@ impl DeformableModel {
     /// Computes the quantities that depend on the pyramid level and the parameters: the gradient image if a gradient
     /// force acts, the iso value π_I and the factor on α_I, the strength of the image force.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
-        if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
-            self.pyramid.levels[self.level].prepare_gradient()?;
-        }
+        self.pyramid.levels[self.level].prepare_gradient_for(&self.params)?;
         self.motion.forces.forget_image();
         self.needs_factor = self.pyramid.levels[self.level].bricks().is_some();
         if self.needs_factor {

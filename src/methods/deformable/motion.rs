@@ -5,7 +5,7 @@ use super::awake::{Awake, ITERATIONS_TO_SLEEP, stillness};
 use super::domain::Domain;
 use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
-use crate::math::{Bounds, Vec3, higher};
+use crate::math::{Bounds, Vec3, higher, resize};
 use crate::mesh::{Mesh, VertexId};
 
 /// The speed of the mesh in one iteration, by which convergence is judged.
@@ -78,7 +78,13 @@ impl Motion {
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool, within: Option<Bounds>) {
         self.awake.find(mesh, keys.still_iterations, examine_all, within);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
-        self.displacements.resize(mesh.slots(), Vec3::ZERO);
+        resize(&mut self.displacements, mesh.slots(), Vec3::ZERO);
+    }
+
+    /// Frees the buffers of forces and displacements, which the next iteration fills anew.
+    pub(super) fn free_buffers(&mut self) {
+        self.forces = Forces::default();
+        self.displacements = Vec::new();
     }
 
     /// Moves the vertices by one iteration as far as `displace` allows, and returns their mean energy and largest
@@ -102,6 +108,9 @@ impl Motion {
             self.wake_unsettled(mesh, keys, context);
         }
         self.clamp_displacements(mesh, keys, context);
+        if context.field.image.bricks().is_some() {
+            self.forces.keep_normals();
+        }
         let held = displace(mesh, &self.awake.moving, &mut self.displacements);
         let velocities = mesh.vector_mut(keys.velocity);
         held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);

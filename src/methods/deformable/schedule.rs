@@ -114,7 +114,8 @@ impl DeformableModel {
     /// seeds missing parts on the finest level, examines all vertices, checks the whole mesh, and descends one level or
     /// ends the run. Returns the numbers of edits.
     pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
-        let is_slow = self.convergence.began_on_contour || self.speed.fastest < self.settled_speed();
+        let may_move = self.convergence.began_on_contour || self.leaves_fronts();
+        let is_slow = may_move || self.speed.fastest < self.settled_speed();
         let quiet = is_slow && self.energy() < self.params.energy_tolerance;
         self.convergence.quiet = if quiet { self.convergence.quiet + 1 } else { 0 };
         if self.convergence.quiet < self.quiet_iterations() {

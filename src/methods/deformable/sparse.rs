@@ -17,7 +17,8 @@ use super::sizes::LARGEST;
 use super::{DeformableModel, DeformableParams, Origin, Seeding, Start, Topology, coarse};
 use crate::math::order::{median, sort_ranks};
 use crate::math::{Bounds, DVec3, Vec3};
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Connectivity, Mesh, VertexId};
+use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
 use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
@@ -25,7 +26,7 @@ use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merge
 /// The distance from a vertex, in δ, within which the bricks of a level are loaded before a step: the vertex moves by at
 /// most half a δ, and thin walls are searched for up to 2.3 δ away. A step that reads beyond it is undone and repeated,
 /// which costs time only.
-const REACH: f32 = 2.5;
+pub(super) const REACH: f32 = 2.5;
 
 /// The distance beyond [`REACH`], in δ, up to which missing bricks are asked for when one within it is missing, so that
 /// asking is rare. With more, more bricks are loaded that the surface never reaches.
@@ -76,9 +77,17 @@ pub(super) struct Follow {
     whole: usize,
 }
 
-/// The state before a step, to which it is undone if a brick was missing.
-struct Before {
-    mesh: Mesh,
+/// The state before a step, to which it is undone if a brick was missing. Meshes take most of the memory, so each part of
+/// this one is copied before the phase of the step that changes it, in compact form.
+#[derive(Clone, Debug)]
+pub(super) struct Before {
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
+    still_iterations: Vec<f32>,
+    since_edit: Vec<f32>,
+    reversals: Vec<f32>,
+    /// The part that only edits change; `None` while vertices are moved.
+    edited: Option<BeforeEdits>,
     waiting: Pending,
     level: usize,
     level_iso: f32,
@@ -89,6 +98,13 @@ struct Before {
     speed: SpeedSummary,
     components: u32,
     refreshed: Changes,
+}
+
+#[derive(Clone, Debug)]
+struct BeforeEdits {
+    connectivity: Connectivity,
+    checked_positions: Vec<Vec3>,
+    sizes: Vec<f32>,
 }
 
 impl DeformableModel {
@@ -122,8 +138,8 @@ impl DeformableModel {
 
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
-        let Some(SparseLevels { volume, finest }) = self.pyramid.sparse.clone() else {
-            return self.iterate();
+        let Some(SparseLevels { volume, finest, .. }) = self.pyramid.sparse.clone() else {
+            return self.iterate(None);
         };
         // Locked all the time, so that other models of the volume wait.
         let mut bricks = volume.bricks();
@@ -147,13 +163,14 @@ impl DeformableModel {
             self.has_asked = true;
             return Err(needs);
         }
-        let (before, level) = (self.before(), self.level);
-        let result = self.iterate();
-        let missed = self.missed()?;
-        if !missed.is_empty() {
+        let (mut before, level) = (self.before(), self.level);
+        let result = self.iterate(Some(&mut before));
+        let result = self.check_missed().and(result);
+        if let Err(MethodError::NeedsData { .. }) = result {
             self.undo(before);
-            return Err(MethodError::NeedsData { needs: missed });
+            return result;
         }
+        drop(before);
         // Only a model that goes on drops bricks, so that of two models of one volume one always does.
         if self.level < level {
             self.drop_level(level);
@@ -185,9 +202,7 @@ impl DeformableModel {
 
     /// Returns the boxes of missing bricks around some vertices, with a margin, if any is missing without it.
     fn needs_around(&self, level: usize, vertices: &[VertexId]) -> Vec<BrickBox> {
-        let Some(finest) = self.pyramid.sparse.as_ref().map(|sparse| sparse.finest) else {
-            return Vec::new();
-        };
+        let Some(SparseLevels { finest, reach: needed, .. }) = self.pyramid.sparse else { return Vec::new() };
         let delta = self.pyramid.delta_at(self.finest_delta, level);
         let image = &self.pyramid.levels[level];
         let Some(bricks) = image.bricks() else { return Vec::new() };
@@ -195,23 +210,39 @@ impl DeformableModel {
             ranks_around(image, bricks, &self.mesh, vertices, reach * delta)
         };
         let is_missing = |rank: &u64| !bricks.has(BrickId::ranked(*rank));
-        if !near(REACH, vertices).iter().any(is_missing) {
+        if !near(needed, vertices).iter().any(is_missing) {
             return Vec::new();
         }
-        let needs: Vec<u64> = near(REACH + MARGIN, vertices).into_iter().filter(is_missing).collect();
+        let needs: Vec<u64> = near(needed + MARGIN, vertices).into_iter().filter(is_missing).collect();
         merged(bricks, finest + level, &needs)
     }
 
-    /// Returns the boxes of the bricks that were missing in the iteration just made.
-    fn missed(&self) -> Result<Vec<BrickBox>, MethodError> {
-        let mut missed = Vec::new();
-        let Some(SparseLevels { finest, .. }) = self.pyramid.sparse else { return Ok(missed) };
+    /// Returns an error with the boxes of the bricks that were read since the last call but are missing, if there are any.
+    fn check_missed(&self) -> Result<(), MethodError> {
+        let Some(SparseLevels { finest, .. }) = self.pyramid.sparse else { return Ok(()) };
+        let mut needs = Vec::new();
         for (k, level) in self.pyramid.levels.iter().enumerate() {
             if let Some(bricks) = level.bricks() {
-                missed.extend(merged(bricks, finest + k, &bricks.take_missed()));
+                needs.extend(merged(bricks, finest + k, &bricks.take_missed()));
             }
         }
-        Ok(missed)
+        if needs.is_empty() { Ok(()) } else { Err(MethodError::NeedsData { needs }) }
+    }
+
+    /// Copies what the edits of a step may change, once vertices have moved; the buffers of the motion are freed.
+    ///
+    /// # Errors
+    /// [`MethodError::NeedsData`] if bricks were missing so far.
+    pub(super) fn prepare_edits(&mut self, before: &mut Before) -> Result<(), MethodError> {
+        self.check_missed()?;
+        self.motion.free_buffers();
+        let Self { mesh, keys, .. } = self;
+        before.edited = Some(BeforeEdits {
+            connectivity: mesh.connectivity(),
+            checked_positions: mesh.vector(keys.checked_position).to_vec(),
+            sizes: mesh.scalar(keys.size).to_vec(),
+        });
+        Ok(())
     }
 
     /// Drops the bricks of a level that the run has left.
@@ -235,8 +266,14 @@ impl DeformableModel {
     }
 
     fn before(&self) -> Before {
+        let scalar = |key| self.mesh.scalar(key).to_vec();
         Before {
-            mesh: self.mesh.clone(),
+            positions: self.mesh.positions().to_vec(),
+            velocities: self.mesh.vector(self.keys.velocity).to_vec(),
+            still_iterations: scalar(self.keys.still_iterations),
+            since_edit: scalar(self.keys.since_edit),
+            reversals: scalar(self.keys.reversals),
+            edited: None,
             waiting: self.resolver.pending(),
             level: self.level,
             level_iso: self.level_iso,
@@ -251,11 +288,22 @@ impl DeformableModel {
     }
 
     fn undo(&mut self, before: Before) {
-        let failed = std::mem::replace(&mut self.mesh, before.mesh);
-        self.mesh.advance_versions_past(&failed);
+        let Self { mesh, keys, .. } = self;
+        match before.edited {
+            Some(BeforeEdits { connectivity, checked_positions, sizes }) => {
+                mesh.set_back(&connectivity, &before.positions);
+                mesh.vector_mut(keys.checked_position).copy_from_slice(&checked_positions);
+                mesh.scalar_mut(keys.size).copy_from_slice(&sizes);
+            }
+            None => mesh.positions_mut().copy_from_slice(&before.positions),
+        }
+        mesh.vector_mut(keys.velocity).copy_from_slice(&before.velocities);
+        mesh.scalar_mut(keys.still_iterations).copy_from_slice(&before.still_iterations);
+        mesh.scalar_mut(keys.since_edit).copy_from_slice(&before.since_edit);
+        mesh.scalar_mut(keys.reversals).copy_from_slice(&before.reversals);
         self.resolver.set_pending(before.waiting);
         self.resolver.take_overflow();
-        self.motion.forces.forget_image();
+        self.motion.free_buffers();
         self.level = before.level;
         self.level_iso = before.level_iso;
         self.image_force_factor = before.image_force_factor;
@@ -296,6 +344,28 @@ impl DeformableModel {
             return None;
         }
         self.follow.filter(|follow| level < follow.whole).map(|follow| follow.bounds)
+    }
+
+    /// Adds the box that a sparse volume is followed in to the fingerprint of saved states, if there is one.
+    pub(super) fn mix_box_into(&self, hash: &mut Hash) {
+        if !self.pyramid.is_sparse() {
+            return;
+        }
+        if let Some(Follow { bounds, whole }) = self.follow {
+            let corners = [bounds.min, bounds.max].into_iter().flat_map(|corner| corner.to_array());
+            corners.for_each(|x| hash.mix(u64::from(x.to_bits())));
+            hash.mix(whole as u64);
+        }
+        let levels = self.pyramid.levels.iter().flat_map(|level| level.grid().0.dims);
+        levels.for_each(|n| hash.mix(n as u64));
+    }
+
+    /// Returns whether single vertices may still move when the current phase of a run on a sparse volume ends: not in the last
+    /// one. Finer levels do not begin on their contour, and in a noisy image fronts creep for hundreds of iterations; those
+    /// of a start on the contour are small, and go on later.
+    pub(super) fn leaves_fronts(&self) -> bool {
+        let is_last = self.level == 0 && (self.convergence.sized || !self.params.adapts_to_image());
+        self.pyramid.is_sparse() && self.from_contour && !is_last
     }
 
     /// Returns whether the current level follows the surface at a vertex.
@@ -419,4 +489,78 @@ fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follo
     let corner = |k: usize| DVec3::from([0, 1, 2].map(|axis| [min, max][k >> axis & 1][axis]));
     let corners: Vec<Vec3> = (0..8).map(|k| to_model.transform_point3(corner(k)).as_vec3()).collect();
     Ok(Some(Follow { bounds: Bounds::from_points(&corners), whole: whole - options.finest }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::volume::{SparseInit, SparseLevel, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Returns a volume of two levels, with the coarser one loaded, and a function for the voxels of its boxes: a ball with
+    /// a cavity, and eight specks that only the coarser level has.
+    fn volume() -> (SparseVolume, impl Fn(&BrickBox) -> Voxels) {
+        let level = |n: usize, voxel: f64| {
+            let translation = DVec3::splat(0.5 * (voxel - 1.0));
+            let affine = DAffine3 { translation, ..DAffine3::from_scale(DVec3::splat(voxel)) };
+            SparseLevel { dims: [n; 3], affine }
+        };
+        let levels = vec![level(64, 1.0), level(32, 2.0)];
+        let init = SparseInit { levels: levels.clone(), range: [0.0, 200.0], fill: Voxels::U8(vec![0]) };
+        let voxels = move |at: &BrickBox| {
+            let [nx, ny, _] = at.region.dims;
+            let value = |k: usize| {
+                let offset = [k % nx, k / nx % ny, k / nx / ny];
+                let index = [0, 1, 2].map(|axis| (at.region.min[axis] + offset[axis]) as f64);
+                let p = levels[at.level].affine.transform_point3(DVec3::from(index)) - 31.3;
+                let shell = (20.0 - p.length()).min(p.length() - 8.0);
+                let speck = 4.0 * at.level as f64 - (p.abs() - 27.0).length();
+                (100.0 + 60.0 * shell.max(speck)).clamp(0.0, 200.0) as u8
+            };
+            Voxels::U8((0..at.region.len()).map(value).collect())
+        };
+        let volume = SparseVolume::new(init).unwrap();
+        volume.missing(1).unwrap().iter().for_each(|at| volume.insert(*at, &voxels(at)).unwrap());
+        (volume, voxels)
+    }
+
+    /// With a negative reach nothing is asked for in advance: steps read missing bricks while vertices move, and then in
+    /// edits, and are undone.
+    #[test]
+    fn a_step_that_reads_a_missing_brick_is_undone() {
+        let (whole, voxels) = volume();
+        whole.missing(0).unwrap().iter().for_each(|at| whole.insert(*at, &voxels(at)).unwrap());
+        let mut expected = DeformableModel::on_sparse(&whole, SparseOptions::default()).unwrap();
+        let (volume, voxels) = volume();
+        let mut model = DeformableModel::on_sparse(&volume, SparseOptions::default()).unwrap();
+        if let Some(sparse) = &mut model.pyramid.sparse {
+            sparse.reach = -100.0;
+        }
+        let [mut while_moving, mut in_edits] = [0, 0];
+        loop {
+            let (before, versions) = (model.save(), model.mesh.versions());
+            match model.step() {
+                Ok(report) => {
+                    expected.step().unwrap();
+                    assert_eq!(model.mesh.positions(), expected.mesh.positions());
+                    assert!(model.save() == expected.save(), "iteration {}", report.iteration);
+                    if report.done {
+                        break;
+                    }
+                }
+                Err(MethodError::NeedsData { needs }) => {
+                    assert!(model.save() == before);
+                    assert_eq!(model.mesh.check(), Ok(()));
+                    let changed = [0, 1].map(|k| model.mesh.versions()[k] != versions[k]);
+                    while_moving += u32::from(changed == [false, true]);
+                    in_edits += u32::from(changed[0]);
+                    needs.iter().for_each(|at| volume.insert(*at, &voxels(at)).unwrap());
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+        assert!(while_moving > 0 && in_edits > 0, "{while_moving} and {in_edits}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Saving and restoring a run of the deformable model; a restored run continues bit for bit.
 
 use super::domain::Domain;
-use super::motion::SpeedSummary;
+use super::motion::{Motion, SpeedSummary};
 use super::schedule::Convergence;
 use super::{Attractor, DeformableModel, DeformableParams, coarse, image};
 use crate::mesh::{Mesh, VertexId};
@@ -11,6 +11,9 @@ use crate::remesh::{Changes, Pending, Resolver};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLDEF\x06";
+/// The magic bytes of states of sparse volumes, which have one more field: whether the factor on the image force is still
+/// to be measured.
+const SPARSE_MAGIC: Magic = *b"VSCLDES\x01";
 
 /// The largest number of edits of each kind, made by refreshes since the last step, that is accepted in a saved state, so
 /// that their sums do not overflow.
@@ -58,32 +61,39 @@ impl DeformableModel {
             fastest: self.speed.fastest,
             refreshed: self.refreshed,
         };
+        if self.pyramid.is_sparse() {
+            return encode(&SPARSE_MAGIC, &(self.needs_factor, state));
+        }
         encode(&MAGIC, &state)
     }
 
-    /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels.
+    /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels, and on a
+    /// sparse volume the same box. Bricks are not saved: the next step asks for those that are missing.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] if the bytes are not such a state or the volume is sparse, [`MethodError::InvalidArgument`] if a parameter or
+    /// [`MethodError::BadState`] if the bytes are not such a state, [`MethodError::InvalidArgument`] if a parameter or
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        if self.pyramid.is_sparse() {
-            let problem = "runs on sparse volumes cannot be restored".into();
-            return Err(MethodError::BadState { field: "volume", problem });
-        }
-        let state: State = decode(&MAGIC, bytes)?;
+        let (needs_factor, state): (bool, State) = if self.pyramid.is_sparse() {
+            decode(&SPARSE_MAGIC, bytes)?
+        } else {
+            (false, decode(&MAGIC, bytes)?)
+        };
         if state.fingerprint != self.fingerprint() {
             let problem = "the state belongs to another volume, frame or number of levels".into();
             return Err(MethodError::BadState { field: "volume", problem });
         }
         self.check_state(&state)?;
-        self.take_state(state)
+        self.take_state(state)?;
+        self.needs_factor = needs_factor;
+        Ok(())
     }
 
     fn check_state(&self, state: &State) -> Result<(), MethodError> {
         let bad = |field, problem: String| Err(MethodError::BadState { field, problem });
-        state.params.validate()?;
+        self.check_params(&state.params)?;
+        self.check_attractors(&state.attractors)?;
         if !can_be_checked(&state.mesh) {
             return bad("mesh", format!("a vertex has more than {MAX_VALENCE} neighbours"));
         }
@@ -125,6 +135,7 @@ impl DeformableModel {
         self.to_world.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
         self.pyramid.range().into_iter().for_each(|x| hash.mix(x.to_bits()));
         hash.mix(self.pyramid.hash());
+        self.mix_box_into(&mut hash);
         hash.value()
     }
 
@@ -134,28 +145,27 @@ impl DeformableModel {
     }
 
     fn take_state(&mut self, state: State) -> Result<(), MethodError> {
-        let mut next = self.clone();
-        next.set_attractors(state.attractors)?;
-        next.params = state.params;
-        next.from_contour = state.from_contour;
-        next.finest_delta = state.finest_delta;
-        next.level = state.level;
-        next.domain = self.domain_for(state.finest_delta);
-        next.mesh = state.mesh;
-        next.mesh.advance_versions_past(&self.mesh);
-        let finest = next.pyramid.delta_at(state.finest_delta, 0);
-        next.resolver = Resolver::with_max_vertices(next.domain.most_vertices(finest));
-        next.watch_output();
-        next.resolver.set_pending(state.waiting);
-        next.iteration = state.iteration;
-        next.convergence = state.convergence;
-        next.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };
-        next.components = next.mesh.component_count() as u32;
-        next.refreshed = state.refreshed;
-        next.prepare_level()?;
-        next.level_iso = state.level_iso;
-        next.image_force_factor = state.image_force_factor;
-        *self = next;
+        self.pyramid.levels[state.level].prepare_gradient_for(&state.params)?;
+        self.level = state.level;
+        self.params = state.params;
+        self.attractors = state.attractors;
+        self.from_contour = state.from_contour;
+        self.finest_delta = state.finest_delta;
+        self.domain = self.domain_for(state.finest_delta);
+        let replaced = std::mem::replace(&mut self.mesh, state.mesh);
+        self.mesh.advance_versions_past(&replaced);
+        let finest = self.pyramid.delta_at(state.finest_delta, 0);
+        self.resolver = Resolver::with_max_vertices(self.domain.most_vertices(finest));
+        self.watch_output();
+        self.resolver.set_pending(state.waiting);
+        self.motion = Motion::default();
+        self.iteration = state.iteration;
+        self.convergence = state.convergence;
+        self.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };
+        self.components = self.mesh.component_count() as u32;
+        self.refreshed = state.refreshed;
+        self.level_iso = state.level_iso;
+        self.image_force_factor = state.image_force_factor;
         Ok(())
     }
 }

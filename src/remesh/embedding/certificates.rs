@@ -7,7 +7,7 @@
 //! structures for mobile data*, 1999.)
 
 use super::one_ring::ORDINARY_RING;
-use crate::math::lower;
+use crate::math::{lower, resize};
 use crate::mesh::VertexId;
 use smallvec::SmallVec;
 
@@ -53,9 +53,9 @@ impl Certificates {
     }
 
     pub(super) fn resize(&mut self, slots: usize) {
-        self.odometer.resize(slots, 0.0);
-        self.own.resize(slots, 0.0);
-        self.along_edges.resize(slots, SmallVec::new());
+        resize(&mut self.odometer, slots, 0.0);
+        resize(&mut self.own, slots, 0.0);
+        resize(&mut self.along_edges, slots, SmallVec::new());
     }
 
     /// Returns whether an odometer exceeds [`MAX_ODOMETER`], so that the certificates must be reset.

@@ -27,7 +27,7 @@ mod refine;
 mod replace;
 mod separate;
 
-use crate::math::{Bounds, DAffine3, Vec3, higher, triangle};
+use crate::math::{Bounds, DAffine3, Vec3, higher, resize, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
@@ -277,10 +277,10 @@ impl Embedding {
 
     /// Resizes the arrays indexed by vertex slot to `slots`; all collision checks of new vertices are due.
     fn resize_for(&mut self, slots: usize) {
-        self.longest.resize(slots, 0.0);
-        self.nearby.resize(slots, SmallVec::new());
+        resize(&mut self.longest, slots, 0.0);
+        resize(&mut self.nearby, slots, SmallVec::new());
         self.may_touch.resize(slots, true);
-        self.motion_bounds.resize(slots, MotionBounds::NONE);
+        resize(&mut self.motion_bounds, slots, MotionBounds::NONE);
         self.certificates.resize(slots);
     }
 
@@ -331,7 +331,7 @@ impl Embedding {
 
     /// Clears the visited marks of all vertices.
     fn new_marks(&mut self, mesh: &Mesh) {
-        self.marks.resize(mesh.slots(), 0);
+        resize(&mut self.marks, mesh.slots(), 0);
         self.newest = self.newest.wrapping_add(1);
         if self.newest == 0 {
             self.marks.fill(0);

@@ -2,7 +2,7 @@
 
 use super::Embedding;
 use super::motion_bound::Checks;
-use crate::math::Vec3;
+use crate::math::{Vec3, resize};
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
@@ -36,7 +36,7 @@ impl Embedding {
     ) -> Vec<(VertexId, f32)> {
         self.sync_without_cells(mesh);
         let mut from = std::mem::take(&mut self.from);
-        from.resize(mesh.slots(), Vec3::ZERO);
+        resize(&mut from, mesh.slots(), Vec3::ZERO);
         let positions = mesh.positions_mut();
         for i in moving.iter().map(|v| v.index()) {
             from[i] = positions[i];

@@ -5,7 +5,7 @@
 //! one-rings add up to the clearance.
 
 use super::{Embedding, MIN_LENGTH};
-use crate::math::{Vec3, higher};
+use crate::math::{Vec3, higher, resize};
 use crate::mesh::{Mesh, VertexId};
 
 /// A kind of collision check at a vertex, with a motion bound of its own.
@@ -80,7 +80,7 @@ impl Embedding {
     /// marks those vertices dirty whose bounds are used up. `moved` contains the moved vertices and their previous
     /// positions.
     pub(super) fn apply_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
-        self.ring_displacement.resize(mesh.slots(), 0.0);
+        resize(&mut self.ring_displacement, mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
         for (v, from) in moved {
             // The displacement after rounding of the position.
