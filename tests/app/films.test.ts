@@ -133,7 +133,7 @@ async function play(film: Buffer): Promise<{ size: number[]; frames: number }> {
 const EBML = '1a45dfa3';
 
 describe('a film', () => {
-  const record = () => app.page.click('[data-film=start]');
+  const record = () => setting('start').click();
 
   test('of one turn is a WebM of the chosen size with many frames, and the view is as before', async () => {
     await choose(320, 240);
@@ -152,7 +152,7 @@ describe('a film', () => {
     const files: string[] = [];
     app.page.on('download', (download) => files.push(download.suggestedFilename()));
     await record();
-    await app.page.click('[data-film=cancel]');
+    await setting('cancel').click();
     await expect.poll(said).toBe('Cancelled.');
     expect(files).toEqual([]);
     expect(await setting('save').isEnabled()).toBe(true);
@@ -184,13 +184,13 @@ describe('a film', () => {
     await open({ page, address: app.address }, QUICK.extract);
     await reach(page, 'done');
     await page.click('.picture-panel > summary');
-    await page.click('[data-film=start]');
+    await page.click('[data-picture=start]');
     expect(await page.locator('.picture-panel [role=status]').textContent()).toContain('cannot record');
     await page.close();
   });
 });
 
-/** What a file of a plot contains, as an XML parser reads it. */
+/** Contents of the file of a plot, as an XML parser reads it. */
 interface PlotFile {
   error: string | undefined;
   viewBox: string | null;

@@ -63,6 +63,11 @@ export function labelFor(control: HTMLElement, ...content: (Node | string)[]): H
   return h('label', { for: control.id }, ...content);
 }
 
+/** Creates a control with its label before it, for a row of options. */
+export function placed(label: string, control: HTMLElement): HTMLElement {
+  return h('span', { class: 'placement' }, labelFor(control, label), control);
+}
+
 /** Creates a selection list. */
 export function selectFrom(choices: readonly Choice[], attributes: Record<string, unknown> = {}): HTMLSelectElement {
   return h('select', attributes, ...choices.map(({ value, label }) => h('option', { value }, label)));

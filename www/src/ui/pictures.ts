@@ -77,7 +77,7 @@ export class PicturePanel {
     this.#save = button('save', () => void this.#savePicture(), text('pictures.save'));
     this.#finish = button('finish', () => this.#end(true), text('pictures.finish'));
     this.#task = new TaskControls({
-      name: 'film',
+      name: 'picture',
       start: text('pictures.record'),
       progress: text('pictures.progress'),
       onStart: () => void this.#record(),
@@ -208,8 +208,7 @@ export class PicturePanel {
     context.scale(scale, scale);
     context.font = '13px system-ui, sans-serif';
     const perUnit = draw(context, size, scale);
-    const unit = this.#events.unit() || text('pictures.units');
-    if (this.#scaleBar.checked) paintScaleBar(context, size, perUnit, unit, inks);
+    if (this.#scaleBar.checked) paintScaleBar(context, size, perUnit, this.#events.unit(), inks);
     return true;
   }
 

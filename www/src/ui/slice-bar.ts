@@ -1,7 +1,7 @@
 import { type TextKey, text } from '../texts';
 import type { DisplayWindow } from '../view/slicing';
 import { h } from './dom';
-import { labelFor, selectFrom } from './field';
+import { placed, selectFrom } from './field';
 
 /** The part of the surface that is cut away in the 3D view: the patient's right, left, front, back, top or bottom. */
 export type CutSide = 'none' | 'R' | 'L' | 'A' | 'P' | 'S' | 'I';
@@ -74,8 +74,6 @@ export class SliceBar {
     );
     [this.#width, this.#level] = [this.#number('width'), this.#number('level')];
     this.#cut = selectFrom(SIDES, { 'data-view': 'cut', onchange: () => onCut(this.#cut.value as CutSide) });
-    const placed = (label: string, control: HTMLElement) =>
-      h('span', { class: 'placement' }, labelFor(control, label), control);
     this.#reset = h('button', { type: 'button', disabled: true, onclick: onResetZoom }, text('slices.resetZoom'));
     this.element = h(
       'div',

@@ -1,7 +1,7 @@
 import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
-import { type Choice, type FormControl, labelFor, selectFrom } from './field';
+import { type Choice, type FormControl, placed, selectFrom } from './field';
 
 /**
  * Placement of the slices in the 3D view: on the walls behind the surface, at their positions in the volume, or hidden.
@@ -89,7 +89,7 @@ export class OptionControls<Options extends object> {
     this.#controls.set(name, control);
     control.addEventListener(step ? 'input' : 'change', () => this.set({ [name]: read(control) } as Partial<Options>));
     if (!choices && !step) return h('label', {}, control, label);
-    return h('span', { class: 'placement' }, labelFor(control, label), control);
+    return placed(label, control);
   }
 
   #show(): void {

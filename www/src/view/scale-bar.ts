@@ -1,3 +1,4 @@
+import { plural } from '../texts';
 import { token } from '../ui/dom';
 import { figure } from '../ui/format';
 
@@ -36,7 +37,8 @@ export function paintScaleBar(
   const length = barLength((MOST * width) / perUnit);
   const [left, bottom] = [MARGIN, height - MARGIN];
   const bar = [left, bottom - THICKNESS, length * perUnit, THICKNESS] as const;
-  paintText(context, `${figure(length)} ${unit}`, left, bottom - THICKNESS - 6, 'left', inks);
+  const label = unit ? `${figure(length)} ${unit}` : plural('view.units', length, { count: figure(length) });
+  paintText(context, label, left, bottom - THICKNESS - 6, 'left', inks);
   context.strokeRect(...bar);
   context.fillRect(...bar);
 }
