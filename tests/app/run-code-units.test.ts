@@ -23,7 +23,7 @@ async function tooth() {
 /** Returns linked rings, which the lab computes, as the file that the lab saves. */
 async function rings() {
   const source = (): VolumeSource => ({ shape: 'linked rings' });
-  await worker.request('load', { name: 'linked rings', source: source(), setup: SETUP });
+  await worker.request('load', { name: 'linked rings', source: source(), setup: SETUP, frame: 0 });
   return { name: 'linked rings.nii', bytes: await worker.request('volume', undefined), source };
 }
 
@@ -90,7 +90,7 @@ function actions(random: () => number, bounds: { middle: number[]; size: number 
 /** Opens a volume, acts at random, and writes code of the run; returns the surface. */
 async function interactiveRun(seed: number, source: VolumeSource, file: string): Promise<Uint8Array> {
   const random = uniform(seed);
-  const { volume } = await worker.request('load', { name: file, source, setup: SETUP });
+  const { volume } = await worker.request('load', { name: file, source, setup: SETUP, frame: 0 });
   const size = Math.min(...volume.dims.map((n, axis) => n * (volume.spacing[axis] ?? 1)));
   const middle = [0, 1, 2].map((row) =>
     [0, 1, 2, 3].reduce(

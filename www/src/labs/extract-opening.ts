@@ -99,8 +99,8 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
 
   /** Opens another frame of the open volume, with the settings in force. */
   async frame(frame: number): Promise<void> {
-    const { source } = this;
-    if (!source) return;
+    if (!this.source) return;
+    const { session: _, ...source } = this.source;
     const { params, attractors, sphere } = this.#settings;
     const { kind: start, edge = 0, ...choice } = this.#ui.start.inForce;
     await this.open({ ...source, linked: { ...choice, frame, start, edge, sphere, params, attractors } });

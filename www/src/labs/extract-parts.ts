@@ -53,6 +53,8 @@ export class ExtractParts extends RunParts<Example> {
   readonly stage: Stage;
   readonly measures = new MeasurePanel();
   readonly large: LargeSourceControls;
+  /** Number of frames of the open volume. */
+  frameCount = 1;
   readonly #frames: FrameChoice;
   readonly histogram: Histogram;
   readonly start: StartControls;
@@ -157,6 +159,7 @@ export class ExtractParts extends RunParts<Example> {
     this.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
+    this.frameCount = volume.frames;
     this.#frames.show(frameOf(source), volume.frames);
     this.large.showTotal(volume.large?.bytes);
     this.stage.setVolume(volume);

@@ -100,7 +100,8 @@ export class ExtractLab extends RunLab<Example> {
     if (!source) return;
     const { saving, status } = this.ui;
     const files = this.opening.filesOf(await source.load()).map(({ name }) => name);
-    const isRead = files.length > 0 && files.length < 3 && files.some((name) => PACKAGE_FILES.test(name));
+    // Of several frames, the model has one as a volume of its own.
+    const isRead = files.length < 3 && files.some((name) => PACKAGE_FILES.test(name)) && this.ui.frameCount === 1;
     const code = await this.client.request('code', { files: isRead ? files : [`${saving.stem}.nii`] });
     try {
       await navigator.clipboard.writeText(code);

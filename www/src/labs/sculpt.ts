@@ -135,6 +135,7 @@ export class SculptLab extends RunLab<SculptExample> {
     if (isRecord(view)) this.ui.options.set(view.options as Partial<SculptViewOptions>);
     await this.client.request('show', this.#shown);
     await this.#settings.resume(moments);
+    this.states.idle(this.#results.describe('paused'));
     if (isRecord(view)) this.ui.view.pose = view.camera as CameraPose;
   }
 

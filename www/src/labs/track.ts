@@ -121,6 +121,8 @@ export class TrackLab extends RunLab<TrackExample> {
   /** Continues a session: shows its state and view, and does not run it. */
   async #resume(moments: Moments<TrackMoment>, view: unknown): Promise<void> {
     await this.#settings.resume(moments);
+    const state = moments.now.saved.done ? 'done' : 'paused';
+    this.states.idle(this.#results.describe(state), state);
     if (!isRecord(view)) return;
     this.ui.options.set(view.options as Partial<TrackViewOptions>);
     this.ui.view.pose = view as unknown as StageView;

@@ -51,6 +51,7 @@ class Session {
   /** Reports of the latest steps, which have not been sent to the page yet. */
   #reports: StepReport[] = [];
   #last: StepReport | undefined;
+  #iteration = 0;
   #durationMs = 0;
   /** Serial number of the last frame sent to the page. */
   #sentSerial = 0;
@@ -137,6 +138,7 @@ class Session {
     this.#preview = new Preview();
     this.#dragging = false;
     this.#path.rewind(0);
+    this.#iteration = 0;
     this.#forget();
     if (pose) this.#path.glideTo(model, pose);
     return { params: { ...model.params }, start, pose: pose ?? start };
@@ -222,6 +224,7 @@ class Session {
     this.#durationMs = performance.now() - began;
     if (report.iteration !== this.#last?.iteration) this.#reports.push(report);
     this.#last = report;
+    this.#iteration = report.iteration;
   }
 
   #motion(): 'none' | 'path' | 'drag' {
@@ -318,17 +321,18 @@ class Session {
     return {
       state: this.#current().save(),
       start: this.#start,
-      iteration: this.#last?.iteration ?? 0,
+      iteration: this.#iteration,
       frame: this.#path.frame,
     };
   }
 
-  async #restore({ state, frame }: SavedPose): Promise<Ready> {
+  async #restore({ state, frame, iteration }: SavedPose): Promise<Ready> {
     await this.#run.stop();
     const model = this.#current();
     model.restore(state);
     this.#preview = new Preview();
     this.#path.rewind(frame);
+    this.#iteration = iteration;
     this.#forget();
     return { params: { ...model.params }, start: this.#start, pose: model.targets };
   }
