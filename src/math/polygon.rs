@@ -255,7 +255,7 @@ mod tests {
             let mut random = Random::new(seed);
             let mut points = Vec::new();
             let mut star = |centre: DVec2, least: f64, most: f64, is_hole: bool| {
-                let (first, count) = (points.len() as u32, 3 + random.below(40) as u32);
+                let (first, count) = (points.len() as u32, 3 + random.below(40));
                 for k in 0..count {
                     let angle = std::f64::consts::TAU * f64::from(k) / f64::from(count);
                     let (sine, cosine) = libm::sincos(angle);
