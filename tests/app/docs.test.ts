@@ -21,7 +21,7 @@ const LABS: Record<string, (id: string) => { id: string } | undefined> = {
 
 interface Link {
   page: string;
-  /** Path of the file that the link leads to; the part after `#` is separate. */
+  /** Path of the file that the link leads to, without a query; the part after `#` is separate. */
   file: string;
   hash: string;
 }
@@ -43,7 +43,7 @@ async function linksOf(page: string): Promise<Link[]> {
 }
 
 function linkAt(page: string, address: string): Link {
-  const [path = '', hash = ''] = address.split('#');
+  const [path = '', hash = ''] = address.replace(/^([^?#]*)\?[^#]*/, '$1').split('#');
   return { page, file: path ? join(DOCS, dirname(page), decodeURI(path)) : join(DOCS, page), hash };
 }
 
