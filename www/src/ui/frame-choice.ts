@@ -1,5 +1,6 @@
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
+import { labelFor } from './field';
 import { count } from './format';
 
 /** Slider of the Extract lab that chooses the frame of a 4D volume to which the surface is fitted; hidden for others. */
@@ -19,7 +20,7 @@ export class FrameChoice {
     this.element = h(
       'div',
       { class: 'param', 'data-param': 'frame', hidden: true },
-      h('label', { for: id }, text('controls.frame')),
+      labelFor(this.#slider, text('controls.frame')),
       this.#output,
       this.#slider,
       h('p', { class: 'help', id: `${id}-help` }, text('slices.frameHelp')),
