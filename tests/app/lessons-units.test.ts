@@ -93,8 +93,8 @@ describe('files of a lesson', () => {
     const lesson = parseLesson(files(), 'fr');
     expect(lesson).toMatchObject({ id: 'rings', language: 'en', title: 'Rings', intro: 'Intro', minutes: 5 });
     expect(lesson.steps).toEqual([
-      { id: 'a', question: 'text', title: 'A', parts: { goal: 'Goal', hint: 'H' } },
-      { id: 'b', title: 'B', parts: {} },
+      { id: 'a', question: 'text', language: 'en', title: 'A', parts: { goal: 'Goal', hint: 'H' } },
+      { id: 'b', language: 'en', title: 'B', parts: {} },
     ]);
     expect(parseLesson(files(), 'de').title).toBe('Ringe');
   });
@@ -125,7 +125,7 @@ describe('progress', () => {
     ticks: { a: { at: '', link: '', measures: { triangles: 10 } } },
     answers: { a: '15', b: ' ', c: '0,5' },
   };
-  const step = (id: string, more: object) => ({ id, title: '', parts: {}, ...more });
+  const step = (id: string, more: object) => ({ id, language: 'en', title: '', parts: {}, ...more });
 
   test('numbers are read with point or comma, and either minus sign', () => {
     expect(['1.5', '1,5', ' −4 ', '-4', '1e3'].map(parseNumber)).toEqual([1.5, 1.5, -4, -4, 1000]);

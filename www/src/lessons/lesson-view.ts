@@ -37,7 +37,7 @@ export class LessonView {
     this.#lab = lab;
     this.#progress = loadProgress(lesson.id);
     const steps = h('nav', { 'aria-label': text('lessons.steps') }, this.#steps);
-    this.element = h('div', { lang: lesson.language }, steps, this.#body, this.#news, this.#results(address));
+    this.element = h('div', {}, steps, this.#body, this.#news, this.#results(address));
     watchLab(lab, this.#closing.signal, () => this.#test());
     this.#show();
   }
@@ -92,8 +92,12 @@ export class LessonView {
       h('button', { type: 'button', disabled: !this.#lesson.steps[to], onclick: () => this.#go(to) }, text(name));
     this.#now = undefined;
     this.#body.replaceChildren(
-      ...(index === 0 ? [prose(this.#lesson.intro)] : []),
-      h('h3', { tabindex: -1 }, text('lessons.stepTitle', { number: index + 1, title: step.title })),
+      ...(index === 0 ? [prose(this.#lesson.intro, this.#lesson.language)] : []),
+      h(
+        'h3',
+        { tabindex: -1, lang: step.language },
+        text('lessons.stepTitle', { number: index + 1, title: step.title }),
+      ),
       ...[parts.goal, parts.do, this.#doButton(step), parts.watch, this.#check(step, parts.check)].filter(isPresent),
       ...[parts.question && this.#question(step, parts.question), parts.hint, parts.explanation].filter(isPresent),
       h('div', { class: 'buttons' }, link('lessons.back', index - 1), link('lessons.next', index + 1)),

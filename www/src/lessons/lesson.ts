@@ -20,6 +20,8 @@ interface StepData {
 }
 
 export interface Step extends StepData {
+  /** Language of its text. */
+  language: string;
   title: string;
   /** Texts of the step, as Markdown. */
   parts: Partial<Record<Part, string>>;
@@ -63,7 +65,7 @@ export function parseLesson(files: LessonFiles, language: string): Lesson {
     language: used,
     title,
     intro,
-    steps: data.steps.map((one, at) => ({ ...one, ...steps[at] })) as Step[],
+    steps: data.steps.map((one, at) => ({ ...one, ...steps[at], language: used })) as Step[],
   };
 }
 

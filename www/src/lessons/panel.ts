@@ -42,6 +42,7 @@ export class LessonPanel {
     this.#close();
     setLesson(undefined);
     this.#title.textContent = text('lessons.title');
+    this.#title.lang = LANGUAGE;
     this.#back.hidden = true;
     const list = h('ul', { class: 'lesson-list' });
     const chooser = fileChooser((files) => void this.#openFiles(files), '.json,.md,.zip', text('lessons.openFile'));
@@ -75,9 +76,9 @@ export class LessonPanel {
     open.id = `${id}-open`;
     return h(
       'li',
-      { lang: lesson.language },
-      h('h3', { id }, lesson.title),
-      prose(lesson.intro.split('\n\n')[0] ?? ''),
+      {},
+      h('h3', { id, lang: lesson.language }, lesson.title),
+      prose(lesson.intro.split('\n\n')[0] ?? '', lesson.language),
       h('p', { class: 'help' }, facts.join(' · ')),
       open,
     );
@@ -88,6 +89,7 @@ export class LessonPanel {
     this.#error.textContent = '';
     setLesson(address);
     this.#title.textContent = lesson.title;
+    this.#title.lang = lesson.language;
     this.#back.hidden = false;
     this.#view = new LessonView(lesson, this.#lab, address);
     this.#body.replaceChildren(this.#view.element);

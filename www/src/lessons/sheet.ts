@@ -24,13 +24,12 @@ export async function showSheet(address: string, forTeachers: boolean): Promise<
 function fill(sheet: HTMLElement, lesson: Lesson, forTeachers: boolean): void {
   const progress = loadProgress(lesson.id);
   const title = forTeachers ? text('lessons.teacherTitle', { title: lesson.title }) : lesson.title;
-  sheet.lang = lesson.language;
   sheet.append(
-    h('h1', {}, title),
+    h('h1', { lang: lesson.language }, title),
     h('button', { type: 'button', onclick: () => window.print() }, text('lessons.print')),
     h('p', { class: 'help' }, plural('lessons.minutes', lesson.minutes)),
     ...(forTeachers ? [] : [h('p', { class: 'line' }, `${text('lessons.name')}: ${progress.name}`)]),
-    prose(lesson.intro),
+    prose(lesson.intro, lesson.language),
     ...lesson.steps.map((step, index) =>
       h(
         'section',

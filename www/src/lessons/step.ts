@@ -17,9 +17,9 @@ const TITLES: Record<Part, string> = {
 /** Parts that are collapsed until the student opens them. */
 const FOLDED: Part[] = ['hint', 'explanation'];
 
-/** Creates an element with a text in Markdown. */
-export function prose(source: string): HTMLElement {
-  const element = h('div', { class: 'prose' });
+/** Creates an element with a text in Markdown, which is in the given language. */
+export function prose(source: string, lang: string): HTMLElement {
+  const element = h('div', { class: 'prose', lang });
   renderMarkdown(source, element);
   return element;
 }
@@ -32,7 +32,7 @@ export function partsOf(step: Step, on: 'panel' | 'sheet' | 'teacher'): Partial<
   const shown = PARTS.filter((part) => part !== 'answer' || on === 'teacher');
   const entries = shown.flatMap((part) => {
     const source = step.parts[part];
-    return source ? [[part, partOf(part, prose(source), on === 'panel')]] : [];
+    return source ? [[part, partOf(part, prose(source, step.language), on === 'panel')]] : [];
   });
   return Object.fromEntries(entries);
 }
