@@ -8,6 +8,7 @@ import { at, must } from '../../scripts/shell.mjs';
 import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
 import { uniform } from '../../www/src/random';
 import { literal } from '../../www/src/worker/code';
+import { ball, ring } from './volumes';
 import { startWorker } from './worker-in-node';
 
 const worker = await startWorker<Requests>(() => import('../../www/src/worker'));
@@ -25,6 +26,14 @@ async function rings() {
   const source = (): VolumeSource => ({ shape: 'linked rings' });
   await worker.request('load', { name: 'linked rings', source: source(), setup: SETUP, frame: 0 });
   return { name: 'linked rings.nii', bytes: await worker.request('volume', undefined), source };
+}
+
+/** Returns a 4D file with a ball and a ring, of which the second frame is opened. */
+async function secondFrame() {
+  const data = new Uint8Array([...ball(), ...ring()]);
+  const bytes = new Volume({ data, dims: [32, 32, 32, 2] }).toNifti();
+  const source = (): VolumeSource => ({ files: [{ name: 'frames.nii', bytes }] });
+  return { name: 'frames.nii', bytes, source, frame: 1 };
 }
 
 let folder = '';
@@ -88,9 +97,9 @@ function actions(random: () => number, bounds: { middle: number[]; size: number 
 }
 
 /** Opens a volume, acts at random, and writes code of the run; returns the surface. */
-async function interactiveRun(seed: number, source: VolumeSource, file: string): Promise<Uint8Array> {
+async function interactiveRun(seed: number, source: VolumeSource, file: string, frame?: number): Promise<Uint8Array> {
   const random = uniform(seed);
-  const { volume } = await worker.request('load', { name: file, source, setup: SETUP, frame: 0 });
+  const { volume } = await worker.request('load', { name: file, source, setup: SETUP, frame: frame ?? 0 });
   const size = Math.min(...volume.dims.map((n, axis) => n * (volume.spacing[axis] ?? 1)));
   const middle = [0, 1, 2].map((row) =>
     [0, 1, 2, 3].reduce(
@@ -103,7 +112,7 @@ async function interactiveRun(seed: number, source: VolumeSource, file: string):
     await can[Math.floor(random() * can.length)]?.();
     await can[0]?.();
   }
-  await writeFile(join(folder, `${seed}.mjs`), await worker.request('code', { files: [file] }));
+  await writeFile(join(folder, `${seed}.mjs`), await worker.request('code', { files: [file], frame }));
   return worker.request('export', { format: 'ply' });
 }
 
@@ -119,16 +128,24 @@ async function repeated(file: string, seeds: number[]): Promise<Uint8Array[]> {
   return Promise.all(seeds.map((seed) => readFile(join(folder, `${seed}.ply`))));
 }
 
+interface Opened {
+  name: string;
+  bytes: Uint8Array;
+  source: () => VolumeSource;
+  frame?: number;
+}
+
 const SEEDS = Array.from({ length: 10 }, (_, index) => index + 1);
 
 test.each([
   ['a file', tooth],
   ['a computed volume', rings],
+  ['a frame of a 4D file', secondFrame],
 ])('the code of random runs on %s gives the same surfaces', async (_, open) => {
-  const { name, bytes, source } = await open();
+  const { name, bytes, source, frame }: Opened = await open();
   await writeFile(join(folder, name), bytes);
   const made: Uint8Array[] = [];
-  for (const seed of SEEDS) made.push(await interactiveRun(seed, source(), name));
+  for (const seed of SEEDS) made.push(await interactiveRun(seed, source(), name, frame));
   const again = await repeated(name, SEEDS);
   for (const [index, seed] of SEEDS.entries())
     expect(Buffer.compare(again[index] ?? new Uint8Array(), made[index] ?? new Uint8Array()), `seed ${seed}`).toBe(0);

@@ -228,7 +228,7 @@ export interface Requests {
   /** Adds to the surface the components and cavities of the object that it misses; replies with their number. */
   seed: { body: undefined; reply: number };
   /** Replies with JavaScript that repeats the run; `files` are the names of the volume's files. */
-  code: { body: { files: string[] }; reply: string };
+  code: { body: { files: string[]; frame?: number | undefined }; reply: string };
   /** Replies with the volume as NIfTI. */
   volume: { body: undefined; reply: Uint8Array };
 }

@@ -106,7 +106,7 @@ class Session {
     coverage: () => this.#coverage(),
     cancelCoverage: () => this.#coverageRun.stop(),
     seed: () => this.#seed(),
-    code: ({ files }) => this.#code(files),
+    code: (context) => this.#code(context),
     volume: () => this.#image().toNifti(),
   };
 
@@ -322,11 +322,11 @@ class Session {
   }
 
   /** Returns code that repeats the run with the package alone. */
-  #code(files: string[]): string {
+  #code(context: Requests['code']['body']): string {
     // Of a volume larger than memory, the package reads parts while the model runs.
     this.#image();
     const defaults = Object.fromEntries(paramSpecs('deformable').map(({ name, default: value }) => [name, value]));
-    return toCode(this.#logged(), { files, version: version(), defaults });
+    return toCode(this.#logged(), { ...context, version: version(), defaults });
   }
 
   /**

@@ -169,6 +169,11 @@ export class ExtractParts extends RunParts<Example> {
     if (isPreset(example) && example.compares) this.#compareHolder.open = true;
   }
 
+  /** Index of the open frame of a 4D volume; undefined if the volume has one only. */
+  get frame(): number | undefined {
+    return this.#frames.frame;
+  }
+
   showParams(params: ParamValues, example: Example | undefined): void {
     this.displayParams(params);
     if (typeof params.iso === 'number') this.histogram.setIso(params.iso);

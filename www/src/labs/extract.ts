@@ -98,11 +98,13 @@ export class ExtractLab extends RunLab<Example> {
   async #copyCode(): Promise<void> {
     const { source } = this.opening;
     if (!source) return;
-    const { saving, status } = this.ui;
+    const { saving, status, frame } = this.ui;
     const files = this.opening.filesOf(await source.load()).map(({ name }) => name);
     // Of several frames, the model has one as a volume of its own.
     const isRead = files.length < 3 && files.some((name) => PACKAGE_FILES.test(name)) && this.ui.frameCount === 1;
-    const code = await this.client.request('code', { files: isRead ? files : [`${saving.stem}.nii`] });
+    // A saved volume has one frame.
+    const context = isRead ? { files, frame } : { files: [`${saving.stem}.nii`], frame: undefined };
+    const code = await this.client.request('code', context);
     try {
       await navigator.clipboard.writeText(code);
       status.say(text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', { name: files[0] ?? saving.stem }));

@@ -3,7 +3,7 @@ import { seriesOf } from '../importers/dicom-header';
 import type { NamedBytes } from '../protocol';
 import { plural, text } from '../texts';
 
-/** Number of bytes at the start of a DICOM file in which its series is looked for. */
+/** Number of bytes at the start of a DICOM file that are searched for its series. */
 const HEAD = 2 ** 16;
 /** Files at the top of an OME-Zarr image, of the versions of the format. */
 const ZARR = ['zarr.json', '.zattrs', '.zgroup', '.zarray'];

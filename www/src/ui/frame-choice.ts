@@ -8,6 +8,7 @@ export class FrameChoice {
   readonly element: HTMLElement;
   readonly #slider: HTMLInputElement;
   readonly #output = h('output', { 'aria-live': 'off' });
+  #frame = 0;
   #frames = 1;
 
   /** `onFrame` is called with the index of the frame that the user chooses. */
@@ -27,8 +28,14 @@ export class FrameChoice {
     );
   }
 
+  /** Index of the open frame; undefined if the volume has no others. */
+  get frame(): number | undefined {
+    return this.#frames > 1 ? this.#frame : undefined;
+  }
+
   /** Shows the open frame of a volume of `frames` frames. */
   show(frame: number, frames: number): void {
+    this.#frame = frame;
     this.#frames = frames;
     this.element.hidden = frames < 2;
     this.#slider.max = String(frames - 1);

@@ -26,7 +26,7 @@ export interface PanelEvents {
   onHover?: (index: Vec3 | undefined) => void;
 }
 
-/** What all slices of a volume share, besides the crosshair. */
+/** The common part of all slices of a volume, besides the crosshair. */
 export interface PanelHost {
   /** Called with the voxel under the pointer; undefined when it has left the slice image. */
   onProbe: (voxel: Vec3 | undefined) => void;

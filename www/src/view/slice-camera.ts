@@ -1,4 +1,4 @@
-/** Size and position of a slice image in its canvas: its top left corner, and the size of a voxel, CSS pixels. */
+/** Size and position of a slice image in its canvas: its top left corner, and its voxel size, CSS pixels. */
 export interface Placement {
   x: number;
   y: number;

@@ -1,4 +1,4 @@
-/** What the gestures on a slice image act on; positions and distances are in CSS pixels. */
+/** Actions of the gestures on a slice image; positions and distances are in CSS pixels. */
 export interface GestureTarget {
   /** Returns the drag that a press of the main button, or of one finger, starts. */
   press: (event: PointerEvent) => Drag;

@@ -9,6 +9,8 @@ import type { RunLog } from './run-log';
 export interface CodeContext {
   /** Name of the file that the volume is read from and, if that is a header, of the file with its voxels. */
   files: readonly string[];
+  /** Index of the frame of these files that the run is of; undefined if they have one frame only. */
+  frame?: number | undefined;
   /** Version of the library that made the run. */
   version: string;
   /** Default parameters of the method, which the code omits. */
@@ -19,7 +21,7 @@ export interface CodeContext {
  * Returns the code of an ES module for Node and browsers, which exports a function that repeats a run of the deformable
  * model.
  */
-export function toCode({ setup, calls }: RunLog<Setup>, { files, version, defaults }: CodeContext): string {
+export function toCode({ setup, calls }: RunLog<Setup>, { files, frame, version, defaults }: CodeContext): string {
   const { levels, edge, attractors, params } = setup;
   const chosen = Object.entries(params).filter(([name, value]) => !Object.is(defaults[name], value));
   const start = startOf(setup, Number(params.iso));
@@ -28,7 +30,7 @@ export function toCode({ setup, calls }: RunLog<Setup>, { files, version, defaul
   const names = files.map(literal).join(' and ');
   const lines = [
     'await init();',
-    `const model = new DeformableModel({ volume: Volume.parse(${read}), ${literal(options).slice(2)});`,
+    `const model = new DeformableModel({ volume: Volume.parse(${read})${frame === undefined ? '' : `.frame(${frame})`}, ${literal(options).slice(2)});`,
     ...(attractors.length > 0 ? [`model.setAttractors(${literal(attractors)});`] : []),
     ...calls.map(lineOf),
     `return model.mesh.toBytes('ply');`,
