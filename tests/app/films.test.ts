@@ -135,7 +135,7 @@ const EBML = '1a45dfa3';
 describe('a film', () => {
   const record = () => setting('start').click();
 
-  test('of one turn is a WebM of the chosen size with many frames, and the view is as before', async () => {
+  test('of one turn is a WebM of the chosen size with several frames, and the view keeps its own size', async () => {
     await choose(320, 240);
     await app.page.locator('.picture-panel input[type=number]').last().fill('2');
     const before = await canvasSize();

@@ -21,7 +21,7 @@ import { PyramidPanel } from '../ui/pyramid';
 import { SessionControls } from '../ui/session';
 import { StartControls } from '../ui/start';
 import { TimeTable } from '../ui/times';
-import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
+import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { type ExtractSource, frameOf } from './extract-opening';
 import { extractData, factsOf, unitOf } from './extract-page';
@@ -60,7 +60,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly start: StartControls;
   readonly pyramid: PyramidPanel;
   readonly attractors: AttractorControls;
-  readonly options: ViewOptionControls;
+  readonly options: OptionControls<ViewOptions>;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
   readonly session: SessionControls;
@@ -107,7 +107,7 @@ export class ExtractParts extends RunParts<Example> {
       onGoTo: (point) => this.stage.goTo(point),
       crosshair: () => this.stage.crosshair,
     });
-    this.options = new ViewOptionControls(INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(EXTRACT_OPTIONS, INITIAL_VIEW, (options) => {
       this.stage.setOptions(options);
       events.onOptions(options);
     });

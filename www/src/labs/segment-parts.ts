@@ -6,8 +6,9 @@ import { h, section, wideButton } from '../ui/dom';
 import { fileChooser } from '../ui/files';
 import { LabelList, type LabelListEvents } from '../ui/label-list';
 import { LabelMeasureTable } from '../ui/label-measures';
-import { SegmentOptionControls } from '../ui/segment-options';
+import { SEGMENT_OPTIONS } from '../ui/segment-options';
 import { SegmentTools, type ToolEvents } from '../ui/segment-tools';
+import { OptionControls } from '../ui/view-options';
 import { SegmentView, type SegmentViewEvents, type SegmentViewOptions } from '../view/segmentation';
 import { type LabEvents, LabParts } from './lab-parts';
 import { INITIAL_VIEW } from './segment-link';
@@ -41,7 +42,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
   readonly #slices = h('div', { class: 'slices' });
   readonly view: SegmentView;
   readonly measures = new LabelMeasureTable();
-  readonly options: SegmentOptionControls;
+  readonly options: OptionControls<SegmentViewOptions>;
   readonly labels: LabelList;
   readonly tools: SegmentTools;
   readonly #saves: HTMLButtonElement[];
@@ -57,7 +58,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
       data: segmentData(choosers, events.onExample),
     });
     this.view = new SegmentView(this.canvas, this.#slices, INITIAL_VIEW, events);
-    this.options = new SegmentOptionControls(INITIAL_VIEW, (options: SegmentViewOptions) => {
+    this.options = new OptionControls(SEGMENT_OPTIONS, INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions();
     });

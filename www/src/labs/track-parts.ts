@@ -18,7 +18,8 @@ import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
 import { SessionControls } from '../ui/session';
 import { TrackComparePanel } from '../ui/track-compare';
-import { TrackOptionControls } from '../ui/track-options';
+import { TRACK_OPTIONS } from '../ui/track-options';
+import { OptionControls } from '../ui/view-options';
 import { VolumeCurve } from '../ui/volume-curve';
 import { TrackView, type TrackViewOptions } from '../view/track';
 import { type RunEvents, RunParts } from './lab-parts';
@@ -52,7 +53,7 @@ export class TrackParts extends RunParts<TrackExample> {
   readonly view = new TrackView(this.canvas, this.#slices, INITIAL_VIEW);
   readonly measures = new MeasurePanel(TRACK_ROWS);
   readonly table = new FrameTable();
-  readonly options: TrackOptionControls;
+  readonly options: OptionControls<TrackViewOptions>;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
   readonly frames: FrameBar;
@@ -100,7 +101,7 @@ export class TrackParts extends RunParts<TrackExample> {
     ];
     this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
-    this.options = new TrackOptionControls(INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(TRACK_OPTIONS, INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
       this.stills.below = options.below;

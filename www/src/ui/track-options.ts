@@ -1,7 +1,7 @@
 import { text } from '../texts';
 import type { ContentBelow, TrackViewOptions, VisibleVotes } from '../view/track';
 import type { Choice } from './field';
-import { OptionControls, PLACEMENTS, type ViewOption } from './view-options';
+import { PLACEMENTS, type ViewOption } from './view-options';
 
 const VOTES: Choice<VisibleVotes>[] = [
   { value: 'none', label: text('trackPanels.votesHidden') },
@@ -16,7 +16,8 @@ const BELOW: Choice<ContentBelow>[] = [
   { value: 'between', label: text('trackPanels.belowBetween') },
 ];
 
-const OPTIONS: ViewOption<TrackViewOptions>[] = [
+/** Options of the Track lab's view, including what is shown below it. */
+export const TRACK_OPTIONS: ViewOption<TrackViewOptions>[] = [
   { name: 'surface', label: text('controls.viewSurface') },
   { name: 'edges', label: text('controls.viewWireframe') },
   { name: 'region', label: text('trackPanels.viewBox') },
@@ -24,10 +25,3 @@ const OPTIONS: ViewOption<TrackViewOptions>[] = [
   { name: 'slices', label: text('controls.slices'), choices: PLACEMENTS },
   { name: 'below', label: text('trackPanels.below'), choices: BELOW },
 ];
-
-/** Controls for the view options of the Track lab, including what is shown below the 3D view. */
-export class TrackOptionControls extends OptionControls<TrackViewOptions> {
-  constructor(initial: TrackViewOptions, onChange: (options: TrackViewOptions) => void) {
-    super(OPTIONS, initial, onChange);
-  }
-}

@@ -111,14 +111,8 @@ function isPossible<Options>({ choices, step }: ViewOption<Options>, value: unkn
   return step === undefined || (typeof value === 'number' && value >= 0 && value <= 1);
 }
 
-/** Controls for the view options of the Extract lab: what is shown, and the surface's colouring. */
-export class ViewOptionControls extends OptionControls<ViewOptions> {
-  constructor(initial: ViewOptions, onChange: (options: ViewOptions) => void) {
-    super(EXTRACT_OPTIONS, initial, onChange);
-  }
-}
-
-const EXTRACT_OPTIONS: ViewOption<ViewOptions>[] = [
+/** Options of the Extract lab's view: what is shown, and the surface's colouring. */
+export const EXTRACT_OPTIONS: ViewOption<ViewOptions>[] = [
   { name: 'surface', label: text('controls.viewSurface') },
   { name: 'edges', label: text('controls.viewWireframe') },
   { name: 'color', label: text('controls.color'), choices: COLOR_MODES },
