@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
-import { type App, measures, openApp, QUICK, reach } from './browser';
+import { type App, measures, open, openApp, QUICK, reach } from './browser';
 
 let app: App;
 
@@ -94,4 +94,19 @@ test('a mask is a reference, too', async () => {
   await choose('mask.nii', new Volume({ data, dims }).toNifti());
   await expect.poll(() => app.page.locator('[data-reference=status]').textContent()).toBe('mask.nii');
   await expect.poll(() => app.page.locator('[data-reference=result]').textContent()).toContain('Dice coefficient');
+});
+
+test.each(['reconstruct', 'track'] as const)('surfaces are edited in %s, too', async (lab) => {
+  await open(app, QUICK[lab]);
+  await reach(app.page, 'done');
+  const { triangles } = await measures(app.page);
+  await unfold('Edit the surface');
+  await app.page.waitForSelector('[data-component]');
+  await press('cut');
+  await expect.poll(async () => (await log()).length).toBe(1);
+  expect(await measures(app.page)).toMatchObject({ closed: true, oriented: true, crossings: 0 });
+  await press('undo');
+  await expect.poll(async () => (await log()).length).toBe(0);
+  expect((await measures(app.page)).components).toBeGreaterThan(0);
+  if (lab === 'reconstruct') expect((await measures(app.page)).triangles).toBe(triangles);
 });

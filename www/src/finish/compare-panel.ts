@@ -124,9 +124,9 @@ export class ReferencePanel {
       const option = (value: string, name: string) => h('option', { value }, name);
       this.#label.append(option('', text('finish.allLabels')), ...found.labels.map((n) => option(`${n}`, `${n}`)));
     }
-    const heads = ['', ...DIRECTIONS.map(([, label]) => label)].map((label) => h('th', { scope: 'col' }, label));
+    const heads = [this.unit, ...DIRECTIONS.map(([, label]) => label)].map((label) => h('th', { scope: 'col' }, label));
     const rows = MEASURES.map(([measure, label]) => {
-      const cells = DIRECTIONS.map(([name]) => h('td', {}, `${figure(found[name][measure])} ${this.unit}`.trim()));
+      const cells = DIRECTIONS.map(([name]) => h('td', {}, figure(found[name][measure])));
       return h('tr', {}, h('th', { scope: 'row' }, label), ...cells);
     });
     const table = h(

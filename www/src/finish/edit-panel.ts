@@ -85,9 +85,10 @@ export class EditPanel {
 
   /** Whether there is a surface to edit. */
   set enabled(enabled: boolean) {
+    const begins = enabled && !this.#enabled;
     this.#enabled = enabled;
     this.#enable();
-    void this.#open();
+    if (begins) void this.#open();
   }
 
   /** Whether the panel is unfolded: it then shows the components of the surface. */

@@ -239,9 +239,15 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     return this.finish?.exported(format) ?? this.#fetchMesh(format);
   }
 
-  /** Creates the sections that edit the surface after a run and compare it with a reference. */
-  protected finishSections(view: EditedView, measures: MeasurePanel): HTMLElement[] {
-    const mesh = () => this.#fetchMesh('ply');
+  /**
+   * Creates the sections that edit the surface after a run and compare it with a reference. `onOpen` is called before
+   * the surface is taken.
+   */
+  protected finishSections(view: EditedView, measures: MeasurePanel, onOpen = () => {}): HTMLElement[] {
+    const mesh = () => {
+      onOpen();
+      return this.#fetchMesh('ply');
+    };
     this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
     return this.finish.elements;
   }
@@ -250,12 +256,12 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
    * Enables and disables controls according to the lab's state, and that of the model `beneath` an error. Returns
    * whether nothing is being loaded.
    */
-  protected showRunState(state: LabState, beneath: LabState, ready: boolean): boolean {
+  protected showRunState(state: LabState, beneath: LabState, ready: boolean, hasSurface = true): boolean {
     const idle = this.showLoading(state, ready);
     this.transport.showState(beneath, ready);
     this.exports.enabled = idle;
     if (!idle || state === 'running') this.finish?.reset();
-    if (this.finish) this.finish.enabled = idle && state !== 'running';
+    if (this.finish) this.finish.enabled = idle && state !== 'running' && hasSurface;
     return idle;
   }
 

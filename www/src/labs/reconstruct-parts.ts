@@ -144,9 +144,8 @@ export class ReconstructParts extends RunParts<CloudExample> {
 
   /** Enables and disables controls; `surface`: whether there is a complete surface. */
   showState(state: LabState, beneath: LabState, ready: boolean, surface: boolean): void {
-    this.timing.enabled = this.showRunState(state, beneath, ready);
+    this.timing.enabled = this.showRunState(state, beneath, ready, surface);
     this.exports.enabled = surface;
-    if (this.finish) this.finish.enabled = surface;
     for (const button of this.#uses) button.disabled = !surface;
   }
 

@@ -128,7 +128,7 @@ export class TrackParts extends RunParts<TrackExample> {
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
         this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt, this.#session.element),
-        ...this.finishSections(this.view.editing, this.measures),
+        ...this.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
       ],
@@ -180,9 +180,8 @@ export class TrackParts extends RunParts<TrackExample> {
    * whether the displayed frame has one.
    */
   showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
-    const idle = this.showRunState(state, beneath, ready);
+    const idle = this.showRunState(state, beneath, ready, here);
     this.exports.enabled = idle && here;
-    if (this.finish) this.finish.enabled = idle && here && state !== 'running';
     this.#sculpt.disabled = !idle || !here;
     this.#session.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
