@@ -104,6 +104,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
     await this.client.request('step', { count: 0 });
     const state = list.at(-1)?.done ? 'done' : 'paused';
     this.states.idle(this.#results.describe(state), state);
+    this.#results.showState(state);
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown>> {
