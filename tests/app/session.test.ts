@@ -42,9 +42,12 @@ const session = (page: Page) => saved(page, '[data-action=session]');
 const asFile = (bytes: Uint8Array) => [{ name: 'a.vesicle.zip', bytes }];
 const banner = (page: Page) => expect.poll(() => page.textContent('.banner:not([hidden]) [data-error]'));
 
+// The buttons to undo and redo name the parameter, too.
+const rigidity = (page: Page) => page.getByRole('spinbutton', { name: 'Rigidity' });
+
 async function setRigidity(page: Page, value: string): Promise<void> {
-  await page.getByLabel('Rigidity').first().fill(value);
-  await page.getByLabel('Rigidity').first().press('Enter');
+  await rigidity(page).fill(value);
+  await rigidity(page).press('Enter');
 }
 
 /** Opens the app in a new browser at a lab, calls `work`, and closes the browser. */
@@ -105,7 +108,7 @@ test('undo goes back beyond the opening of a session', async () => {
   await reach(page, 'running', 'done');
   await reopened(page, asFile(file), 'extract');
   await page.click('[data-transport=undo]');
-  await expect.poll(() => page.getByLabel('Rigidity').first().inputValue()).toBe('0.1');
+  await expect.poll(() => rigidity(page).inputValue()).toBe('0.1');
   expect(Buffer.compare(await surface(page), before)).toBe(0);
 });
 

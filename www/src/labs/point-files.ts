@@ -1,7 +1,7 @@
 /** Reads points, cameras and photographs for the Reconstruct lab, from an example or from the user's files. */
 
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
-import type { CloudSource } from '../reconstruct/protocol';
+import type { CloudSource, NamedBytes } from '../reconstruct/protocol';
 import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
@@ -15,6 +15,8 @@ export interface PointFiles {
   /** Source of the points; undefined if only cameras were opened, which belong to the points already open. */
   source?: CloudSource;
   photographs: Photograph[];
+  /** The user's files that these were read from. */
+  files?: NamedBytes[];
 }
 
 export async function fromExample({ source, photographs }: CloudExample): Promise<PointFiles> {
@@ -49,7 +51,7 @@ export async function fromFiles(files: File[]): Promise<PointFiles> {
   // A list may name photographs with their folder.
   const find = async (name: string) => byName.get(name.replace(/^.*[/\\]/, ''));
   const photographs = lists[0] ? await readPhotographs(await lists[0].text(), find) : [];
-  if (!points) return { photographs };
-  const [file] = await readFiles([points]);
-  return { photographs, ...(file && { source: { file } }) };
+  const all = await readFiles(files);
+  const file = points && all[files.indexOf(points)];
+  return { photographs, files: all, ...(file && { source: { file } }) };
 }

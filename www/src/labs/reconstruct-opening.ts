@@ -1,7 +1,16 @@
 import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
-import type { Cloud, CloudSource, ParamSpec, ParamValues, Setup } from '../reconstruct/protocol';
+import type {
+  Cloud,
+  CloudSource,
+  NamedBytes,
+  ParamSpec,
+  ParamValues,
+  SavedSurface,
+  Setup,
+} from '../reconstruct/protocol';
+import { isRecord } from '../session/recognise';
 import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
@@ -71,9 +80,11 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
     const from = source ?? (await this.#presentPoints());
-    const setup = this.#setupFor(origin, source === undefined);
+    const saved = origin.session && savedIn(origin.session.content);
+    const setup = saved?.setup ?? this.#setupFor(origin, source === undefined);
     const cameras = photographs.map(({ view }) => view);
-    return { ...(await this.#client.request('load', { source: from, cameras, setup })), photographs, setup, from };
+    const loaded = await this.#client.request('load', { source: from, cameras, setup, saved });
+    return { ...loaded, photographs, setup, from };
   }
 
   /**
@@ -87,6 +98,10 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   ): CloudOrigin {
     if (source) return origin;
     return { ...origin, name: this.source?.name ?? origin.name, load: async () => ({ source: from, photographs }) };
+  }
+
+  override filesOf({ source, files = [] }: Data): NamedBytes[] {
+    return source && 'file' in source && files.length === 0 ? [source.file] : files;
   }
 
   protected adopt(opened: OpenedCloud, origin: CloudOrigin): Promise<void> {
@@ -132,6 +147,14 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     const { cell: _, ...others } = params;
     return { params: others, ...choice };
   }
+}
+
+/** Returns the saved model in the content of a session; throws an Error if it is damaged. */
+function savedIn({ state, model }: Record<string, unknown>): SavedSurface {
+  const setup = isRecord(model) && model.setup;
+  if (!(state instanceof Uint8Array) || !isRecord(setup) || !isRecord(setup.params) || !isRecord(setup.edits))
+    throw new Error(text('sessions.badIndex'));
+  return { ...(model as object), state } as SavedSurface;
 }
 
 function firstVariant(example: CloudExample): CloudVariant | undefined {

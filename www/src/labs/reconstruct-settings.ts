@@ -22,6 +22,8 @@ interface Settings {
   edits: Edits;
 }
 
+type Entries = UndoStack<Settings>['entries'];
+
 /**
  * Manages the edits of the points and the settings of their model: changes them, sends them to the worker, and undoes
  * changes.
@@ -74,6 +76,16 @@ export class ReconstructSettings {
     this.#showUndo();
     this.#ui.setup.show(setup);
     this.#showEdits();
+  }
+
+  /** The settings to undo and to redo, for a session. */
+  get entries(): Entries {
+    return this.#undo.entries;
+  }
+
+  set entries(entries: Entries) {
+    this.#undo.entries = entries;
+    this.#showUndo();
   }
 
   /** Takes over and shows the parameters in force, as reported by the worker. */

@@ -1,11 +1,13 @@
 import { ReconstructClient } from '../reconstruct/client';
 import type { CloudExample } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
-import type { ParamValues, PointQuantity, WorkerEvent } from '../reconstruct/protocol';
+import type { ParamValues, PointQuantity, StepReport, WorkerEvent } from '../reconstruct/protocol';
+import { isRecord } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
 import type { CloudViewOptions } from '../view/reconstruction';
+import type { CameraPose } from '../view/viewport';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -30,13 +32,14 @@ export class ReconstructLab extends RunLab<CloudExample> {
   protected readonly opening: ReconstructOpening;
   readonly #results: ReconstructResults;
   readonly #settings: ReconstructSettings;
+  readonly #history = new History();
   #quantity: PointQuantity | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     super(root, help, passOn);
     const { client } = this;
     const { signal } = this.closing;
-    const history = new History();
+    const history = this.#history;
     const ui = new ReconstructParts(root, history, client, signal, this.#events());
     const states = new LabStates(ui.banner, ui.status, signal);
     this.ui = ui;
@@ -71,7 +74,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
   }
 
   /** Displays newly opened points, with the settings of their example or link, and runs the model. */
-  async #adopt(opened: OpenedCloud, { name, example, linked }: CloudOrigin): Promise<void> {
+  async #adopt(opened: OpenedCloud, { name, example, linked, session }: CloudOrigin): Promise<void> {
     const { cloud, params, photographs, setup } = opened;
     const pictured = photographs.some(({ picture }) => picture);
     this.states.ready = true;
@@ -84,7 +87,30 @@ export class ReconstructLab extends RunLab<CloudExample> {
     this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
     this.ui.photos.choose(photoFor(example, linked?.photo));
     this.#settings.showParams(params);
+    if (session) return this.#resume(session.content);
     await this.client.request('play', undefined);
+  }
+
+  /** Continues a session, whose model has been restored: shows its state and view, and does not run it. */
+  async #resume({ undo, redo, reports, view }: Record<string, unknown>): Promise<void> {
+    this.#settings.entries = { undo, redo } as ReconstructSettings['entries'];
+    const [list = []] = reports as StepReport[][];
+    this.#history.rewind({ reports: list, iteration: Number.POSITIVE_INFINITY });
+    if (isRecord(view)) {
+      this.ui.options.set(view.options as Partial<CloudViewOptions>);
+      this.ui.view.pose = view.camera as CameraPose;
+    }
+    // Sends the surface, its measures and the state.
+    await this.client.request('step', { count: 0 });
+    const state = list.at(-1)?.done ? 'done' : 'paused';
+    this.states.idle(this.#results.describe(state), state);
+    this.#results.showState(state);
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown>> {
+    const { state, ...model } = await this.paused(() => this.client.request('save', undefined));
+    const view = { camera: this.ui.view.pose, options: this.ui.options.value };
+    return { state, model, ...this.#settings.entries, reports: [this.#history.reports], view };
   }
 
   #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {

@@ -18,9 +18,14 @@ export async function cloudFrom(source: CloudSource): Promise<Cloud> {
 
 /**
  * Builds the model that reconstructs a surface from a point cloud, with the settings and the manual point edits in
- * `setup`.
+ * `setup`, and restores a saved state, if given.
  */
-export function buildModel({ points, normals, colors }: Cloud, cameras: CameraView[], setup: Setup): ImplicitSurface {
+export function buildModel(
+  { points, normals, colors }: Cloud,
+  cameras: CameraView[],
+  setup: Setup,
+  state?: Uint8Array,
+): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
   const options: ImplicitOptions = { points, cameras, params };
   if (normals) options.normals = normals;
@@ -30,6 +35,7 @@ export function buildModel({ points, normals, colors }: Cloud, cameras: CameraVi
   const model = new ImplicitSurface(options);
   try {
     model.setEdits(toPointEdits(edits));
+    if (state) model.restore(state);
     return model;
   } catch (error) {
     model.free();

@@ -70,6 +70,14 @@ export interface Ready {
   params: ParamValues;
 }
 
+/** A saved run, from which the worker can restore it. */
+export interface SavedSurface {
+  state: Uint8Array;
+  setup: Setup;
+  /** Report of the last step; undefined before the first. */
+  last: StepReport | undefined;
+}
+
 export interface Loaded extends Ready {
   cloud: Cloud;
 }
@@ -108,10 +116,13 @@ export interface Timing {
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
-   * Opens points and builds a model of them. On failure, the previous points and model stay in use. Indices of removed
+   * Opens points and builds a model of them, or with `saved` restores one. On failure, the previous points and model stay in use. Indices of removed
    * points that are out of range are ignored.
    */
-  load: { body: { source: CloudSource; cameras: CameraView[]; setup: Setup }; reply: Loaded };
+  load: {
+    body: { source: CloudSource; cameras: CameraView[]; setup: Setup; saved?: SavedSurface | undefined };
+    reply: Loaded;
+  };
   /** Builds a new model of the loaded points. On failure, the previous model stays in use. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
@@ -123,6 +134,7 @@ export interface Requests {
    * them, nothing changes.
    */
   setEdits: { body: Edits; reply: undefined };
+  save: { body: undefined; reply: SavedSurface };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
   /**
    * Replies with the fitted function f sampled on a grid around the points, `size` voxels along the longest side, as

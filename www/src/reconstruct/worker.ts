@@ -58,6 +58,7 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     setEdits: (edits) => this.#setEdits(edits),
+    save: () => ({ state: this.#current().save(), setup: this.#setup as Setup, last: this.#last }),
     export: ({ format }) => this.#current().mesh.toBytes(format),
     volume: ({ size }) => this.#volume(size),
     quantity: (quantity) => this.#setQuantity(quantity),
@@ -69,15 +70,17 @@ class Session {
     this.#shown = true;
   }
 
-  async #load({ source, cameras, setup }: Requests['load']['body']): Promise<Loaded> {
+  async #load({ source, cameras, setup, saved }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
     const cloud = await cloudFrom(source);
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
     const known = { ...setup, edits: { ...setup.edits, removed } };
-    const model = buildModel(cloud, cameras, known);
+    const model = buildModel(cloud, cameras, known, saved?.state);
     this.#cloud = cloud;
     this.#cameras = cameras;
-    return { ...this.#adopt(model, known), cloud };
+    const ready = this.#adopt(model, known);
+    this.#last = saved?.last;
+    return { ...ready, cloud };
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
@@ -173,6 +176,8 @@ class Session {
     for (let i = 0; i < count && !this.#last?.done; i++) this.#stepped(model.step(1));
     this.#previewedAt = 0;
     if (this.#last?.phase === 'extract') this.#preview();
+    // Those of a restored model have not been sent.
+    this.#showConstraints();
     this.#reportStopped();
   }
 

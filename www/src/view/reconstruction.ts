@@ -9,7 +9,7 @@ import { PointCloud } from './cloud';
 import type { PinholeCamera } from './pinhole';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
-import { Viewport } from './viewport';
+import { type CameraPose, Viewport } from './viewport';
 
 /** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
 const OUTLIER_FRACTION = 0.02;
@@ -133,6 +133,15 @@ export class ReconstructionView {
   clearSurface(): void {
     this.#hasSurface = false;
     this.setOptions(this.#options);
+  }
+
+  /** Pose of the camera. */
+  get pose(): CameraPose {
+    return this.#viewport.pose;
+  }
+
+  set pose(pose: CameraPose) {
+    this.#viewport.pose = pose;
   }
 
   /** The objects shown, for pictures and films. */
