@@ -47,7 +47,7 @@ afterAll(() => rm(folder, { recursive: true }));
 
 const SETUP: Setup = { start: { kind: 'contour' }, levels: 1, edge: undefined, params: {}, attractors: [] };
 
-/** What a user may do between two steps, each with random values. */
+/** Returns the actions of a user between two steps, each with random values. */
 function actions(random: () => number, bounds: { middle: number[]; size: number }) {
   const pick = <T>(list: readonly T[]): T => list[Math.floor(random() * list.length)] as T;
   const point = () => bounds.middle.map((x) => x + (random() - 0.5) * bounds.size) as [number, number, number];

@@ -62,7 +62,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Enables and disables controls according to the lab's state. */
   protected abstract showControls(state: LabState): void;
 
-  /** Returns the lab's own part of a session, and leaves a run as it is; undefined if the lab cannot save its model. */
+  /** Returns the lab's own part of a session, without a change of the run; undefined if the lab cannot save its model. */
   protected async sessionContent(): Promise<Record<string, unknown> | undefined> {
     return undefined;
   }

@@ -15,7 +15,7 @@ import { SurfaceObject } from './surface';
 import { type CameraPose, Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
 
-/** What the user looks at in a {@link Stage}. */
+/** Camera, crosshair and options of a {@link Stage}. */
 export interface StageView {
   camera: CameraPose;
   /** World position of the crosshair. */

@@ -5,7 +5,7 @@ import { startOf } from './models';
 import { Refusal } from './refusal';
 import type { RunLog } from './run-log';
 
-/** What the code of a run depends on besides its log. */
+/** Names, version and defaults that the code of a run depends on besides its log. */
 export interface CodeContext {
   /** Name of the file that the volume is read from and, if that is a header, of the file with its voxels. */
   files: readonly string[];
