@@ -8,7 +8,10 @@ import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
 import type { EditedView } from './edited-view';
 import { Finishing } from './finishing';
-import type { Edited } from './protocol';
+import type { Edit, Edited } from './protocol';
+
+/** Edits that a session may have. */
+const OPERATIONS: Edit['op'][] = ['remesh', 'decimate', 'smooth', 'keepComponents', 'removeCavities', 'cut'];
 
 /** Parts of a lab that the tools use. */
 export interface FinishHost {
@@ -61,6 +64,19 @@ export class Finish {
   /** Returns the edited surface as a file; undefined if there are no edits. */
   exported(format: MeshFormat): Promise<Uint8Array> | undefined {
     return this.#finishing.exported(format);
+  }
+
+  /** The edits that have been made, for a session. */
+  get log(): Edit[] {
+    return this.#finishing.edited?.log ?? [];
+  }
+
+  /** Makes edits of a session again. */
+  async repeat(edits: Edit[]): Promise<void> {
+    for (const edit of edits) {
+      if (!OPERATIONS.includes(edit.op)) throw new Error(text('sessions.badIndex'));
+      await this.#finishing.change('edit', edit);
+    }
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

@@ -91,7 +91,7 @@ export class ExtractLab extends RunLab<Example> {
     const moments = await this.paused(() => this.#settings.moments());
     if (!moments) return undefined;
     const view = { ...this.ui.stage.view, options: this.ui.options.value };
-    return { ...(await import('../session/moments')).packMoments(moments), view, edits: {} };
+    return { ...(await import('../session/moments')).packMoments(moments), view };
   }
 
   /** Copies code that repeats the run; without a clipboard, saves it as a file. */

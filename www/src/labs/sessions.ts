@@ -1,3 +1,4 @@
+import type { Finish } from '../finish';
 import type { Session, SourceFile } from '../session/file';
 import { isSession } from '../session/recognise';
 import { text } from '../texts';
@@ -12,7 +13,7 @@ import type { Saving } from './saving';
 /** A lab, as its sessions need it. */
 interface SessionLab {
   id: (typeof LAB_IDS)[number];
-  ui: { banner: ErrorBanner; status: StatusLine; saving: Saving };
+  ui: { banner: ErrorBanner; status: StatusLine; saving: Saving; finish?: Finish | undefined };
   states: LabStates;
   // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
   opening: Opening<any, any, any, any>;
@@ -64,12 +65,14 @@ export class Sessions {
     if (!source || !states.canChange) return;
     try {
       ui.status.say(text('sessions.saving'));
+      // A run that is paused and continued ends them.
+      const edits = ui.finish?.log ?? [];
       const [{ describe, writeSession }, body, data] = await Promise.all([format(), content(), source.load()]);
       if (!body) throw new Error(text('sessions.notSaved'));
       const files = await describe(opening.filesOf(data), included || source.isMade === true);
       const example: string | undefined = source.example?.id;
       const from = { name: source.name, files, ...(example !== undefined && { example }) };
-      const bytes = await writeSession({ lab, hash: address(source), source: from, content: body });
+      const bytes = await writeSession({ lab, hash: address(source), source: from, content: { ...body, edits } });
       ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
     } catch (error) {
       states.fail(text('sessions.saveFailed'), error);
@@ -88,11 +91,20 @@ export class Sessions {
     const { opening, ui } = this.#lab;
     const { example, files, name } = session.source;
     this.#waiting = undefined;
-    if (files.every(({ content }) => content)) return opening.session(session, files.map(fileOf));
-    if (example !== undefined) return opening.session(session, []);
+    if (files.every(({ content }) => content)) return this.#restore(session, files.map(fileOf));
+    if (example !== undefined) return this.#restore(session, []);
     if (!opening.source) await opening.default();
     this.#waiting = session;
     ui.banner.show(text('sessions.needsData'), text('sessions.needsDataHint', { name }));
+  }
+
+  /** Continues a session with its data, and edits its surface as before. */
+  async #restore(session: Session, files: File[]): Promise<void> {
+    const { opening, ui, states } = this.#lab;
+    await opening.session(session, files);
+    const { edits } = session.content;
+    if (opening.source?.session !== session || !Array.isArray(edits)) return;
+    await ui.finish?.repeat(edits).catch((error) => states.fail(text('sessions.editsFailed'), error));
   }
 
   /** Opens the session that waits for its data, if these are among `files`. */
@@ -101,7 +113,7 @@ export class Sessions {
     const named = await readFiles(files);
     const found = await matching(session.source.files, named);
     this.#waiting = undefined;
-    await this.#lab.opening.session(
+    await this.#restore(
       session,
       found.map(({ name, bytes }) => new File([bytes as BlobPart], name)),
     );
