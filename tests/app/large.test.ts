@@ -91,6 +91,25 @@ test('a folder is opened', async () => {
   await expectExtracted(() => app.page.getByRole('button', { name: 'Open a folder…' }).click());
 });
 
+test('in a box around the crosshair only, finer levels are followed', async () => {
+  await openLab();
+  const field = app.page.getByLabel('Box around the crosshair');
+  expect(await field.isVisible()).toBe(false);
+  await expectExtracted(async () =>
+    drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
+  );
+  const { triangles } = await measures(app.page);
+  await field.fill('-1');
+  await field.press('Enter');
+  expect(await app.page.textContent('.start')).toContain('Must be > 0, or empty.');
+  expect(await field.inputValue()).toBe('');
+  await expectExtracted(async () => {
+    await field.fill('1');
+    await field.press('Enter');
+  });
+  expect((await measures(app.page)).triangles).toBeLessThan(0.8 * triangles);
+});
+
 test('what needs the whole volume is refused with a reason', async () => {
   await openLab();
   await expectExtracted(async () =>

@@ -62,6 +62,8 @@ export interface Setup {
   /** Parameters that differ from the defaults; without `iso` the worker chooses an iso value from the histogram. */
   params: ParamValues;
   attractors: Attractor[];
+  /** Box in world coordinates in which a volume larger than memory is followed to its finer levels; else everywhere. */
+  box?: { min: Vec3; max: Vec3 };
 }
 
 /** Intensities of voxels, in the narrowest of these types that holds all of them exactly. */

@@ -213,7 +213,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const choice = this.#ui.start.value;
     const own: StartChoice =
       'zarr' in volume
-        ? { ...choice, kind: 'contour', levels: 1, edge: undefined }
+        ? { ...choice, kind: 'contour', levels: 1, edge: undefined, box: undefined }
         : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
     const suits: StartChoice = example
       ? { ...choice, ...defaultStart(example), levels: example.levels, edge: example.edge }

@@ -162,6 +162,7 @@ export class ExtractParts extends RunParts<Example> {
     this.frameCount = volume.frames;
     this.#frames.show(frameOf(source), volume.frames);
     this.large.showTotal(volume.large?.bytes);
+    this.start.isLarge = volume.large !== undefined;
     this.stage.setVolume(volume);
     this.compare.clear();
     this.coverage.unit = this.stage.unit;

@@ -111,7 +111,8 @@ export class ExtractSettings {
    */
   setup(choice: StartChoice, params = this.#params, attractors = this.#attractors): Setup {
     const { levels, edge } = choice;
-    return { start: this.#startShape(choice), levels, edge, params, attractors };
+    const box = choice.box === undefined ? {} : { box: this.#boxOf(choice.box) };
+    return { start: this.#startShape(choice), levels, edge, params, attractors, ...box };
   }
 
   /**
@@ -360,6 +361,13 @@ export class ExtractSettings {
       default:
         return { kind };
     }
+  }
+
+  /** Returns the box around the crosshair with sides of a length in world units. */
+  #boxOf(side: number): NonNullable<Setup['box']> {
+    const [x, y, z] = this.#ui.stage.crosshair;
+    const half = side / 2;
+    return { min: [x - half, y - half, z - half], max: [x + half, y + half, z + half] };
   }
 
   /** Shortest side of the volume, in world units. */

@@ -39,6 +39,11 @@ export interface StartChoice {
   levels: number;
   /** Mean edge length of the surface in world units; undefined lets the model choose. */
   edge: number | undefined;
+  /**
+   * Side, in world units, of the box around the crosshair in which a volume larger than memory is followed to its finer
+   * levels; undefined for the whole volume.
+   */
+  box?: number | undefined;
 }
 
 /**
@@ -59,16 +64,23 @@ export class StartControls {
     help: text('extractPanels.pyramidLevelCountHelp'),
     row: 'row',
   });
-  readonly #edge = new Field(
-    h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: text('controls.auto') }),
-    { label: text('extractPanels.meanEdgeLength'), help: text('extractPanels.meanEdgeLengthHelp'), row: 'row' },
-  );
+  readonly #edge = new Field(length(text('controls.auto')), {
+    label: text('extractPanels.meanEdgeLength'),
+    help: text('extractPanels.meanEdgeLengthHelp'),
+    row: 'row',
+  });
+  readonly #box = new Field(length(text('extractPanels.boxWhole')), {
+    label: text('extractPanels.boxSide'),
+    help: text('extractPanels.boxSideHelp'),
+    row: 'row',
+  });
   /** The fields, each with the error message for an invalid value. */
   readonly #needs = new Map<Field<FormControl>, string>([
     [this.#shape, ''],
     [this.#bubbles, text('extractPanels.bubblesPerAxisError', { most: MOST_BUBBLES })],
     [this.#levels, text('extractPanels.pyramidLevelCountError', { most: MOST_LEVELS })],
     [this.#edge, text('extractPanels.meanEdgeLengthError')],
+    [this.#box, text('extractPanels.boxSideError')],
   ]);
   /** The field that was changed last, which shows the error if no model can be created. */
   #changed: Field<FormControl> = this.#shape;
@@ -78,17 +90,23 @@ export class StartControls {
     for (const field of this.#needs.keys())
       field.control.addEventListener('change', () => this.#onChange(field, onChange));
     this.element = h('div', { class: 'start' }, ...[...this.#needs.keys()].map((field) => field.element));
+    this.isLarge = false;
     this.#explain();
     this.#inForce = this.value;
   }
 
+  /** Whether the open volume is larger than memory. */
+  set isLarge(large: boolean) {
+    this.#box.element.hidden = !large;
+  }
+
   get value(): StartChoice {
-    const edge = this.#edge.control;
     return {
       kind: this.#shape.control.value as Kind,
       bubbles: this.#bubbles.control.valueAsNumber,
       levels: this.#levels.control.valueAsNumber,
-      edge: edge.value === '' ? undefined : edge.valueAsNumber,
+      edge: read(this.#edge.control),
+      box: read(this.#box.control),
     };
   }
 
@@ -108,7 +126,8 @@ export class StartControls {
     this.#shape.control.value = choice.kind;
     this.#bubbles.control.valueAsNumber = choice.bubbles;
     this.#levels.control.valueAsNumber = choice.levels;
-    this.#edge.control.value = choice.edge === undefined ? '' : String(choice.edge);
+    this.#edge.control.value = String(choice.edge ?? '');
+    this.#box.control.value = String(choice.box ?? '');
     for (const field of this.#needs.keys()) field.showError(undefined);
     this.#explain();
   }
@@ -135,6 +154,15 @@ export class StartControls {
     this.#bubbles.element.hidden = kind !== 'bubbles';
     this.#shape.help = SHAPES.find(({ value }) => value === kind)?.help ?? '';
   }
+}
+
+/** Creates a field for a length that may be empty, which `empty` explains. */
+function length(empty: string): HTMLInputElement {
+  return h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: empty });
+}
+
+function read({ value, valueAsNumber }: HTMLInputElement): number | undefined {
+  return value === '' ? undefined : valueAsNumber;
 }
 
 function integer(min: number, max: number, value: number): HTMLInputElement {

@@ -55,8 +55,8 @@ export class LargeVolume {
     const coarser = this.coarserLevels;
     if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
     const { levels, ...options } = modelOptions(this.#coarsest, setup);
-    const finest = coarser - levels;
-    return withAttractors(setup, () => new DeformableModel({ ...options, volume: this.#image, finest }));
+    const image = { volume: this.#image, finest: coarser - levels, ...(setup.box && { box: setup.box }) };
+    return withAttractors(setup, () => new DeformableModel({ ...options, ...image }));
   }
 
   free(): void {
