@@ -376,6 +376,8 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     const DIMS: [usize; 3] = [37, 32, 19];
+    /// The number of bricks along each axis.
+    const BRICKS: [usize; 3] = [DIMS[0].div_ceil(BRICK), DIMS[1].div_ceil(BRICK), DIMS[2].div_ceil(BRICK)];
 
     /// Returns random voxels of all types.
     fn all_types(random: &mut Random) -> Vec<Voxels> {
@@ -398,8 +400,8 @@ mod tests {
         let volume = Volume::new(VolumeInit::new(voxels, [DIMS[0], DIMS[1], DIMS[2], 1])).unwrap();
         let normalisation = Normalisation::new([1.0, 0.0], volume.range());
         let mut bricks = BrickGrid::new(DIMS, normalisation).unwrap();
-        for k in 0..3 * 2 * 2 {
-            let at = BrickId([k % 3, k / 3 % 2, k / 6]);
+        for k in 0..BRICKS.iter().product() {
+            let at = BrickId([k % BRICKS[0], k / BRICKS[0] % BRICKS[1], k / (BRICKS[0] * BRICKS[1])]);
             let region = bricks.region(at);
             if is_loaded(at) {
                 let data = volume.voxels().gathered(region.len(), region.rows(DIMS, 0)).unwrap();
@@ -470,14 +472,16 @@ mod tests {
         let (_, mut bricks) = both(all_types(&mut random).swap_remove(0), |_| true);
         let count = bricks.len();
         bricks.retain(|at| at.0[0] == 1);
-        assert_eq!((bricks.len(), bricks.bytes()), (4, 4 * BRICK * BRICK * BRICK));
+        let layer = BRICKS[1] * BRICKS[2];
+        assert_eq!((bricks.len(), bricks.bytes()), (layer, layer * BRICK * BRICK * BRICK));
         assert!(bricks.has(BrickId([1, 1, 1])) && !bricks.has(BrickId([0, 1, 1])));
         let region = Region { min: [0; 3], dims: DIMS };
         let again = Voxels::U8(vec![9; region.len()]);
-        let kept = bricks.value([20, 5, 5]);
+        let inside = [BRICK + 4, 5, 5];
+        let kept = bricks.value(inside);
         bricks.insert(region, &again).unwrap();
         assert_eq!(bricks.len(), count);
-        assert_eq!(bricks.value([20, 5, 5]), kept, "a brick was replaced");
+        assert_eq!(bricks.value(inside), kept, "a brick was replaced");
         assert_eq!(bricks.value([3, 5, 5]), Some(bricks.normalisation.of(9.0) as f32));
     }
 
@@ -485,12 +489,13 @@ mod tests {
     fn ranks_are_those_of_bricks_around_a_box() {
         let (_, bricks) = both(all_types(&mut Random::new(4)).swap_remove(0), |_| false);
         let mut found = Vec::new();
-        bricks.for_each_around(Vec3::new(-9.0, 15.5, 3.0), Vec3::new(16.0, 16.5, 99.0), |rank| {
+        let side = BRICK as f32;
+        bricks.for_each_around(Vec3::new(-9.0, side - 0.5, 3.0), Vec3::new(side, side + 0.5, 99.0), |rank| {
             found.push(rank)
         });
-        let expected =
-            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
-        assert_eq!(found, expected.map(|at| BrickId(at).rank()));
+        let columns = [[0, 0], [1, 0], [0, 1], [1, 1]];
+        let expected: Vec<_> = (0..BRICKS[2]).flat_map(|z| columns.map(|[x, y]| [x, y, z])).collect();
+        assert_eq!(found, expected.iter().map(|&at| BrickId(at).rank()).collect::<Vec<_>>());
         assert_eq!(found.iter().map(|&rank| BrickId::ranked(rank).0).collect::<Vec<_>>(), expected);
     }
 }

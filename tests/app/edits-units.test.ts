@@ -121,3 +121,13 @@ test('the grid for the Dice coefficient holds both meshes', () => {
   expect(a.dice(b)).toBeCloseTo(5 / 16, 2);
   expect(a.dice(a)).toBe(1);
 });
+
+test('a program has nothing of an edit but its arguments, however they are written', () => {
+  const more = { 'a"b': 0, c: ' : run() }); //' };
+  const hostile = { op: 'keepComponents', indices: [0], more } as unknown as Edit;
+  expect(callOf(hostile)).toBe('keepComponents([0])');
+  const odd = { op: 'keepComponents', indices: [{ '"]); run(); //': 0 }] } as unknown as Edit;
+  expect(
+    new Function(`return ((mesh) => mesh.${callOf(odd)})`)()({ keepComponents: (given: unknown) => given }),
+  ).toEqual(odd.op === 'keepComponents' ? odd.indices : []);
+});

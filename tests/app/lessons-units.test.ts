@@ -62,6 +62,8 @@ describe('a condition', () => {
     [{ measur: 'chi', equals: 0 }, /measur,equals.*all,any,not/],
     [{ measure: 'chi' }, /accepted are equals,above/],
     [{ measure: 'chi', is: 0 }, /“is”.*equals/],
+    [{ measure: 'chi', toString: 0 }, /“toString”.*equals/],
+    [{ measure: 'chi', equals: 0, within: 'all' }, /number/],
     [{ measure: 3, equals: 0 }, /must be text/],
     [{ all: {} }, /must be a list/],
     [{ any: [] }, /must be a list/],

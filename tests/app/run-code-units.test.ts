@@ -7,7 +7,7 @@ import init, { Volume } from '../../pkg/index.js';
 import { at, must } from '../../scripts/shell.mjs';
 import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
 import { uniform } from '../../www/src/random';
-import { literal } from '../../www/src/worker/code';
+import { literal } from '../../www/src/worker/literal';
 import { ball, ring } from './volumes';
 import { startWorker } from './worker-in-node';
 

@@ -1,5 +1,6 @@
 /** Edits as calls of the package's methods: to carry them out, and to repeat them outside the app. */
 import type { Mesh } from 'vesicle';
+import { literal } from '../worker/literal';
 import type { Edit } from './protocol';
 
 /** Carries out an edit. */
@@ -30,15 +31,20 @@ export function callOf(edit: Edit): string {
   return `${edit.op}(${argumentsOf(edit).map(literal).join(', ')})`;
 }
 
+/** Returns the arguments of an edit, and nothing else: a log may come from a file of anyone. */
 function argumentsOf(edit: Edit): unknown[] {
-  const { op, ...values } = edit;
-  if (op === 'remesh' || op === 'smooth' || op === 'cut') return [values];
-  return Object.values(values);
+  switch (edit.op) {
+    case 'remesh':
+      return [{ min: edit.min, max: edit.max }];
+    case 'decimate':
+      return [edit.targetTriangles];
+    case 'smooth':
+      return [{ iterations: edit.iterations, keepVolume: edit.keepVolume }];
+    case 'keepComponents':
+      return [edit.indices];
+    case 'removeCavities':
+      return [];
+    case 'cut':
+      return [{ origin: edit.origin, normal: edit.normal }];
+  }
 }
-
-/** Returns plain data as JavaScript, with names of properties unquoted. */
-const literal = (value: unknown) =>
-  JSON.stringify(value)
-    .replace(/"(\w+)":/g, '$1: ')
-    .replace(/,(?=\S)/g, ', ')
-    .replace(/^\{(.*)\}$/, '{ $1 }');

@@ -40,6 +40,7 @@ export class ReferencePanel {
   /** Name of the reference; undefined if there is none. */
   #name: string | undefined;
   #comparison: Comparison | undefined;
+  #enabled = false;
   /** Counts comparisons, so that only the newest is shown. */
   #asked = 0;
 
@@ -73,6 +74,19 @@ export class ReferencePanel {
       this.#more,
     );
     this.#acceptDrops();
+  }
+
+  /** Whether the lab has a surface that does not change by itself. */
+  set enabled(enabled: boolean) {
+    this.#enabled = enabled;
+    for (const input of this.element.querySelectorAll('input')) input.disabled = !enabled;
+  }
+
+  /** Forgets the reference, which the worker has lost. */
+  forget(): void {
+    this.#name = undefined;
+    this.#status.textContent = '';
+    this.clear();
   }
 
   /** Compares the present surface with the reference, if there is one. */
@@ -168,7 +182,7 @@ export class ReferencePanel {
       // Hides what the page shows while files are dragged.
       window.dispatchEvent(new DragEvent('dragleave'));
       const files = [...(event.dataTransfer?.files ?? [])];
-      if (files.length > 0) void this.#open(files);
+      if (files.length > 0 && this.#enabled) void this.#open(files);
     });
   }
 }

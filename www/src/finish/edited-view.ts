@@ -60,8 +60,9 @@ export class EditedView {
   }
 
   #click(ray: Raycaster, take: (at: SurfacePoint) => void): void {
-    const [hit] = ray.intersectObject(this.#surface.target, false);
+    const hit = this.#surface.hit(ray);
     const local = hit && this.#surface.object.worldToLocal(hit.point.clone());
-    if (hit && local) take({ triangle: hit.faceIndex ?? 0, point: local.toArray() });
+    // Not on the cap of a cut, which has no triangles.
+    if (local && typeof hit.faceIndex === 'number') take({ triangle: hit.faceIndex, point: local.toArray() });
   }
 }

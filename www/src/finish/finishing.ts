@@ -4,13 +4,20 @@ import { text } from '../texts';
 import { FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';
 
+export interface FinishingEvents {
+  /** Receives the edited surface, or undefined if there is none. */
+  onChange: (edited: Edited | undefined) => void;
+  /** Called after the worker broke, with the surfaces and the reference that it had. */
+  onLost: () => void;
+}
+
 /**
  * A surface that is edited after a run. Its worker starts with the first request, which also passes the lab's surface
  * to it.
  */
 export class Finishing {
   readonly #mesh: () => Promise<Uint8Array>;
-  readonly #onChange: (edited: Edited | undefined) => void;
+  readonly #events: FinishingEvents;
   #client: FinishClient | undefined;
   #opening: Promise<void> | undefined;
   #edited: Edited | undefined;
@@ -19,10 +26,10 @@ export class Finishing {
   /** The surface before the edits, as a PLY file. */
   initial: Uint8Array | undefined;
 
-  /** `mesh` returns the lab's surface as a PLY file; `onChange` receives the edited one, or undefined if there is none. */
-  constructor(mesh: () => Promise<Uint8Array>, onChange: (edited: Edited | undefined) => void) {
+  /** `mesh` returns the lab's surface as a PLY file. */
+  constructor(mesh: () => Promise<Uint8Array>, events: FinishingEvents) {
     this.#mesh = mesh;
-    this.#onChange = onChange;
+    this.#events = events;
   }
 
   get edited(): Edited | undefined {
@@ -80,7 +87,7 @@ export class Finishing {
 
   #adopt(edited: Edited | undefined): void {
     this.#edited = edited;
-    this.#onChange(edited);
+    this.#events.onChange(edited);
   }
 
   /** After the worker broke, the next request starts another one. */
@@ -88,5 +95,6 @@ export class Finishing {
     this.#client?.close();
     this.#client = undefined;
     this.reset();
+    this.#events.onLost();
   }
 }

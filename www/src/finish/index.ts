@@ -33,7 +33,10 @@ export class Finish {
 
   constructor(host: FinishHost) {
     this.#host = host;
-    this.#finishing = new Finishing(host.mesh, (edited) => this.#adopt(edited));
+    this.#finishing = new Finishing(host.mesh, {
+      onChange: (edited) => this.#adopt(edited),
+      onLost: () => this.#reference.forget(),
+    });
     this.#edits = new EditPanel(this.#finishing, host.view);
     this.#reference = new ReferencePanel(this.#finishing, {
       onValues: (values) => {
@@ -59,6 +62,7 @@ export class Finish {
   /** Whether the lab has a surface that does not change by itself. */
   set enabled(enabled: boolean) {
     this.#edits.enabled = enabled;
+    this.#reference.enabled = enabled;
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits. */

@@ -121,25 +121,33 @@ function compare({ label }: { label?: number }): Comparison {
   const { mesh } = current();
   if (reference instanceof Mesh) {
     const grid = reference.check().closed ? gridAround(mesh, reference) : undefined;
-    const mask = grid && reference.toVolume(grid);
-    return compareWith(reference, mesh, mask, []);
+    try {
+      return compareWith(reference, mesh, grid && reference.toVolume(grid), []);
+    } finally {
+      grid?.free();
+    }
   }
   const labels = reference.labels().map(({ value }) => value);
   const mask = label === undefined ? reference.label(labels) : reference.label(label);
   const surface = Mesh.marchingCubes(mask, 0.5);
-  const found = compareWith(surface, mesh, mask, labels);
-  surface.free();
-  return found;
+  try {
+    return compareWith(surface, mesh, mask, labels);
+  } finally {
+    surface.free();
+  }
 }
 
 /** Compares with a surface and, if it is given, the mask of its voxels, which is freed. */
 function compareWith(surface: Mesh, mesh: Mesh, mask: Volume | undefined, labels: number[]): Comparison {
-  const own = mask && mesh.toVolume(mask);
-  const dice = own?.dice(mask as Volume);
-  own?.free();
-  mask?.free();
-  const found = { ...distancesBetween(mesh, surface), dice, labels };
-  return withTransfer(found, [found.values]);
+  let own: Volume | undefined;
+  try {
+    own = mask && mesh.toVolume(mask);
+    const found = { ...distancesBetween(mesh, surface), dice: own?.dice(mask as Volume), labels };
+    return withTransfer(found, [found.values]);
+  } finally {
+    own?.free();
+    mask?.free();
+  }
 }
 
 const handlers: Handlers<Requests> = {
@@ -155,8 +163,7 @@ const handlers: Handlers<Requests> = {
 };
 
 const started = init();
+started.catch(() => undefined);
 
-self.onmessage = async ({ data }: MessageEvent<{ id: number; kind: RequestKind; body: unknown }>) => {
-  await started;
-  await reply(handlers, data);
-};
+self.onmessage = ({ data }: MessageEvent<{ id: number; kind: RequestKind; body: unknown }>) =>
+  void reply(handlers, data, started);

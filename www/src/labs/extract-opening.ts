@@ -3,7 +3,7 @@ import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
 import type { ImageSource, LargeSource, Loaded, NamedBytes, ParamSpec, ParamValues, Setup } from '../protocol';
 import type { Session } from '../session/file';
-import { isRecord } from '../session/recognise';
+import { restoreView } from '../session/recognise';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -103,7 +103,11 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const { session: _, ...source } = this.source;
     const { params, attractors, sphere } = this.#settings;
     const { kind: start, edge = 0, ...choice } = this.#ui.start.inForce;
-    await this.open({ ...source, linked: { ...choice, frame, start, edge, sphere, params, attractors } });
+    await this.open({
+      ...source,
+      linked: { ...choice, frame, start, edge, sphere, params, attractors },
+      isChange: true,
+    });
   }
 
   protected fromFiles(files: File[]): ExtractSource {
@@ -158,9 +162,14 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   /** Continues a session: shows its state and view, and does not run it. */
   #resume(moments: ExtractMoments, view: unknown): void {
     this.#settings.resume(moments);
-    if (!isRecord(view)) return;
-    this.#ui.options.set(view.options as Partial<ViewOptions>);
-    this.#ui.stage.view = view as unknown as StageView;
+    restoreView(view, (shown) => {
+      this.#ui.options.set(shown.options as Partial<ViewOptions>);
+      this.#ui.stage.view = shown as unknown as StageView;
+    });
+  }
+
+  protected override kept(): void {
+    if (this.source) this.#ui.showFrame(this.source);
   }
 
   override filesOf(source: ImageSource): NamedBytes[] {

@@ -54,7 +54,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly measures = new MeasurePanel();
   readonly large: LargeSourceControls;
   /** Number of frames of the open volume. */
-  frameCount = 1;
+  #frameCount = 1;
   readonly #frames: FrameChoice;
   readonly histogram: Histogram;
   readonly start: StartControls;
@@ -159,8 +159,8 @@ export class ExtractParts extends RunParts<Example> {
     this.unit = shown;
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
-    this.frameCount = volume.frames;
-    this.#frames.show(frameOf(source), volume.frames);
+    this.#frameCount = volume.frames;
+    this.showFrame(source);
     this.large.showTotal(volume.large?.bytes);
     this.start.isLarge = volume.large !== undefined;
     this.stage.setVolume(volume);
@@ -168,6 +168,10 @@ export class ExtractParts extends RunParts<Example> {
     this.coverage.unit = this.stage.unit;
     this.coverage.clear();
     if (isPreset(example) && example.compares) this.#compareHolder.open = true;
+  }
+
+  showFrame(source: ExtractSource): void {
+    this.#frames.show(frameOf(source), this.#frameCount);
   }
 
   /** Index of the open frame of a 4D volume; undefined if the volume has one only. */

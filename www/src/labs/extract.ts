@@ -66,7 +66,10 @@ export class ExtractLab extends RunLab<Example> {
   #events(): PartEvents {
     return {
       ...this.runEvents(),
-      onLarge: (name, source) => void this.opening.large(name, source),
+      onLarge: (name, source) => {
+        this.forgetSession();
+        void this.opening.large(name, source);
+      },
       onFrame: (frame) => void this.opening.frame(frame),
       onVariant: (preset, variant) => void this.#settings.changeTo(preset, variant),
       onStart: () => void this.#settings.restart(),
@@ -99,15 +102,20 @@ export class ExtractLab extends RunLab<Example> {
     const { source } = this.opening;
     if (!source) return;
     const { saving, status, frame } = this.ui;
-    const files = this.opening.filesOf(await source.load()).map(({ name }) => name);
-    // Of several frames, the model has one as a volume of its own.
-    const isRead = files.length < 3 && files.some((name) => PACKAGE_FILES.test(name)) && this.ui.frameCount === 1;
+    // A header before its voxels.
+    const names = this.opening.filesOf(await source.load()).map(({ name }) => name);
+    const files = names.sort((one, other) => Number(PACKAGE_FILES.test(other)) - Number(PACKAGE_FILES.test(one)));
+    const isRead = files.length < 3 && files.some((name) => PACKAGE_FILES.test(name));
     // A saved volume has one frame.
     const context = isRead ? { files, frame } : { files: [`${saving.stem}.nii`], frame: undefined };
     const code = await this.client.request('code', context);
     try {
       await navigator.clipboard.writeText(code);
-      status.say(text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', { name: files[0] ?? saving.stem }));
+      status.say(
+        text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', {
+          name: (isRead && files[0]) || saving.stem,
+        }),
+      );
     } catch {
       saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
     }

@@ -95,7 +95,11 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
   async start(passedOn?: Handoff): Promise<void> {
     const open = passedOn && (() => this.#sessions?.passedOn(passedOn) ?? this.opening.passedOn(passedOn));
-    await this.opening.start(this.closing.signal, () => this.updateAddress(), open);
+    const onFollowed = () => {
+      this.forgetSession();
+      this.updateAddress();
+    };
+    await this.opening.start(this.closing.signal, onFollowed, open);
   }
 
   close(): void {
@@ -110,7 +114,10 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   protected labEvents(): Omit<LabEvents<Example>, 'onParam'> {
     return {
       onFiles: (files) => void this.#sessions?.files(files),
-      onExample: (example) => void this.opening.example(example),
+      onExample: (example) => {
+        this.forgetSession();
+        void this.opening.example(example);
+      },
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
@@ -130,8 +137,13 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     request.catch((error) => this.states.fail(title, error));
   }
 
-  protected dismiss(): void {
+  /** Waits no longer for the data of a session, since the user does something else. */
+  protected forgetSession(): void {
     this.#sessions?.forget();
+  }
+
+  protected dismiss(): void {
+    this.forgetSession();
     if (this.states.dismiss()) this.ui.status.say(this.describe());
   }
 
@@ -189,8 +201,8 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       onToggle: () => this.#toggle(),
       onStep: (steps) => this.#step(steps),
       onReset: () => void this.#reset(),
-      onUndo: () => void this.travel('undo'),
-      onRedo: () => void this.travel('redo'),
+      onUndo: () => this.#travel('undo'),
+      onRedo: () => this.#travel('redo'),
     };
   }
 
@@ -211,9 +223,11 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
   protected async paused<Result>(work: () => Promise<Result>): Promise<Result> {
     const isRunning = this.states.modelState === 'running';
     await this.client.request('pause', undefined);
-    const result = await work();
-    if (isRunning) await this.client.request('play', undefined);
-    return result;
+    try {
+      return await work();
+    } finally {
+      if (isRunning) await this.client.request('play', undefined);
+    }
   }
 
   /** Opens the present surface in the Sculpt lab, as a mesh to deform. */
@@ -222,6 +236,11 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       mesh.then((bytes) => this.passOn({ lab: 'sculpt', name, bytes, params: {} })),
       text('labs.toSculptFailed'),
     );
+  }
+
+  #travel(way: 'undo' | 'redo'): void {
+    this.ui.finish?.reset();
+    void this.travel(way);
   }
 
   #toggle(): void {
@@ -236,6 +255,7 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
     if (!this.canStep || this.states.value === 'running') return;
     this.ui.banner.hide();
     this.beforeRun(plural('counts.step', steps), true);
+    this.ui.finish?.reset();
     this.ask(this.client.request('step', { count: steps }));
   }
 

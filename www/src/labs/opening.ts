@@ -25,6 +25,8 @@ export interface Source<Example, Linked, Data> {
   unit?: Unit;
   /** The session to continue, whose state takes precedence over all settings. */
   session?: Session;
+  /** Whether the settings in `linked` are those in force, so that there are none to go back to. */
+  isChange?: boolean;
   /** Whether the data are nowhere but in the app, since another lab has made them. */
   isMade?: boolean;
 }
@@ -138,6 +140,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return this.default();
   }
 
+  /** Called when opening has failed, and what was open before stays; does nothing by default. */
+  protected kept(): void {}
+
   /** Called when a request to open something is made, to end the one before if that takes long; does nothing by default. */
   protected superseded(): void {}
 
@@ -206,7 +211,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     const own = files.length > 0 ? [this.fromFiles(files)] : [];
     const origins = example ? [this.fromExample(example), ...own] : own;
     const load = () => this.#matching(session.source, origins);
-    return this.open({ ...origins[0], ...(example && { example }), name, load, session });
+    // Data that came with the session may be nowhere else.
+    const isMade = !example && session.source.files.every(({ content }) => content);
+    return this.open({ ...origins[0], ...(example ? { example } : { isMade }), name, load, session });
   }
 
   /** Returns the data of the first of several sources that are those of a session. */
@@ -317,9 +324,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   async #failed(source: Source<Example, Linked, Data>, error: unknown, reopening: boolean): Promise<void> {
     this.states.finishOpening(false);
     const { code, message } = toFailure(error);
-    if (code !== 'internal' && !this.states.engineBroken && !reopening && source.linked)
+    if (code !== 'internal' && !this.states.engineBroken && !reopening && source.linked && !source.isChange)
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
+    this.kept();
     if (this.#modelMismatch) this.states.engineBroken = true;
     this.states.fail(text('labs.openFailed', { name: source.name }), error);
   }

@@ -2,7 +2,7 @@ import { ReconstructClient } from '../reconstruct/client';
 import type { CloudExample } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
 import type { ParamValues, PointQuantity, StepReport, WorkerEvent } from '../reconstruct/protocol';
-import { isRecord } from '../session/recognise';
+import { restoreView } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
@@ -96,10 +96,10 @@ export class ReconstructLab extends RunLab<CloudExample> {
     this.#settings.entries = { undo, redo } as ReconstructSettings['entries'];
     const [list = []] = reports as StepReport[][];
     this.#history.rewind({ reports: list, iteration: Number.POSITIVE_INFINITY });
-    if (isRecord(view)) {
-      this.ui.options.set(view.options as Partial<CloudViewOptions>);
-      this.ui.view.pose = view.camera as CameraPose;
-    }
+    restoreView(view, ({ options, camera }) => {
+      this.ui.options.set(options as Partial<CloudViewOptions>);
+      this.ui.view.pose = camera as CameraPose;
+    });
     // Sends the surface, its measures and the state.
     await this.client.request('step', { count: 0 });
     const state = list.at(-1)?.done ? 'done' : 'paused';

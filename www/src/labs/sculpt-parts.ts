@@ -132,7 +132,9 @@ export class SculptParts extends RunParts<SculptExample> {
    * even when the model has converged.
    */
   showState(state: LabState, beneath: LabState, ready: boolean, canPlay: boolean): void {
-    this.#session.enabled = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
+    const idle = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
+    // Saving pauses a run, which would then not go on to the same pose.
+    this.#session.enabled = idle && beneath !== 'running';
   }
 
   override dispose(): void {

@@ -3,7 +3,7 @@ import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, WorkerEvent } from '../sculpt/protocol';
-import { isRecord } from '../session/recognise';
+import { restoreView } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { prefersReducedMotion } from '../ui/dom';
@@ -132,11 +132,13 @@ export class SculptLab extends RunLab<SculptExample> {
 
   /** Continues a session: shows its state and view, and does not run it. */
   async #resume(moments: SculptMoments, view: unknown): Promise<void> {
-    if (isRecord(view)) this.ui.options.set(view.options as Partial<SculptViewOptions>);
+    restoreView(view, ({ options }) => this.ui.options.set(options as Partial<SculptViewOptions>));
     await this.client.request('show', this.#shown);
     await this.#settings.resume(moments);
     this.states.idle(this.#results.describe('paused'));
-    if (isRecord(view)) this.ui.view.pose = view.camera as CameraPose;
+    restoreView(view, ({ camera }) => {
+      this.ui.view.pose = camera as CameraPose;
+    });
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {

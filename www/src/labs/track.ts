@@ -1,6 +1,6 @@
 import { toFailure } from '../channel';
 import type { Moments } from '../session/moments';
-import { isRecord } from '../session/recognise';
+import { restoreView } from '../session/recognise';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
@@ -123,10 +123,11 @@ export class TrackLab extends RunLab<TrackExample> {
     await this.#settings.resume(moments);
     const state = moments.now.saved.done ? 'done' : 'paused';
     this.states.idle(this.#results.describe(state), state);
-    if (!isRecord(view)) return;
-    this.ui.options.set(view.options as Partial<TrackViewOptions>);
-    this.ui.view.pose = view as unknown as StageView;
-    if (typeof view.frame === 'number') this.#results.choose(view.frame);
+    restoreView(view, (shown) => {
+      this.ui.options.set(shown.options as Partial<TrackViewOptions>);
+      this.ui.view.pose = shown as unknown as StageView;
+      if (typeof shown.frame === 'number') this.#results.choose(shown.frame);
+    });
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {

@@ -58,8 +58,9 @@ function listProblem(list: unknown, joint: string, steps: string[]): string | un
 }
 
 function comparisonProblem(check: Check, subject: string, steps: string[]): string | undefined {
-  const { [subject]: _, within: __, ...comparisons } = check;
-  const unknown = Object.keys(comparisons).find((name) => !(name in COMPARISONS));
+  const { [subject]: _, within = 0, ...comparisons } = check;
+  if (typeof within !== 'number' || !(within >= 0)) return text('lessons.operandInvalid');
+  const unknown = Object.keys(comparisons).find((name) => !Object.hasOwn(COMPARISONS, name));
   const accepted = Object.keys(COMPARISONS).join();
   if (unknown || Object.keys(comparisons).length === 0)
     return text('lessons.comparisonUnknown', { found: unknown ?? '', accepted });

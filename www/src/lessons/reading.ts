@@ -83,6 +83,8 @@ export function watchLab(root: HTMLElement, signal: AbortSignal, callback: () =>
   };
   const watch = new MutationObserver(note);
   watch.observe(root, { subtree: true, attributeFilter: ['data-state', 'data-measures'] });
+  // A parameter that changes while the lab is paused.
+  root.addEventListener('change', note, { signal });
   signal.addEventListener('abort', () => {
     watch.disconnect();
     cancelAnimationFrame(pending);

@@ -56,8 +56,14 @@ const isLessonFile = (name: string) => /(^|\/)(lesson\.json|text\.[\w-]+\.md)$/.
 async function unpack(archive: Blob): Promise<LessonFiles> {
   if (archive.size > MOST_BYTES) throw new Error(text('lessons.archiveTooLarge'));
   const { strFromU8, unzipSync } = await import('three/addons/libs/fflate.module.js');
+  let total = 0;
   const entries = unzipSync(new Uint8Array(await archive.arrayBuffer()), {
-    filter: ({ name, originalSize }) => isLessonFile(name) && originalSize <= MOST_BYTES,
+    filter: ({ name, originalSize }) => {
+      if (!isLessonFile(name)) return false;
+      total += originalSize;
+      if (!(total <= MOST_BYTES)) throw new Error(text('lessons.archiveTooLarge'));
+      return true;
+    },
   });
   return Object.fromEntries(
     Object.entries(entries).map(([name, bytes]) => [name.replace(/^.*\//, ''), strFromU8(bytes)]),

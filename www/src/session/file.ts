@@ -84,6 +84,8 @@ export async function readSession(bytes: Uint8Array): Promise<Session> {
   }
   const find = (name: string) => {
     const part = Object.hasOwn(sums ?? {}, name) ? parts[name] : undefined;
+    // Each part stands for one array, so that a small file cannot become many.
+    delete parts[name];
     if (!part) throw new Error(text('sessions.missingPart', { part: name }));
     return part;
   };
@@ -101,9 +103,9 @@ function decoded(body: unknown, find: (part: string) => Uint8Array): Record<stri
 
 function unpack(bytes: Uint8Array): Parts {
   let [count, total] = [0, 0];
-  const filter = ({ originalSize }: { originalSize: number }) => {
+  const filter = ({ size, originalSize }: { size: number; originalSize: number }) => {
     count += 1;
-    total += originalSize;
+    total += Math.max(size, originalSize);
     if (count > MOST_PARTS || !(total <= MOST_BYTES)) throw new Error(TOO_LARGE);
     return true;
   };

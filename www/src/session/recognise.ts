@@ -15,3 +15,13 @@ export async function isSession(file: File): Promise<boolean> {
 export function isRecord(value: unknown): value is Record<string, unknown> {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
+
+/** Passes the view of a session to `show`. A damaged one is left out: nothing else depends on it. */
+export function restoreView(view: unknown, show: (view: Record<string, unknown>) => void): void {
+  if (!isRecord(view)) return;
+  try {
+    show(view);
+  } catch {
+    // The view stays.
+  }
+}

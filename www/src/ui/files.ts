@@ -23,7 +23,7 @@ export function fileChooser(
     const files = [...(input.files ?? [])];
     // Makes choosing the same file again a change.
     input.value = '';
-    if (files.length > 0) void largestSeries(files).then(onFiles);
+    if (files.length > 0) void largestSeriesOrAll(files).then(onFiles);
   });
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
 }
@@ -61,7 +61,7 @@ export function acceptDrops(
     const drop = ++drops;
     // If a folder cannot be read, opening it as a file gives the error message.
     const dropped = (await folders?.catch(() => undefined)) ?? { files };
-    const chosen = 'zarr' in dropped ? dropped : { files: await largestSeries(dropped.files) };
+    const chosen = 'zarr' in dropped ? dropped : { files: await largestSeriesOrAll(dropped.files) };
     if (drop !== drops || signal.aborted) return;
     overlay.hidden = true;
     if ('files' in chosen) onFiles(chosen.files);
@@ -80,6 +80,9 @@ export function acceptDrops(
     { signal },
   );
 }
+
+/** Returns the files to open; all if some cannot be read, of which opening them then says why. */
+const largestSeriesOrAll = (files: File[]) => largestSeries(files).catch(() => files);
 
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {
   return Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));

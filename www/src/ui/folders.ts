@@ -75,12 +75,14 @@ async function entriesOf(folder: FileSystemDirectoryEntry): Promise<FileSystemEn
  */
 export async function largestSeries(files: File[]): Promise<File[]> {
   if (files.length < 2) return files;
-  const heads = await Promise.all(files.map(headOf));
-  const segmentations = files.filter((_, i) => isSegmentation(heads[i] as NamedBytes));
+  const segmentations: File[] = [];
   const series = new Map<string, { description: string; files: File[] }>();
-  for (const [i, head] of heads.entries()) {
-    const file = files[i];
-    if (!file || !isDicom(head) || segmentations.includes(file)) continue;
+  // One after another: the heads of all files of a large folder may not fit into memory.
+  for (const file of files) {
+    const head = await headOf(file);
+    if (isSegmentation(head)) segmentations.push(file);
+    else if (!isDicom(head)) continue;
+    if (segmentations.at(-1) === file) continue;
     const { uid, description } = seriesOf(head.bytes);
     const one = series.get(uid) ?? { description, files: [] };
     series.set(uid, one);

@@ -80,7 +80,7 @@ export class PicturePanel {
       name: 'picture',
       start: text('pictures.record'),
       progress: text('pictures.progress'),
-      onStart: () => void this.#record(),
+      onStart: () => void this.#record().catch((error) => this.#fail(error)),
       onCancel: () => this.#end(false),
       during: [this.#finish],
     });
@@ -240,6 +240,13 @@ export class PicturePanel {
     );
     if (bytes?.length) this.#events.save('webm', bytes, 'video/webm', '');
     else if (!isDrawn) this.#reject(size);
+  }
+
+  /** Ends a recording that this browser has refused. */
+  #fail(error: unknown): void {
+    this.#release();
+    this.#blocked = false;
+    this.#task.end(error instanceof Error ? error.message : String(error));
   }
 
   /** Waits until the turn or the run has ended, or the user has ended the film; returns whether it is kept. */

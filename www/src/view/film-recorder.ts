@@ -42,7 +42,8 @@ export class FilmRecorder {
 
   /** Ends the recording and returns the film, which is empty if the encoder did not manage a single frame. */
   async finish(): Promise<Uint8Array> {
-    for (let waited = 0; waited < PATIENCE && !this.#hasData; waited += PAUSE) {
+    const isRecording = () => this.#recorder.state === 'recording';
+    for (let waited = 0; waited < PATIENCE && !this.#hasData && isRecording(); waited += PAUSE) {
       this.addFrame();
       this.#recorder.requestData();
       await new Promise((resolve) => setTimeout(resolve, PAUSE));
@@ -52,9 +53,11 @@ export class FilmRecorder {
   }
 
   async cancel(): Promise<void> {
-    const stopped = new Promise((resolve) => this.#recorder.addEventListener('stop', resolve, { once: true }));
-    this.#recorder.stop();
-    await stopped;
+    if (this.#recorder.state !== 'inactive') {
+      const stopped = new Promise((resolve) => this.#recorder.addEventListener('stop', resolve, { once: true }));
+      this.#recorder.stop();
+      await stopped;
+    }
     this.#track.stop();
   }
 

@@ -181,7 +181,7 @@ export class SurfaceObject {
    * Returns the point that a ray from the viewer hits first: of the part of the surface that is not cut away, or of the
    * cut.
    */
-  hit(ray: Raycaster): Pick<Intersection, 'point' | 'distance'> | undefined {
+  hit(ray: Raycaster): Pick<Intersection, 'point' | 'distance' | 'faceIndex'> | undefined {
     const [cut] = this.#clipping;
     const hits: Intersection[] = [];
     for (const part of cut ? [this.target, this.#inside] : [this.target]) part.raycast(ray, hits);

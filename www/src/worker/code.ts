@@ -1,6 +1,7 @@
 /** Writes the log of a run as JavaScript that repeats the run to the same bits with the package alone. */
 import type { ParamValues, Setup } from '../protocol';
 import { text } from '../texts';
+import { literal } from './literal';
 import { startOf } from './models';
 import { Refusal } from './refusal';
 import type { RunLog } from './run-log';
@@ -54,17 +55,3 @@ function lineOf({ call, given }: RunLog<Setup>['calls'][number]): string {
   if (!METHODS.includes(call)) throw new Refusal('bad-file', text('sessions.unknownCall', { call }));
   return `model.${call}(${given === undefined ? '' : literal(given)});`;
 }
-
-/** Returns JavaScript for a value of plain data; numbers are written so that they are read as the same numbers. */
-export function literal(value: unknown): string {
-  if (value instanceof Float32Array) return `new Float32Array(${literal([...value])})`;
-  if (Array.isArray(value)) return `[${value.map(literal).join(', ')}]`;
-  if (typeof value === 'object' && value !== null) {
-    const entries = Object.entries(value).map(([name, one]) => `${property(name)}: ${literal(one)}`);
-    return entries.length > 0 ? `{ ${entries.join(', ')} }` : '{}';
-  }
-  if (typeof value === 'string') return /^[\w .-]*$/.test(value) ? `'${value}'` : JSON.stringify(value);
-  return Object.is(value, -0) ? '-0' : String(value);
-}
-
-const property = (name: string) => (/^[a-z]\w*$/i.test(name) ? name : JSON.stringify(name));

@@ -25,8 +25,9 @@ export class Work {
     }
   }
 
-  /** Begins work; returns its result. */
+  /** Begins work, and aborts what is under way; returns its result. */
   async begin<Result>(work: (signal: AbortSignal) => Promise<Result>): Promise<Result> {
+    this.#abort?.abort();
     const abort = new AbortController();
     this.#abort = abort;
     const ended = work(abort.signal).finally(() => {
@@ -84,13 +85,18 @@ export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBu
   return reply;
 }
 
-/** Runs the handler for a request of the page, and replies with the handler's result, or with its failure. */
+/**
+ * Runs the handler for a request of the page when the engine is `ready`, and replies with the handler's result, or with its
+ * failure.
+ */
 export async function reply(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },
+  ready?: Promise<unknown>,
 ): Promise<void> {
   const handler = handlers[kind] as (body: unknown) => unknown;
   try {
+    await ready;
     const result = await handler(body);
     const transfer = result instanceof Object ? transferLists.get(result) : undefined;
     self.postMessage({ id, ok: true, body: result }, { transfer: transfer ?? [] });
