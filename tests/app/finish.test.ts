@@ -96,6 +96,18 @@ test('a mask is a reference, too', async () => {
   await expect.poll(() => app.page.locator('[data-reference=result]').textContent()).toContain('Dice coefficient');
 });
 
+test('edits end when the run goes on by a single step', async () => {
+  await app.page.getByRole('button', { name: 'Reset' }).click();
+  await reach(app.page, 'paused');
+  await app.page.waitForSelector('[data-component]');
+  await press('cut');
+  await expect.poll(async () => (await log()).length).toBe(1);
+  await app.page.getByRole('button', { name: 'Step', exact: true }).click();
+  await expect.poll(async () => (await log()).length).toBe(0);
+  const { triangles } = await measures(app.page);
+  expect(Mesh.parse(await saved('[data-export=ply]')).triangleCount).toBe(triangles);
+});
+
 test.each(['reconstruct', 'track'] as const)('surfaces are edited in %s, too', async (lab) => {
   await open(app, QUICK[lab]);
   await reach(app.page, 'done');
