@@ -1,6 +1,7 @@
 /** Lessons in the browser: done by the interface, opened from files and addresses, saved, printed, and in German. */
 import { readFileSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
+import type { Dialog } from 'playwright-core';
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
@@ -114,6 +115,7 @@ describe('topology and χ, by the interface of the lab alone', () => {
     await viewer.close();
     expect([name, steps.length]).toEqual(['Ada <b>', 6]);
     expect(steps[4]).toMatchObject({ id: 'sponge', complete: true, answer: '81', measures: { chi: -160, genus: 81 } });
+    expect(html).toContain(steps[4].measures.triangles.toLocaleString('en'));
     expect(steps[4].link).toContain('?lesson=topology#extract?example=sponge');
     expect(text).toContain('6 of 6 steps complete');
     expect(text).toContain('Ada <b>');
@@ -223,10 +225,17 @@ describe('in German', () => {
     expect(await app.page.getAttribute('html', 'lang')).toBe('de');
     expect(await panel().locator('h2').textContent()).toBe('Topologie und χ');
     expect(await app.page.locator('dt', { hasText: 'Euler-Charakteristik' }).count()).toBe(1);
+    // The page asks first, since results are lost.
+    app.page.once('dialog', (dialog) => dialog.dismiss());
+    await app.page.selectOption('#language', 'en');
+    expect(await app.page.inputValue('#language')).toBe('de');
+    const accept = (dialog: Dialog) => dialog.accept();
+    app.page.on('dialog', accept);
     await app.page.selectOption('#language', 'en');
     await expect.poll(() => app.page.getAttribute('html', 'lang')).toBe('en');
     await app.page.selectOption('#language', 'de');
     await panel().getByText('Topologie und χ').waitFor();
+    app.page.off('dialog', accept);
     await goTo('#extract?example=linked-rings&v=2');
     await app.page.getByRole('button', { name: 'Lektionen' }).waitFor();
   });

@@ -177,7 +177,11 @@ function offerLanguages(select: HTMLElement): void {
   select.replaceChildren(...options);
   select.setAttribute('aria-label', text('shell.language'));
   select.title = text('shell.languageHelp');
-  select.addEventListener('change', () => chooseLanguage((select as HTMLSelectElement).value));
+  select.addEventListener('change', () => {
+    const list = select as HTMLSelectElement;
+    if (window.confirm(text('shell.languageConfirm'))) chooseLanguage(list.value);
+    else list.value = LANGUAGE;
+  });
 }
 
 function openLabs(): void {

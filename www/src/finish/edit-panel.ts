@@ -176,6 +176,7 @@ export class EditPanel {
     box.addEventListener('change', async () => {
       for (const other of [this.#choosing, this.#measuring]) if (other !== box) other.checked = false;
       this.#view.pick(undefined);
+      this.#view.showLines(new Float32Array());
       if (box.checked && (await this.#attempt(() => this.#finishing.open()))) this.#view.pick(take);
     });
     return box;

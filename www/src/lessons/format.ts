@@ -1,10 +1,11 @@
 import { text } from '../texts';
-import { figure } from '../ui/format';
+import { count, figure } from '../ui/format';
 import type { Value } from './reading';
 
-/** Formats a measured value, as the labs do; a dash if it is unknown. */
+/** Formats a measured value, as the labs do; whole numbers in full, and a dash for an unknown value. */
 export function shownValue(value: Value | undefined): string {
   if (value === undefined) return '–';
   if (typeof value === 'boolean') return text(value ? 'controls.yes' : 'controls.no');
-  return typeof value === 'number' ? figure(value) : value;
+  if (typeof value === 'string') return value;
+  return Number.isInteger(value) ? count(value) : figure(value);
 }

@@ -27,6 +27,7 @@ export class LessonView {
   readonly #body = h('div', { class: 'lesson-step' });
   readonly #news = h('p', { class: 'visually-hidden', role: 'status' });
   readonly #complete = h('p', { class: 'help' });
+  readonly #finished = h('p', { class: 'lesson-finished', role: 'status' });
   readonly #closing = new AbortController();
   /** Element with the present values of what the step's condition is about. */
   #now: HTMLElement | undefined;
@@ -37,7 +38,7 @@ export class LessonView {
     this.#lab = lab;
     this.#progress = loadProgress(lesson.id);
     const steps = h('nav', { 'aria-label': text('lessons.steps') }, this.#steps);
-    this.element = h('div', {}, steps, this.#body, this.#news, this.#results(address));
+    this.element = h('div', {}, steps, this.#body, this.#finished, this.#news, this.#results(address));
     watchLab(lab, this.#closing.signal, () => this.#test());
     this.#show();
   }
@@ -67,7 +68,9 @@ export class LessonView {
     const { steps } = this.#lesson;
     this.#steps.replaceChildren(...steps.map((step, index) => h('li', {}, this.#stepButton(step, index))));
     const done = completeSteps(this.#lesson, this.#progress);
+    const isFinished = done === steps.length;
     this.#complete.textContent = text('lessons.progress', { done, steps: steps.length });
+    this.#finished.textContent = isFinished ? text('lessons.finished') : '';
   }
 
   #stepButton(step: Step, index: number): HTMLElement {
@@ -131,11 +134,13 @@ export class LessonView {
     const { id, check } = this.#step;
     if (!check) return;
     const reading = readLab(this.#lab);
+    const tick = this.#progress.ticks[id];
+    // Those at the time of the tick, which the lab may have left since.
+    const measures = tick?.measures ?? reading.measures;
     const facts = namesIn(check).map(({ kind, name }) => {
-      const value = (kind === 'measure' ? reading.measures : reading.params)[name];
+      const value = (kind === 'measure' ? measures : reading.params)[name];
       return text('lessons.fact', { name: labelIn(this.#lab, kind, name), value: shownValue(value) });
     });
-    const tick = this.#progress.ticks[id];
     const state = text(tick ? 'lessons.ticked' : 'lessons.unticked');
     if (this.#now) this.#now.textContent = [state, [...new Set(facts)].join(', ')].filter(Boolean).join(' ');
     if (tick || !holds(check, reading, recordsOf(this.#progress))) return;
@@ -153,15 +158,19 @@ export class LessonView {
     const attributes = { 'aria-labelledby': asked.id };
     const field =
       step.question === 'text'
-        ? h('textarea', { rows: 3, ...attributes })
+        ? h('textarea', { rows: 6, ...attributes })
         : h('input', { type: 'text', inputmode: 'decimal', autocomplete: 'off', ...attributes });
     field.value = this.#progress.answers[step.id] ?? '';
+    const tell = (isAsked: boolean) => {
+      feedback.textContent = isAsked ? this.#feedback(step) : '';
+      feedback.toggleAttribute('data-right', isAsked && isAnswered(step, this.#progress));
+    };
     field.addEventListener('change', () => {
       this.#progress.answers[step.id] = field.value;
       this.#save();
-      feedback.textContent = this.#feedback(step);
+      tell(true);
     });
-    feedback.textContent = field.value && this.#feedback(step);
+    tell(field.value !== '');
     part.append(field, feedback);
     return part;
   }

@@ -1,5 +1,5 @@
 /** A student's results as one file: a page to read, which contains the same results as JSON. */
-import { text } from '../texts';
+import { LANGUAGE, text } from '../texts';
 import { h } from '../ui/dom';
 import { shownValue } from './format';
 import type { Lesson, Step } from './lesson';
@@ -46,13 +46,29 @@ function stepResult(step: Step, progress: Progress): HTMLElement {
   ]);
   const answer = step.question && [
     h('p', {}, h('em', {}, step.parts.question ?? '')),
-    h('p', {}, progress.answers[step.id] ?? ''),
+    h('p', {}, `${progress.answers[step.id] ?? ''} `, h('em', {}, verdict(step, progress))),
   ];
   return h(
     'section',
     {},
     h('h2', {}, `${isComplete(step, progress) ? '✓' : '○'} ${step.title}`),
-    ...(tick ? [h('p', {}, h('a', { href: tick.link }, tick.at)), h('dl', {}, ...measures)] : []),
+    ...(tick
+      ? [
+          h(
+            'p',
+            {},
+            h('a', { href: tick.link }, text('lessons.openState')),
+            ` (${new Date(tick.at).toLocaleString(LANGUAGE)})`,
+          ),
+          h('dl', {}, ...measures),
+        ]
+      : []),
     ...(answer ?? []),
   );
+}
+
+/** Tells whether the answer to a question about a number is right; empty for other questions. */
+function verdict(step: Step, progress: Progress): string {
+  if (step.question === 'text' || !progress.answers[step.id]) return '';
+  return text(isAnswered(step, progress) ? 'lessons.right' : 'lessons.notRight');
 }
