@@ -80,10 +80,13 @@ export async function open({ page, address }: Pick<App, 'page' | 'address'>, has
 }
 
 /** Expands all collapsible parts. */
-export function unfold(page: Page): Promise<void> {
-  return page.locator('details').evaluateAll((all) => {
+export async function unfold(page: Page): Promise<void> {
+  await page.locator('details').evaluateAll((all) => {
     for (const one of all) (one as HTMLDetailsElement).open = true;
   });
+  // Panels that begin to work when they are unfolded are told in a later task.
+  await page.evaluate(() => new Promise((told) => requestAnimationFrame(() => setTimeout(told))));
+  await page.waitForFunction(() => !document.querySelector('[aria-busy=true]'));
 }
 
 /** Waits until the lab is in one of the states; an unexpected error fails with its message. */

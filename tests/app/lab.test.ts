@@ -253,7 +253,7 @@ describe('colour', () => {
 
   test("by curvature has a legend in the volume's unit, and distinguishes convex from concave", async () => {
     await app.page.selectOption('[data-view=color]', 'mean curvature');
-    const legend = app.page.locator('.color-legend');
+    const legend = app.page.locator('.color-legend:visible');
     await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1concaveconvex$/);
     await app.page.selectOption('[data-view=color]', 'gaussian curvature');
     await expect
@@ -265,7 +265,7 @@ describe('colour', () => {
     await app.page.selectOption('[data-view=color]', 'speed');
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
-    const legend = app.page.locator('.color-legend');
+    const legend = app.page.locator('.color-legend:visible');
     await expect.poll(() => legend.textContent()).toContain('−1.00e-4');
     await app.page.click('text=Step ×10');
     await expect.poll(() => legend.textContent()).toMatch(/−0\.[1-5]0/);

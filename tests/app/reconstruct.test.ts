@@ -563,7 +563,7 @@ describe('the page', () => {
   test('nothing covers the pictures but the legend', async () => {
     await openAt('#reconstruct?example=figure-2', 'done');
     const box = async (selector: string) => app.page.locator(selector).boundingBox();
-    const [bar, scene, legend] = [await box('.view-options'), await box('.scene'), await box('.color-legend')];
+    const [bar, scene, legend] = [await box('.view-options'), await box('.scene'), await box('.color-legend:visible')];
     expect((bar?.y ?? 0) + (bar?.height ?? 0)).toBeLessThanOrEqual((scene?.y ?? 0) + 1);
     expect(legend?.y).toBeGreaterThan(scene?.y ?? 0);
   });

@@ -250,7 +250,7 @@ describe('the view', () => {
   test('shows all five meshes with their names, and distortion with its legend', async () => {
     await openAt(`${SMALL}&layout=row&color=area+distortion`, 'done');
     await expect.poll(() => app.page.locator('.captions span').count()).toBe(5);
-    await expect.poll(() => app.page.locator('.color-legend').isVisible()).toBe(true);
+    await expect.poll(() => app.page.locator('.color-legend:visible').isVisible()).toBe(true);
     expect(await hash()).toContain('layout=row');
   });
 

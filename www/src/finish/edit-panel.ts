@@ -198,6 +198,7 @@ export class EditPanel {
   #enable(): void {
     const { edited } = this.#finishing;
     const idle = this.#enabled && !this.#busy;
+    this.element.setAttribute('aria-busy', String(this.#busy));
     for (const button of this.#buttons) button.disabled = !idle;
     this.#undo.disabled ||= !edited?.undoable;
     this.#redo.disabled ||= !edited?.redoable;
