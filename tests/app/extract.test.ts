@@ -99,12 +99,21 @@ describe('running', () => {
     await app.page.waitForFunction(() => document.querySelector('.iteration')?.textContent === 'Iteration 1');
     await app.page.keyboard.press('d');
     await app.page.waitForFunction(() => document.querySelector('.iteration')?.textContent === 'Iteration 11');
+    // Smaller steps, so that the run is still under way when it is paused.
+    const timeStep = app.page.locator('[data-param=timeStep] input[type=number]');
+    const usual = await timeStep.inputValue();
+    await timeStep.fill('0.05');
+    await timeStep.press('Enter');
+    await app.page.locator('.scene > canvas').focus();
     await app.page.keyboard.press(' ');
     await reach(app.page, 'running');
     await app.page.keyboard.press(' ');
     await reach(app.page, 'paused');
     expect(await iteration(app.page)).toBeGreaterThan(11);
     expect(await measures(app.page)).toMatchObject({ closed: true, oriented: true });
+    await timeStep.fill(usual);
+    await timeStep.press('Enter');
+    await expect.poll(() => app.page.url()).not.toContain('timeStep');
   });
 
   test('a parameter changed while paused is used from then on, and kept by a reset', async () => {
