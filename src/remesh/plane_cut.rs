@@ -3,6 +3,7 @@
 use crate::math::predicates::{collinear, in_circle};
 use crate::math::{Bounds, DVec2, DVec3, Vec3, triangulate};
 use crate::mesh::{Mesh, MeshError, OppositeVertices, TriangleMesh, VertexId, intersecting_pairs};
+use crate::spatial::lone_corner;
 use std::collections::BTreeMap;
 
 /// The number of positions of the plane that are tried.
@@ -180,16 +181,6 @@ impl OpenPart {
             }
         }
         (!rims.is_empty()).then_some(rims)
-    }
-}
-
-/// Returns the index of the corner that is alone on its side of the plane; `None` if all are on the same side.
-fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
-    match (a == b, b == c) {
-        (true, true) => None,
-        (true, false) => Some(2),
-        (false, true) => Some(0),
-        (false, false) => Some(1),
     }
 }
 

@@ -22,6 +22,7 @@ pub use distance::{SurfaceDistance, surface_distance};
 pub use lattice_distance::lattice_distances;
 pub use points::PointGrid;
 pub use section::cross_section;
+pub(crate) use section::lone_corner;
 pub use surface_walker::SurfaceWalker;
 pub use sweep::near_pairs;
 pub use tree::{NearestHit, SurfacePoint, TriangleTree};

@@ -29,7 +29,7 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
 
 /// Returns the index (0 to 2) of the triangle corner that is alone on its side of a plane, given whether each corner is
 /// above the plane; `None` if all three are on the same side.
-fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
+pub(crate) fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     match (a == b, b == c) {
         (true, true) => None,
         (true, false) => Some(2),

@@ -1,6 +1,6 @@
 import { text } from '../texts';
 import { h, uniqueId } from '../ui/dom';
-import { fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
+import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
 import { figure } from '../ui/format';
 import type { Finishing } from './finishing';
 import type { Comparison, Distances } from './protocol';
@@ -61,7 +61,6 @@ export class ReferencePanel {
       this.#labelRow,
       this.#result,
       h('label', {}, this.#colors, ' ', text('finish.colors')),
-
       h('button', { type: 'button', 'data-reference': 'csv', onclick: () => this.#save() }, text('finish.csv')),
     );
     this.element = h(
@@ -73,7 +72,10 @@ export class ReferencePanel {
       this.#error,
       this.#more,
     );
-    this.#acceptDrops();
+    acceptDropsOn(this.element, (data) => {
+      const files = [...(data?.files ?? [])];
+      if (files.length > 0 && this.#enabled) void this.#open(files);
+    });
   }
 
   /** Whether the lab has a surface that does not change by itself. */
@@ -167,22 +169,5 @@ export class ReferencePanel {
     const lines = DIRECTIONS.map(([name]) => [name, ...MEASURES.map(([measure]) => found[name][measure])]);
     const all = [head, ...lines, ['dice', found.dice ?? '']].map((line) => line.join(','));
     this.#events.onSave('csv', new TextEncoder().encode(`${all.join('\n')}\n`), 'text/csv', '-comparison');
-  }
-
-  /** Accepts files dropped on the panel, before the page takes them for data of the lab. */
-  #acceptDrops(): void {
-    const { element } = this;
-    element.addEventListener('dragover', (event) => {
-      event.preventDefault();
-      event.stopPropagation();
-    });
-    element.addEventListener('drop', (event) => {
-      event.preventDefault();
-      event.stopPropagation();
-      // Hides what the page shows while files are dragged.
-      window.dispatchEvent(new DragEvent('dragleave'));
-      const files = [...(event.dataTransfer?.files ?? [])];
-      if (files.length > 0 && this.#enabled) void this.#open(files);
-    });
   }
 }

@@ -1,6 +1,7 @@
 /** Distances between two surfaces in each direction, and the grid in which they are compared as solids. */
 import { type Mesh, Volume } from 'vesicle';
 import type { Vec3 } from '../protocol';
+import { triangleArea } from '../worker/triangle-area';
 import type { Distances } from './protocol';
 
 /** Number of voxels along the longest side of the grid in which the Dice coefficient of two meshes is computed. */
@@ -36,16 +37,13 @@ export function summary(values: Float32Array, weights: Float64Array): Distances 
   return { mean: mean / total, rms: Math.sqrt(square / total), p95: p95 ?? max, max };
 }
 
-/** Returns the area around each vertex, times six: that of all its triangles. */
+/** Returns the area around each vertex, times three: that of all its triangles. */
 function weightsOf(mesh: Mesh): Float64Array {
   const { positions, indices } = mesh.arrays();
   const weights = new Float64Array(positions.length / 3);
   for (let at = 0; at < indices.length; at += 3) {
-    const corners = [0, 1, 2].map((k) => indices[at + k] ?? 0) as Vec3;
-    const [p, q, r] = corners.map((v) => [...positions.subarray(3 * v, 3 * v + 3)]) as [Vec3, Vec3, Vec3];
-    const [a, b] = [q, r].map((end) => end.map((x, axis) => x - (p[axis] ?? 0))) as [Vec3, Vec3];
-    const area = Math.hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
-    for (const v of corners) weights[v] = (weights[v] ?? 0) + area;
+    const area = triangleArea(positions, indices, at);
+    for (const v of indices.subarray(at, at + 3)) weights[v] = (weights[v] ?? 0) + area;
   }
   return weights;
 }

@@ -18,7 +18,6 @@ import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ENERGY_PLOTS, Plots } from '../ui/plots';
 import { PyramidPanel } from '../ui/pyramid';
-import { SessionControls } from '../ui/session';
 import { StartControls } from '../ui/start';
 import { TimeTable } from '../ui/times';
 import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../ui/view-options';
@@ -63,7 +62,6 @@ export class ExtractParts extends RunParts<Example> {
   readonly options: OptionControls<ViewOptions>;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
-  readonly session: SessionControls;
   readonly #figure: FigurePanel<Variant, Preset>;
   readonly #sculpt: HTMLButtonElement;
   readonly #plots: Plots;
@@ -120,7 +118,6 @@ export class ExtractParts extends RunParts<Example> {
       onMark: (parts) => this.stage.showUncovered(parts),
     });
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
-    this.session = new SessionControls(events);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
     this.layOut({
@@ -139,7 +136,7 @@ export class ExtractParts extends RunParts<Example> {
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
-        this.saveSection(this.stage.subject, this.exports.element, this.#sculpt, this.session.element),
+        this.saveSection(this.stage.subject, this.#sculpt),
         ...this.finishSections(this.stage.editing, this.measures),
         section(text('labs.sectionProgress'), this.#plots.element, this.csv),
         section(text('extract.sectionEvents'), this.#log.element),
@@ -214,7 +211,6 @@ export class ExtractParts extends RunParts<Example> {
   showState(state: LabState, beneath: LabState, ready: boolean): void {
     const idle = this.showRunState(state, beneath, ready);
     this.#sculpt.disabled = !idle;
-    this.session.enabled = idle;
     this.compare.enabled = idle;
     this.coverage.enabled = idle;
   }

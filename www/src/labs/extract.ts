@@ -197,7 +197,7 @@ export class ExtractLab extends RunLab<Example> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (this.isTaken(event)) return;
+    if (this.takes(event)) return;
     if (event.event === 'comparing') this.ui.compare.showProgress(event);
     else if (event.event === 'data') this.ui.large.showProgress(event);
     else if (event.event === 'covering') this.ui.coverage.showProgress(event);

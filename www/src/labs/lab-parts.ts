@@ -11,6 +11,7 @@ import type { History } from '../ui/history';
 import type { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { PicturePanel, type PictureSubject } from '../ui/pictures';
+import { SessionControls, type SessionEvents } from '../ui/session';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import type { ExamplePanel, Listed } from './example-panel';
@@ -24,13 +25,11 @@ export interface LabEvents<Example> {
   onCancel: () => void;
   onDismiss: () => void;
   onCopyLink: () => void;
-  /** Saves the session; `included`: with its data. */
-  onSaveSession: (included: boolean) => void;
   onError: (title: string, error: unknown) => void;
 }
 
 /** The user's actions in a lab whose model runs. */
-export interface RunEvents<Example> extends LabEvents<Example>, TransportEvents {}
+export interface RunEvents<Example> extends LabEvents<Example>, TransportEvents, SessionEvents {}
 
 /** Contents that differ between the labs. */
 interface PartsOptions<Example extends Listed> {
@@ -198,6 +197,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   readonly transport: Transport;
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
+  protected readonly session: SessionControls;
   protected readonly history: History;
   readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
   finish: Finish | undefined;
@@ -212,6 +212,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     this.history = history;
     this.#fetchMesh = fetchMesh;
     this.transport = new Transport(events);
+    this.session = new SessionControls(events);
     this.onRun = events.onToggle;
     this.exports = new ExportButtons((format, type) => {
       this.surfaceFile(format)
@@ -239,6 +240,10 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     return this.finish?.exported(format) ?? this.#fetchMesh(format);
   }
 
+  protected override saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
+    return super.saveSection(subject, this.exports.element, ...elements, this.session.element);
+  }
+
   /**
    * Creates the sections that edit the surface after a run and compare it with a reference. `onOpen` is called before
    * the surface is taken.
@@ -260,6 +265,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     const idle = this.showLoading(state, ready);
     this.transport.showState(beneath, ready);
     this.exports.enabled = idle;
+    this.session.enabled = idle;
     if (!idle || state === 'running') this.finish?.reset();
     if (this.finish) this.finish.enabled = idle && state !== 'running' && hasSurface;
     return idle;

@@ -121,7 +121,6 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
-      onSaveSession: (included) => void this.#sessions?.save(included),
       onError: (title, error) => this.states.fail(title, error),
     };
   }
@@ -135,6 +134,10 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Shows an error message if a request fails, without waiting for the reply. */
   protected ask(request: Promise<unknown>, title = text('labs.requestFailed')): void {
     request.catch((error) => this.states.fail(title, error));
+  }
+
+  protected async saveSession(included: boolean): Promise<void> {
+    await this.#sessions?.save(included);
   }
 
   /** Waits no longer for the data of a session, since the user does something else. */
@@ -203,6 +206,7 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       onReset: () => void this.#reset(),
       onUndo: () => this.#travel('undo'),
       onRedo: () => this.#travel('redo'),
+      onSaveSession: (included) => void this.saveSession(included),
     };
   }
 
@@ -211,7 +215,7 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
   }
 
   /** Takes the events that the workers of all labs send; returns whether this was one of them. */
-  protected isTaken(event: { event: string }): event is EngineEvent {
+  protected takes(event: { event: string }): event is EngineEvent {
     const sent = event as EngineEvent;
     if (sent.event === 'failure') this.states.fail(text('labs.runFailed'), new RequestError(sent.failure));
     else if (sent.event !== 'state') return false;

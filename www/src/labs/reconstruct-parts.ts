@@ -16,7 +16,6 @@ import { MeasurePanel } from '../ui/measures';
 import { PhaseList } from '../ui/phases';
 import { PhotoStrip } from '../ui/photo-strip';
 import { Plots } from '../ui/plots';
-import { SessionControls } from '../ui/session';
 import { TimingPanel } from '../ui/timing';
 import { type CloudViewOptions, type Hit, ReconstructionView } from '../view/reconstruction';
 import { type RunEvents, RunParts } from './lab-parts';
@@ -61,7 +60,6 @@ export class ReconstructParts extends RunParts<CloudExample> {
   readonly #events: PartEvents;
   readonly #figure: FigurePanel<CloudVariant, CloudPreset>;
   readonly #kernel = new KernelPlot();
-  readonly #session: SessionControls;
   /** Buttons that need a complete surface. */
   readonly #uses: HTMLButtonElement[];
   #photographs: readonly Photograph[] = [];
@@ -87,7 +85,6 @@ export class ReconstructParts extends RunParts<CloudExample> {
     });
     this.photos = new PhotoStrip((index) => this.#lookThrough(index));
     this.view.onLeave = () => this.photos.choose(undefined);
-    this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.#uses = [
       wideButton(text('reconstruct.saveVolume'), 'volume', events.onSaveVolume),
       wideButton(text('reconstruct.openInExtract'), 'extract', events.onPassOn),
@@ -107,7 +104,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
       results: [
         section(text('labs.sectionProgress'), this.phases.element),
         section(text('labs.sectionSurface'), this.measures.element),
-        this.saveSection(this.view.subject, this.exports.element, ...this.#uses, this.#session.element),
+        this.saveSection(this.view.subject, ...this.#uses),
         ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
         folded(text('reconstruct.sectionTiming'), this.timing.element),
@@ -149,7 +146,6 @@ export class ReconstructParts extends RunParts<CloudExample> {
   showState(state: LabState, beneath: LabState, ready: boolean, surface: boolean): void {
     const idle = this.showRunState(state, beneath, ready, surface);
     this.timing.enabled = idle;
-    this.#session.enabled = idle;
     this.exports.enabled = surface;
     for (const button of this.#uses) button.disabled = !surface;
   }

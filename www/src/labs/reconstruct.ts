@@ -180,7 +180,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (!this.isTaken(event)) this.#results.take(event);
+    if (!this.takes(event)) this.#results.take(event);
   }
 
   protected settled(state: LabState): void {

@@ -14,7 +14,6 @@ import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
 import { Plots } from '../ui/plots';
 import { SculptOptionControls } from '../ui/sculpt-options';
-import { SessionControls } from '../ui/session';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
 import { DragLatency } from './drag-latency';
@@ -41,7 +40,6 @@ export class SculptParts extends RunParts<SculptExample> {
   readonly options: SculptOptionControls;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
-  readonly #session: SessionControls;
   readonly plots: Plots;
   readonly #onError: PartEvents['onError'];
   readonly #figure: FigurePanel<SculptVariant, SculptPreset>;
@@ -63,7 +61,6 @@ export class SculptParts extends RunParts<SculptExample> {
     this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
     this.ellipsoids = new EllipsoidControls(events);
     this.film = new FilmControls(events);
-    this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.plots = new Plots(history, SCULPT_PLOTS, true);
     this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -83,7 +80,7 @@ export class SculptParts extends RunParts<SculptExample> {
       ],
       results: [
         section(text('labs.sectionSurface'), this.measures.element),
-        this.saveSection(this.view.subject, this.exports.element, this.#session.element),
+        this.saveSection(this.view.subject),
         ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
       ],
@@ -134,7 +131,7 @@ export class SculptParts extends RunParts<SculptExample> {
   showState(state: LabState, beneath: LabState, ready: boolean, canPlay: boolean): void {
     const idle = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
     // Saving pauses a run, which would then not go on to the same pose.
-    this.#session.enabled = idle && beneath !== 'running';
+    this.session.enabled = idle && beneath !== 'running';
   }
 
   override dispose(): void {

@@ -219,7 +219,7 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (this.isTaken(event)) return;
+    if (this.takes(event)) return;
     if (event.event === 'recorded') this.ui.film.showRecording(event.progress);
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);

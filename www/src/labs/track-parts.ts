@@ -16,7 +16,6 @@ import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
 import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
-import { SessionControls } from '../ui/session';
 import { TrackComparePanel } from '../ui/track-compare';
 import { TRACK_OPTIONS } from '../ui/track-options';
 import { OptionControls } from '../ui/view-options';
@@ -64,7 +63,6 @@ export class TrackParts extends RunParts<TrackExample> {
   readonly #figure: FigurePanel<TrackVariant, TrackPreset>;
   readonly #saves: HTMLButtonElement[];
   readonly #sculpt: HTMLButtonElement;
-  readonly #session: SessionControls;
   readonly #thresholdHolder = h('div');
   #threshold: EdgeThreshold | undefined;
   /**
@@ -99,7 +97,6 @@ export class TrackParts extends RunParts<TrackExample> {
       wideButton(text('track.saveAnimation'), 'save-animation', () => events.onSave('animation')),
       wideButton(text('track.saveTable'), 'save-table', () => events.onSave('table')),
     ];
-    this.#session = new SessionControls({ onSaveSession: events.onSaveSession });
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.options = new OptionControls(TRACK_OPTIONS, INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -127,7 +124,7 @@ export class TrackParts extends RunParts<TrackExample> {
       results: [
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
         section(text('track.sectionSurface'), this.measures.element),
-        this.saveSection(this.view.subject, this.exports.element, ...this.#saves, this.#sculpt, this.#session.element),
+        this.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
         ...this.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
@@ -183,7 +180,6 @@ export class TrackParts extends RunParts<TrackExample> {
     const idle = this.showRunState(state, beneath, ready, here);
     this.exports.enabled = idle && here;
     this.#sculpt.disabled = !idle || !here;
-    this.#session.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }

@@ -237,7 +237,7 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (this.isTaken(event)) return;
+    if (this.takes(event)) return;
     if (event.event === 'preparing') this.ui.status.say(event.what);
     else if (event.event === 'comparing') this.ui.compare.showProgress(event.part, event.phase);
     else {

@@ -28,7 +28,7 @@ markdown.renderer.rules.link_open = (tokens, index, options, _, renderer) => {
   return renderer.renderToken(tokens, index, options);
 };
 
-/** Fills an element with a text in Markdown; a formula that cannot be read is shown as it is written. */
+/** Renders Markdown into an element; invalid formulas are shown as their source. */
 export function renderMarkdown(source: string, element: HTMLElement): void {
   element.innerHTML = markdown.render(source);
   for (const span of element.querySelectorAll<HTMLElement>('[data-formula]')) {

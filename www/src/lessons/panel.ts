@@ -3,7 +3,7 @@ import './lessons.css';
 import { LESSON_GUIDE } from '../guides';
 import { LANGUAGE, plural, text, textNodes } from '../texts';
 import { h, uniqueId } from '../ui/dom';
-import { fileChooser } from '../ui/files';
+import { acceptDropsOn, fileChooser } from '../ui/files';
 import { type Lesson, parseLesson } from './lesson';
 import { LessonView } from './lesson-view';
 import { completeSteps, loadProgress } from './progress';
@@ -12,7 +12,6 @@ import { prose } from './step';
 
 /** Shows the list of lessons, and the open one, in `root`; its conditions are tested against the lab in `lab`. */
 export class LessonPanel {
-  readonly #root: HTMLElement;
   readonly #lab: HTMLElement;
   readonly #body = h('div', { class: 'lesson-body' });
   readonly #title = h('h2', { tabindex: -1 });
@@ -21,12 +20,11 @@ export class LessonPanel {
   #view: LessonView | undefined;
 
   constructor(root: HTMLElement, lab: HTMLElement, onHide: () => void) {
-    this.#root = root;
     this.#lab = lab;
     const hide = h('button', { type: 'button', class: 'quiet', onclick: onHide }, text('lessons.hide'));
     root.replaceChildren(h('div', { class: 'lesson-head' }, this.#back, hide), this.#title, this.#error, this.#body);
     root.setAttribute('aria-label', text('lessons.title'));
-    this.#acceptFiles();
+    acceptDropsOn(root, (data) => void filesIn(data).then((files) => this.#openFiles(files)));
   }
 
   /** Opens the lesson at an address, as in the page's own address; `files` for one that was opened from files. */
@@ -125,18 +123,6 @@ export class LessonPanel {
         message: error instanceof Error ? error.message : String(error),
       });
     }
-  }
-
-  /** Accepts files dropped on the panel, which are lessons; those dropped elsewhere are the lab's. */
-  #acceptFiles(): void {
-    for (const type of ['dragover', 'drop'] as const)
-      this.#root.addEventListener(type, (event) => {
-        event.preventDefault();
-        event.stopPropagation();
-        // The lab ends its own offer to accept the files.
-        window.dispatchEvent(new DragEvent('dragleave'));
-        if (type === 'drop') void filesIn(event.dataTransfer).then((files) => this.#openFiles(files));
-      });
   }
 }
 

@@ -1,5 +1,6 @@
 /** Where lessons come from: the app's own, an address, or files of the user. */
 import { text } from '../texts';
+import { readFolders } from '../ui/folders';
 import { filesOf, type LessonFiles } from './lesson';
 
 /** Most bytes of a lesson's archive or file; a larger one is no lesson. */
@@ -43,12 +44,8 @@ export async function readLessonFiles(files: File[]): Promise<LessonFiles> {
 /** Returns the files of a drop, or those in a folder that was dropped; may be called during the event only. */
 export async function filesIn(data: DataTransfer | null): Promise<File[]> {
   const files = [...(data?.files ?? [])];
-  const entries = [...(data?.items ?? [])].map((item) => item.webkitGetAsEntry());
-  const folder = entries.find((entry) => entry?.isDirectory) as FileSystemDirectoryEntry | undefined;
-  if (!folder) return files;
-  const content = await new Promise<FileSystemEntry[]>((...settle) => folder.createReader().readEntries(...settle));
-  const inside = content.filter((entry) => entry.isFile) as FileSystemFileEntry[];
-  return Promise.all(inside.map((entry) => new Promise<File>((...settle) => entry.file(...settle))));
+  const dropped = await readFolders(data, false);
+  return dropped && 'files' in dropped ? dropped.files : files;
 }
 
 const isLessonFile = (name: string) => /(^|\/)(lesson\.json|text\.[\w-]+\.md)$/.test(name);

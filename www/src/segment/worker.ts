@@ -6,6 +6,7 @@ import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
+import { triangleArea } from '../worker/triangle-area';
 import { viewOf } from '../worker/volumes';
 import type {
   LabelArray,
@@ -214,14 +215,8 @@ function arraysOf({ surfaces }: SurfaceUpdate): ArrayBufferView[] {
 }
 
 function areaOf({ positions, indices, triangles }: Surface): number {
-  const at = (corner: number, axis: number) => positions[3 * (indices[corner] ?? 0) + axis] ?? 0;
   let area = 0;
-  for (let corner = 0; corner < 3 * triangles; corner += 3) {
-    const side = (end: number, axis: number) => at(corner + end, axis) - at(corner, axis);
-    const [ax, ay, az] = [side(1, 0), side(1, 1), side(1, 2)];
-    const [bx, by, bz] = [side(2, 0), side(2, 1), side(2, 2)];
-    area += Math.hypot(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx) / 2;
-  }
+  for (let at = 0; at < 3 * triangles; at += 3) area += triangleArea(positions, indices, at);
   return area;
 }
 

@@ -44,7 +44,7 @@ export function packMoments<M extends Moment>({ now, undo, redo }: Moments<M>): 
   return { ...pack(now), undo: labelled(undo), redo: labelled(redo), reports: reports.lists };
 }
 
-/** Returns the last entries of a list that have together at most so many bytes. */
+/** Returns the last entries of a list whose total size is at most `most` bytes. */
 function newest<M>(list: Labelled<M>[], most: number): Labelled<M>[] {
   let [first, size] = [list.length, 0];
   while (first > 0 && size + (list[first - 1]?.bytes ?? 0) <= most) size += list[--first]?.bytes ?? 0;

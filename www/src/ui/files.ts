@@ -81,6 +81,21 @@ export function acceptDrops(
   );
 }
 
+/**
+ * Passes what is dropped on an element to `onDrop`, before the page opens it as data of the lab. `onDrop` has to read it
+ * during the event.
+ */
+export function acceptDropsOn(element: HTMLElement, onDrop: (data: DataTransfer | null) => void): void {
+  for (const type of ['dragover', 'drop'] as const)
+    element.addEventListener(type, (event) => {
+      event.preventDefault();
+      event.stopPropagation();
+      // Hides what the page shows while files are dragged.
+      window.dispatchEvent(new DragEvent('dragleave'));
+      if (type === 'drop') onDrop(event.dataTransfer);
+    });
+}
+
 /** Returns the files to open; all if some cannot be read, of which opening them then says why. */
 const largestSeriesOrAll = (files: File[]) => largestSeries(files).catch(() => files);
 

@@ -17,8 +17,8 @@ export function figure(value: number): string {
 const UNITS = ['m', 'mm', 'µm', 'nm'];
 
 /**
- * Formats lengths, areas (power 2) or volumes (power 3) with their unit, as "0.5 × 0.5 × 2 µm". Values of which the
- * smallest would need a power of ten are converted to a smaller unit; a unit that is none of length stays.
+ * Formats lengths, areas (power 2) or volumes (power 3) with their unit, as "0.5 × 0.5 × 2 µm". If the smallest
+ * value would need a power of ten, all are converted to a smaller unit; units other than those of length are kept.
  */
 export function lengths(values: readonly number[], unit: string, power: 1 | 2 | 3 = 1): string {
   const raised = ['', '²', '³'][power - 1] ?? '';
