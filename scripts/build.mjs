@@ -3,7 +3,7 @@
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
-import { join } from 'node:path';
+import { dirname, join } from 'node:path';
 import { makeElement } from './element.mjs';
 import { METHODS, makeEntries, PARTS } from './entries.mjs';
 import { makeInline } from './inline.mjs';
@@ -16,28 +16,22 @@ const WHOLE = { target: 'target', name: 'vesicle_bg' };
 
 /** The whole library for engines without vector instructions. */
 const PLAIN = {
-  ...{ target: 'target/methods', name: 'vesicle_plain_bg' },
+  ...{ target: 'target/plain', name: 'vesicle_plain_bg' },
   // After what .cargo/config.toml says of the target: the last word counts.
   env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
 
 /** The library with one method, without the readers of files. */
-const only = (method, target) => ({
-  ...{ target, name: `${method}/vesicle_bg` },
+const only = (method) => ({
+  ...{ target: 'target', name: `${method}/vesicle_bg` },
   // Few slices are what makes sequences hard to track.
   features: [method, ...(method === 'tracking' ? ['enrich'] : [])],
 });
 
 /** The readers of files alone, which have glue of another name, since they have other classes. */
-const READERS = { target: 'target/methods', name: 'import/vesicle_bg', features: ['import'], glue: 'files' };
+const READERS = { target: 'target', name: 'import/vesicle_bg', features: ['import'], glue: 'files' };
 
-/** Modules by lane; the lanes are compiled in parallel, since each module is linked by one thread. */
-const LANES = [
-  [WHOLE, ...METHODS.slice(0, 2).map((method) => only(method, 'target'))],
-  [PLAIN, ...METHODS.slice(2).map((method) => only(method, 'target/methods')), READERS],
-];
-
-const MODULES = LANES.flat();
+const MODULES = [WHOLE, PLAIN, ...METHODS.map(only), READERS];
 
 /** Folder of a module's glue, and of the module as the glue needs it. */
 const folder = ({ name }) => at('target/modules', name);
@@ -55,20 +49,31 @@ const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 /** Packages that an entry point imports when it is used. */
 const OPTIONAL_PEERS = ['zarrita', '@zarrita/storage'];
 
-async function compile({ target, features, env }) {
-  const args = [
-    'rustc',
-    '--locked',
-    '--release',
-    '--lib',
-    '--crate-type',
-    'cdylib',
-    '--target',
-    'wasm32-unknown-unknown',
-  ];
+/**
+ * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same
+ * features of its own.
+ */
+async function compile(module) {
+  const { target, features, env } = module;
+  const args = ['build', '--locked', '-p', 'vesicle-bindings', '--release'];
   const selected = features ? ['--no-default-features', '--features', features.join()] : [];
-  await must('cargo', [...args, ...selected, '--target-dir', at(target)], { env });
-  return at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
+  await must('cargo', [...args, '--target', 'wasm32-unknown-unknown', ...selected, '--target-dir', at(target)], {
+    env,
+  });
+  // The next module of the directory replaces it.
+  const compiled = at('target/modules', `${module.name.replace('/', '-')}.wasm`);
+  await mkdir(dirname(compiled), { recursive: true });
+  await copyFile(at(target, 'wasm32-unknown-unknown/release/vesicle_bindings.wasm'), compiled);
+  return compiled;
+}
+
+/** The last module of each target directory, whose modules are compiled one after the other. */
+const turns = new Map();
+
+function compileInTurn(module) {
+  const compiled = (turns.get(module.target) ?? Promise.resolve()).then(() => compile(module));
+  turns.set(module.target, compiled);
+  return compiled;
 }
 
 /** Files and folders that a module depends on. */
@@ -92,14 +97,11 @@ async function sourceHash() {
   return hash.digest('hex');
 }
 
-/**
- * Compiles a module, and makes its glue, unless that was done from the same `sources`: cargo itself would compile every
- * module again, since those of one target directory replace each other.
- */
+/** Compiles a module, and makes its glue, unless that was done from the same `sources`. */
 async function make(module, sources) {
   const stampFile = join(folder(module), 'stamp');
   if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === sources) return;
-  const compiled = await compile(module);
+  const compiled = await compileInTurn(module);
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
@@ -189,15 +191,11 @@ async function manifest() {
   };
 }
 
-async function inTurn(modules, sources) {
-  for (const module of modules) await make(module, sources);
-}
-
 /** The whole package; fast where nothing changed. */
 export async function build() {
   const started = performance.now();
   const sources = await sourceHash();
-  await Promise.all(LANES.map((modules) => inTurn(modules, sources)));
+  await Promise.all(MODULES.map((module) => make(module, sources)));
   await compareGlue();
   await assemble();
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;

@@ -1,7 +1,7 @@
 """Prints the errors of screened Poisson surface reconstruction, given the true normals, on known shapes.
 
     pip install pymeshlab==2025.7.post1 numpy==2.4.6
-    cargo test --release --test core implicit_accuracy -- --ignored
+    cargo test --release --lib implicit_accuracy -- --ignored
     python scripts/poisson_reference.py target/tmp/accuracy
 
 The second command writes the points as <shape>-<noise>-<seed>.xyz, with the outward normals at their positions before noise

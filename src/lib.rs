@@ -4,28 +4,8 @@
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
 //! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial.
 //!
-//! Each method is a Cargo feature, so that a WebAssembly module can have one of them; `import` adds the readers of
-//! files to the bindings, `enrich` the interpolation of slices, `labels` label maps, the writers of volume files,
-//! voxelisation, and smoothing and transforms of meshes, `sparse` volumes larger than memory. All are on by default.
-
-#![cfg_attr(
-    not(all(
-        feature = "deformable",
-        feature = "implicit",
-        feature = "tracking",
-        feature = "multires",
-        feature = "import",
-        feature = "enrich",
-        feature = "labels",
-        feature = "sparse"
-    )),
-    allow(
-        dead_code,
-        unused_macros,
-        unused_imports,
-        reason = "what some methods share is unused without them"
-    )
-)]
+//! The JavaScript bindings are a crate of their own, `src/bindings`, with a Cargo feature for each method, so that a
+//! WebAssembly module can have one of them.
 
 pub mod io;
 pub mod math;
@@ -36,5 +16,10 @@ pub mod spatial;
 pub mod volume;
 pub mod voxelise;
 
-#[cfg(target_arch = "wasm32")]
-pub mod bindings;
+// The tests in `tests/core` use the library by its name, as others do, but are of one program with those beside the code:
+// two would be compiled with the library twice.
+#[cfg(test)]
+extern crate self as vesicle;
+#[cfg(test)]
+#[path = "../tests/core/main.rs"]
+mod core_tests;

@@ -4,7 +4,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::mesh::RawMesh;
-use crate::io::AnimationWriter;
+use vesicle::io::AnimationWriter;
 
 /// The raw handle with which `animationGlb` builds an animated GLB file, one frame at a time.
 #[wasm_bindgen]

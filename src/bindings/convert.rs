@@ -8,9 +8,9 @@ use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
-use crate::math::{DAffine3, DVec3, Vec2, Vec3};
-use crate::methods::{ParamInput, ParamSpec, Parameters};
-use crate::volume::{LengthUnit, Space};
+use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};
+use vesicle::methods::{ParamInput, ParamSpec, Parameters};
+use vesicle::volume::{LengthUnit, Space};
 
 #[wasm_bindgen]
 extern "C" {

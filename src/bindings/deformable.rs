@@ -12,8 +12,8 @@ use super::error::Failure;
 use super::mesh::RawMesh;
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
-use crate::math::DVec3;
-use crate::methods::deformable::{
+use vesicle::math::DVec3;
+use vesicle::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
 

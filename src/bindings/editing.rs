@@ -7,8 +7,8 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::point;
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
-use crate::remesh::{Plane, cut_by_plane};
-use crate::spatial::outer_components;
+use vesicle::remesh::{Plane, cut_by_plane};
+use vesicle::spatial::outer_components;
 
 #[wasm_bindgen]
 impl RawMesh {

@@ -4,7 +4,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::volume::RawVolume;
-use crate::volume::Enrichment;
+use vesicle::volume::Enrichment;
 
 #[wasm_bindgen]
 impl RawVolume {

@@ -4,12 +4,12 @@
 use js_sys::{Object, Reflect};
 use wasm_bindgen::prelude::JsValue;
 
-use crate::io::FormatError;
-use crate::mesh::MeshError;
-use crate::methods::MethodError;
-use crate::volume::VolumeError;
+use vesicle::io::FormatError;
+use vesicle::mesh::MeshError;
+use vesicle::methods::MethodError;
+use vesicle::volume::VolumeError;
 #[cfg(feature = "labels")]
-use crate::voxelise::VoxeliseError;
+use vesicle::voxelise::VoxeliseError;
 
 /// An error with the code and message that JavaScript receives.
 #[derive(Debug)]

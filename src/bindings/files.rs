@@ -8,8 +8,8 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{columns, flat, packed, space_name, unit_name};
 use super::readers::{read_mesh, read_volume};
 use super::texture::RawTexture;
-use crate::mesh::TriangleMesh;
-use crate::volume::{Volume, Voxels};
+use vesicle::mesh::TriangleMesh;
+use vesicle::volume::{Volume, Voxels};
 
 /// The content of a volume file.
 #[wasm_bindgen]

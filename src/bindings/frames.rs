@@ -4,7 +4,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::volume::RawVolume;
-use crate::volume::Volume;
+use vesicle::volume::Volume;
 
 /// The raw handle of a list of volumes to be joined into one 4D volume.
 #[wasm_bindgen]

@@ -12,8 +12,10 @@ use super::error::Failure;
 use super::mesh::{RawMesh, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
-use crate::math::Vec3;
-use crate::methods::implicit::{Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits};
+use vesicle::math::Vec3;
+use vesicle::methods::implicit::{
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
+};
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
 #[wasm_bindgen]

@@ -11,9 +11,9 @@ use super::labels::region;
 use super::mesh::RawMesh;
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
-use crate::mesh::TriangleMesh;
-use crate::methods::LiveSurface;
-use crate::methods::label_surfaces::{LabelParams, LabelSurfaces};
+use vesicle::mesh::TriangleMesh;
+use vesicle::methods::LiveSurface;
+use vesicle::methods::label_surfaces::{LabelParams, LabelSurfaces};
 
 /// The raw handle of the TypeScript class `LabelSurfaces`, which shares the surfaces with their live meshes.
 #[wasm_bindgen]

@@ -7,8 +7,8 @@ use super::convert::point;
 use super::deformable::RawDeformable;
 use super::error::Failure;
 use super::volume::{RawVolume, voxels};
-use crate::io::{Compression, VolumeFormat, write_volume};
-use crate::volume::{Interpolation, Region, ResampleGrid};
+use vesicle::io::{Compression, VolumeFormat, write_volume};
+use vesicle::volume::{Interpolation, Region, ResampleGrid};
 
 #[wasm_bindgen]
 impl RawVolume {

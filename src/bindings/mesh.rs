@@ -11,15 +11,17 @@ use super::convert::{coordinates, corner_coordinates, flat, packed, point, point
 use super::error::Failure;
 use super::texture::RawTexture;
 use super::volume::RawVolume;
-use crate::io::{MeshFormat, write_mesh};
-use crate::math::{DVec3, Vec3};
-use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report};
-use crate::methods::LiveSurface;
-use crate::remesh::{
+use vesicle::io::{MeshFormat, write_mesh};
+use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::{
+    Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report,
+};
+use vesicle::methods::LiveSurface;
+use vesicle::remesh::{
     Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
 };
-use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
-use crate::volume::marching_cubes_world;
+use vesicle::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
+use vesicle::volume::marching_cubes_world;
 
 /// The content of a JavaScript `Mesh`.
 pub(super) enum MeshKind {
@@ -197,7 +199,7 @@ impl RawMesh {
     /// longer than `max` (1), flips (2); both bounds are in world units. Returns the number of edits; see
     /// [`restructure`].
     ///
-    /// [`restructure`]: crate::remesh::restructure
+    /// [`restructure`]: vesicle::remesh::restructure
     pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
         let bounds = EdgeBounds { min: min as f32, max: max as f32 };
         let mesh = self.editable()?;

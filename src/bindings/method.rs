@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::JsValue;
 
 use super::convert::{bytes, now, to_js, with_overrides};
 use super::error::Failure;
-use crate::methods::{Method, MethodError, Parameters};
+use vesicle::methods::{Method, MethodError, Parameters};
 
 /// Returns a new model with a clock for its reports, shared between its raw handle and the live meshes of its surfaces.
 pub fn shared<M: Method>(model: Result<M, MethodError>) -> Result<Rc<RefCell<M>>, Failure> {
@@ -58,19 +58,19 @@ macro_rules! method_bindings {
             /// step, with the events of all these steps. If bricks of a sparse volume are missing for the first one, nothing
             /// changes, and an object with the boxes it `needs` is returned.
             pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-                Ok($crate::bindings::method::step(&self.0, iterations)?)
+                Ok($crate::method::step(&self.0, iterations)?)
             }
 
             /// Returns the current values of all parameters of the model, as a plain object.
             pub fn params(&self) -> Result<JsValue, JsValue> {
-                Ok($crate::bindings::method::params(&self.0)?)
+                Ok($crate::method::params(&self.0)?)
             }
 
             /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are
             /// validated together before any is changed.
             #[wasm_bindgen(js_name = setParams)]
             pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-                Ok($crate::bindings::method::set_params(&self.0, params)?)
+                Ok($crate::method::set_params(&self.0, params)?)
             }
 
             /// Returns the state of the run as bytes, without the input that the model was made of, from which
@@ -82,14 +82,14 @@ macro_rules! method_bindings {
             /// Replaces the run by one that `save` returned, if this model was made of the same input, else fails; the
             /// run then continues with the same results, bit for bit.
             pub fn restore(&self, state: &js_sys::Uint8Array) -> Result<(), JsValue> {
-                Ok($crate::bindings::method::restore(&self.0, state)?)
+                Ok($crate::method::restore(&self.0, state)?)
             }
         }
 
         /// Returns the descriptions of the method's parameters, from which user interfaces build their controls.
         #[wasm_bindgen(js_name = $specs)]
         pub fn param_specs() -> Result<JsValue, JsValue> {
-            Ok($crate::bindings::method::param_specs::<$Model>()?)
+            Ok($crate::method::param_specs::<$Model>()?)
         }
     };
 }

@@ -3,6 +3,21 @@
 //! These exports are private to the npm package. Its public classes are the TypeScript ones in `js/`, which hold these
 //! as raw handles and check all arguments first.
 
+#![cfg(target_arch = "wasm32")]
+#![cfg_attr(
+    not(all(
+        feature = "deformable",
+        feature = "implicit",
+        feature = "tracking",
+        feature = "multires",
+        feature = "import",
+        feature = "enrich",
+        feature = "labels",
+        feature = "sparse"
+    )),
+    allow(dead_code, reason = "what some methods share is unused without them")
+)]
+
 // Only sequences and the strokes of a sculptor are saved as animations.
 #[cfg(any(feature = "tracking", feature = "multires"))]
 mod animation;

@@ -11,9 +11,9 @@ use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
-use crate::mesh::TriangleMesh;
-use crate::methods::LiveSurface;
-use crate::methods::multires::{ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel};
+use vesicle::mesh::TriangleMesh;
+use vesicle::methods::LiveSurface;
+use vesicle::methods::multires::{ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel};
 
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
 /// surfaces.

@@ -6,9 +6,9 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{bytes, packed};
 use super::error::Failure;
 use super::texture::RawTexture;
-use crate::io::{PointCloud, parse_mesh, parse_points, parse_textured_mesh, parse_volume};
-use crate::mesh::TriangleMesh;
-use crate::volume::Volume;
+use vesicle::io::{PointCloud, parse_mesh, parse_points, parse_textured_mesh, parse_volume};
+use vesicle::mesh::TriangleMesh;
+use vesicle::volume::Volume;
 
 /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of its
 /// own.

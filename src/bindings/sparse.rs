@@ -9,8 +9,8 @@ use super::deformable::{RawDeformable, RawStart};
 use super::error::Failure;
 use super::method::shared;
 use super::volume::{voxels, world};
-use crate::methods::deformable::{DeformableModel, DeformableParams, SparseOptions, WorldBox};
-use crate::volume::{BRICK, BrickBox, Region, SparseInit, SparseLevel, SparseVolume, Voxels};
+use vesicle::methods::deformable::{DeformableModel, DeformableParams, SparseOptions, WorldBox};
+use vesicle::volume::{BRICK, BrickBox, Region, SparseInit, SparseLevel, SparseVolume, Voxels};
 
 /// The raw handle of a multiscale volume of which only parts are loaded.
 #[wasm_bindgen]

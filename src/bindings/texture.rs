@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::bytes;
 use super::error::Failure;
-use crate::mesh::Texture;
+use vesicle::mesh::Texture;
 
 /// The texture of a mesh: an image file in memory.
 #[wasm_bindgen]

@@ -12,9 +12,9 @@ use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
-use crate::io::write_animation;
-use crate::math::DVec3;
-use crate::methods::tracking::{
+use vesicle::io::write_animation;
+use vesicle::math::DVec3;
+use vesicle::methods::tracking::{
     Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams,
 };
 

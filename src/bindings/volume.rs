@@ -8,9 +8,9 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{columns, copy_array, point, space_name, unit_named};
 use super::error::Failure;
-use crate::io::write_nifti;
-use crate::math::DAffine3;
-use crate::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::io::write_nifti;
+use vesicle::math::DAffine3;
+use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 
 /// The raw handle of the TypeScript class `Volume`: a 3D or 4D volume.
 #[wasm_bindgen]

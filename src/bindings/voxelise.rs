@@ -9,10 +9,10 @@ use super::convert::points;
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
 use super::volume::RawVolume;
-use crate::mesh::invertible_map;
-use crate::remesh::{Smoothing, smooth};
-use crate::spatial::contains;
-use crate::voxelise::{VoxelKind, voxelise};
+use vesicle::mesh::invertible_map;
+use vesicle::remesh::{Smoothing, smooth};
+use vesicle::spatial::contains;
+use vesicle::voxelise::{VoxelKind, voxelise};
 
 #[wasm_bindgen]
 impl RawMesh {

@@ -307,31 +307,26 @@ mod tests {
     }
 
     #[test]
-    #[cfg(feature = "deformable")]
     fn those_of_the_deformable_model_agree_with_their_descriptions() {
         check::<crate::methods::deformable::DeformableParams>();
     }
 
     #[test]
-    #[cfg(feature = "implicit")]
     fn those_of_the_implicit_surface_agree_with_their_descriptions() {
         check::<crate::methods::implicit::ImplicitParams>();
     }
 
     #[test]
-    #[cfg(feature = "tracking")]
     fn those_of_the_tracker_agree_with_their_descriptions() {
         check::<crate::methods::tracking::TrackingParams>();
     }
 
     #[test]
-    #[cfg(feature = "labels")]
     fn those_of_the_label_surfaces_agree_with_their_descriptions() {
         check::<crate::methods::label_surfaces::LabelParams>();
     }
 
     #[test]
-    #[cfg(feature = "multires")]
     fn those_of_the_multiresolution_model_agree_with_their_descriptions() {
         check::<crate::methods::multires::MultiresParams>();
     }

@@ -27,15 +27,22 @@ export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
 
 /**
  * Launches a browser, which the caller closes. It composes pages without WebGL: with WebGL in software, composing the
- * page would take longer than drawing the surface.
+ * page would take longer than drawing the surface. Nothing that is drawn is smoothed along its edges.
  */
-export const launch = () => launchChromium('--disable-gpu-compositing');
+export const launch = () => launchChromium('--disable-gpu-compositing', '--webgl-antialiasing-mode=none');
 
-/** Opens the built app in a browser of its own, at an address within the app. */
-export async function openApp(viewport = { width: 1280, height: 800 }, address = ''): Promise<App> {
+/**
+ * Opens the built app in a browser of its own, at an address within the app, with few pixels: drawing in software takes
+ * most of the time otherwise. Tests of what is drawn ask for as many as `viewport` has.
+ */
+export async function openApp(
+  viewport = { width: 1280, height: 800 },
+  address = '',
+  deviceScaleFactor = 0.5,
+): Promise<App> {
   const server = await serve(at('dist'), 0);
   const browser = await launch();
-  const context = await browser.newContext({ viewport });
+  const context = await browser.newContext({ viewport, deviceScaleFactor });
   // A busy machine with software rendering is slow, not wrong.
   context.setDefaultTimeout(PATIENCE);
   const complaints: string[] = [];

@@ -1,19 +1,21 @@
 // The live pages whose surfaces follow a label map, with their real hosts: drawn on with the mouse.
-import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, beforeEach, describe, expect, onTestFinished, test } from 'vitest';
 import { type App, openApp, overflow, reach } from './browser';
 import type { Hosted } from './hosts';
 import { difference, drawn } from './pixels';
 
+const SIZE = { width: 900, height: 720 };
+
 let app: App;
 beforeAll(async () => {
-  app = await openApp({ width: 900, height: 720 });
+  app = await openApp(SIZE);
 });
 afterAll(() => app.close());
 
 /** Opens a page; returns a function that fails if the page complains. */
 async function show(name: string): Promise<void> {
   app.complaints.length = 0;
-  await app.page.setViewportSize({ width: 900, height: 720 });
+  await app.page.setViewportSize(SIZE);
   await app.page.goto(`${app.address}embed/${name}.html`);
   await reach(app.page, 'done');
 }
@@ -165,6 +167,13 @@ describe('drawing in NiiVue', () => {
   });
 
   test('outlines in slices are whole and thin, and are removed with the surfaces', async () => {
+    const coarse = app;
+    app = await openApp(SIZE, '', 1);
+    onTestFinished(async () => {
+      await app.close();
+      app = coarse;
+    });
+    await show('draw');
     const { x, y, width, height } = await axial();
     const clip = {
       x: Math.ceil(x) + 1,

@@ -16,7 +16,7 @@ let app: App;
 
 beforeAll(async () => {
   await init();
-  app = await openApp({ width: 1280, height: 800 }, 'bench.html');
+  app = await openApp({ width: 1280, height: 800 }, 'bench.html', 1);
 });
 afterAll(() => app.close());
 afterEach(() => {

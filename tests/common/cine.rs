@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
-use crate::common::Random;
+use super::Random;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::TriangleMesh;
 use vesicle::volume::{Grid, Volume, VolumeInit, Voxels, marching_cubes};

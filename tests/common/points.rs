@@ -1,6 +1,6 @@
 //! Points on shapes with known signed distance functions.
 
-use crate::common::Random;
+use super::Random;
 use vesicle::math::{DVec3, Vec3};
 
 /// A solid as a function that is its signed distance near the surface, negative inside. All shapes fit a box of side 2.

@@ -126,7 +126,7 @@ pub fn head_phantom() -> Volume {
         (q / axes).length() * ((q / axes).length() - 1.0) / steepness
     };
     let to_hole = |q: Vec3, x: f32, y: f32, radius: f32| Vec3::new(q.x - x, q.y - y, 0.0).length() - radius;
-    let mut random = crate::common::Random(1);
+    let mut random = super::Random(1);
     let noise: Vec<f32> =
         (0..256 * 256 * 68).map(|_| (0..12).map(|_| random.unit()).sum::<f32>() - 6.0).collect();
     volume([256, 256, 68], |p| {

@@ -1,7 +1,7 @@
 //! Closed surfaces that are each difficult in one respect, and one with every attribute that a mesh file can hold.
 
-use crate::common::scenes::{chain, potential, volume};
-use crate::common::{Random, torus_around};
+use super::scenes::{chain, potential, volume};
+use super::{Random, torus_around};
 use vesicle::math::{Vec2, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh};
 use vesicle::volume::marching_cubes_world;

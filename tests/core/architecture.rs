@@ -5,8 +5,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The modules that each module may use besides itself. `lib.rs` documents the same order.
-const ALLOWED: [(&str, &[&str]); 9] = [
+/// The modules that each module may use besides itself. `lib.rs` documents the same order. The bindings are a crate of
+/// their own, which no module can use.
+const ALLOWED: [(&str, &[&str]); 8] = [
     ("math", &[]),
     ("mesh", &["math"]),
     ("spatial", &["math", "mesh"]),
@@ -15,7 +16,6 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("voxelise", &["math", "mesh", "spatial", "volume"]),
     ("remesh", &["math", "mesh", "spatial", "volume"]),
     ("methods", &["math", "mesh", "spatial", "volume", "remesh"]),
-    ("bindings", &["math", "mesh", "spatial", "volume", "remesh", "methods", "io", "voxelise"]),
 ];
 
 /// Returns the names that follow `prefix` anywhere in the code: `crate::a::b` and `crate::{a::b, c}` give a; a and c.
@@ -106,7 +106,7 @@ fn folders(path: &Path) -> Vec<String> {
 
 #[test]
 fn every_module_belongs_to_a_layer() {
-    for module in folders(&source("")) {
+    for module in folders(&source("")).into_iter().filter(|module| module != "bindings") {
         assert!(
             ALLOWED.iter().any(|(name, _)| *name == module),
             "src/{module} is in no layer: add it to ALLOWED"

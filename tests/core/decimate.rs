@@ -1,8 +1,8 @@
 //! Decimation: the target is reached, the topology is preserved, nothing intersects, and the shape changes little.
 
-use crate::common::scenes;
-use crate::common::shapes::HOSTILE_SCALES;
-use crate::common::{Random, euler_of_parts, torus_around};
+use super::common::scenes;
+use super::common::shapes::HOSTILE_SCALES;
+use super::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::decimate;

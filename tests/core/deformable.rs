@@ -1,8 +1,8 @@
 //! The deformable model on shapes with known surfaces, and its guarantees: a valid mesh at every iteration,
 //! reproducible bits, clear errors.
 
-use crate::common::euler_of_parts;
-use crate::common::scenes;
+use super::common::euler_of_parts;
+use super::common::scenes;
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
 use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
@@ -334,7 +334,7 @@ fn damaged_states_are_refused_and_change_nothing() {
         model.step().unwrap();
     }
     let state = model.save();
-    let mut random = crate::common::Random(1);
+    let mut random = super::common::Random(1);
     for length in [0, 4, 8, 9, 100, state.len() - 1] {
         assert!(matches!(model.restore(&state[..length]), Err(MethodError::BadState { .. })));
     }
@@ -520,7 +520,7 @@ fn a_start_mesh_turned_inside_out_is_refused() {
 #[test]
 fn a_cut_handle_is_removed_once() {
     let volume = ball([24, 24, 24], 7.0);
-    let torus = crate::common::torus_around(Vec3::splat(4.0), [8, 3], [1.3, 0.25]);
+    let torus = super::common::torus_around(Vec3::splat(4.0), [8, 3], [1.3, 0.25]);
     let mut start = Mesh::from_triangles(&torus).unwrap();
     start.append(&Mesh::icosphere(Vec3::splat(14.0), 5.0, 1.5).unwrap()).unwrap();
     let options = DeformableOptions { start: Start::Mesh(start.to_triangles()), ..Default::default() };

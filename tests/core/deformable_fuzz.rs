@@ -2,8 +2,8 @@
 //!
 //! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
-use crate::common::scenes;
-use crate::common::{Named, Random, assert_at_least, misplaced_parts, seeds};
+use super::common::scenes;
+use super::common::{Named, Random, assert_at_least, misplaced_parts, seeds};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use vesicle::math::{DVec3, Vec3};

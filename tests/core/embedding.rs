@@ -1,6 +1,6 @@
 //! Meshes that are moved and edited at random never intersect themselves.
 
-use crate::common::{Random, torus_around};
+use super::common::{Random, torus_around};
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_self_intersections};
 use vesicle::remesh::{Embedding, Resolver, Sampling};

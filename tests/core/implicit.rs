@@ -1,8 +1,8 @@
 //! The implicit surface on shapes with known distances, and its guarantees: a valid mesh, the same bits every time and
 //! after every restore, clear errors.
 
-use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
-use crate::common::{Random, euler_of_parts, fingerprint};
+use super::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use super::common::{Random, euler_of_parts, fingerprint};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{

@@ -12,8 +12,8 @@
 //! otherwise. Noise is the standard deviation along each axis. The ball, the torus and the pair fill a box of side 2;
 //! the blend's box is 1.8 wide, so that the same noise is relatively a tenth more.
 
-use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
-use crate::common::{Random, euler_of_parts};
+use super::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use super::common::{Random, euler_of_parts};
 use std::fmt::Write;
 use std::path::Path;
 use vesicle::mesh::{TriangleMesh, report};
@@ -159,7 +159,7 @@ fn with_twice_the_noise_tuned_parameters_are_as_accurate_as_poisson() {
 #[test]
 #[ignore = "writes files: what scripts/poisson_reference.py reads"]
 fn write_points() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("accuracy");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/tmp/accuracy");
     std::fs::create_dir_all(&folder).unwrap();
     for (known, noise, seed) in ALL.iter().flat_map(|known| {
         NOISES.iter().flat_map(move |noise| SEEDS.iter().map(move |seed| (known, noise, seed)))

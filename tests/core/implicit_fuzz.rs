@@ -2,8 +2,8 @@
 //!
 //! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
-use crate::common::points::{direction, normal};
-use crate::common::{Named, Random, assert_at_least, seeds};
+use super::common::points::{direction, normal};
+use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::MethodError;

@@ -1,7 +1,7 @@
 //! The deformable model on volumes of which only bricks are loaded.
 
-use crate::common::stores::{Store, branching};
-use crate::common::{Named, Random, euler_of_parts, fingerprint};
+use super::common::stores::{Store, branching};
+use super::common::{Named, Random, euler_of_parts, fingerprint};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{

@@ -1,4 +1,4 @@
-//! Tests of the core against known results, natively and in wasm. One binary, which is linked once.
+//! Tests of the core against known results, natively and in wasm, through its public interface. `src/lib.rs` includes them.
 
 #![allow(
     clippy::unwrap_used,

@@ -3,8 +3,8 @@
 //!
 //! A failing seed is printed. `FUZZ_SEEDS=<first>..<last>` runs other seeds.
 
-use crate::common::scenes;
-use crate::common::{Named, Random, assert_at_least, euler_of_parts, misplaced_parts, seeds};
+use super::common::scenes;
+use super::common::{Named, Random, assert_at_least, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
 use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Seeding, Start};

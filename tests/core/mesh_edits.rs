@@ -1,6 +1,6 @@
 //! Every edit and every refusal, and long seeded runs of random edits with all invariants checked after each.
 
-use crate::common::{Random, torus_around};
+use super::common::{Random, torus_around};
 use std::collections::BTreeSet;
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VectorKey, VertexId};

@@ -1,8 +1,8 @@
 //! Mesh files: real ones, hand-made ones of every kind, round trips, and broken ones.
 
-use crate::common::Random;
-use crate::common::files::glb;
-use crate::common::shapes::{octahedron, octahedron_with_seam};
+use super::common::Random;
+use super::common::files::glb;
+use super::common::shapes::{octahedron, octahedron_with_seam};
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, write_animation, write_mesh};
 use vesicle::math::{Vec2, Vec3};

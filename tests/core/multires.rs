@@ -1,7 +1,7 @@
 //! The multiresolution model on known cases: spheres, rigid motion, necks, contacts, and invalid input.
 
-use crate::common::fingerprint;
-use crate::common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
+use super::common::fingerprint;
+use super::common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, measure};
 use vesicle::methods::MethodError;

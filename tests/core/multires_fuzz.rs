@@ -3,8 +3,8 @@
 //!
 //! `FUZZ_SEEDS=<first>..<last>` runs other seeds; a failing seed is printed.
 
-use crate::common::skins::assert_sound;
-use crate::common::{Named, Random, assert_at_least, seeds};
+use super::common::skins::assert_sound;
+use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::Mesh;
 use vesicle::methods::MethodError;

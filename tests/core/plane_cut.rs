@@ -1,7 +1,7 @@
 //! Cuts by planes: what is left is closed, keeps its side, and nothing intersects.
 
-use crate::common::shapes::{all, joined};
-use crate::common::{Named, Random, assert_at_least, seeds, torus_around};
+use super::common::shapes::{all, joined};
+use super::common::{Named, Random, assert_at_least, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::{Plane, cut_by_plane};

@@ -1,8 +1,8 @@
 //! The deformable model after strokes of a brush on its volume: topology, coverage and validity after each.
 
-use crate::common::scenes;
-use crate::common::strokes::{ISO, Scene, Stroke, StrokeKind};
-use crate::common::{Named, Random, assert_at_least, euler_of_parts, seeds};
+use super::common::scenes;
+use super::common::strokes::{ISO, Scene, Stroke, StrokeKind};
+use super::common::{Named, Random, assert_at_least, euler_of_parts, seeds};
 use std::ops::Range;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::count_self_intersections;

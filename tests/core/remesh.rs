@@ -1,8 +1,8 @@
 //! Remeshing: even triangles, the same topology and shape, and no self-intersections.
 
-use crate::common::shapes;
-use crate::common::shapes::HOSTILE_SCALES;
-use crate::common::{Named, Random, euler_of_parts, seeds, torus_around};
+use super::common::shapes;
+use super::common::shapes::HOSTILE_SCALES;
+use super::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::{EdgeBounds, remesh};

@@ -3,8 +3,8 @@
 //!
 //! Scenes that take long are ignored; `npm run scenes` runs all of them (some minutes).
 
-use crate::common::scenes;
-use crate::common::{Random, euler_of_parts, fingerprint};
+use super::common::scenes;
+use super::common::{Random, euler_of_parts, fingerprint};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
 use vesicle::mesh::{Measures, Mesh, count_self_intersections, measure};

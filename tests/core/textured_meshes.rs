@@ -1,6 +1,6 @@
 //! Textures of meshes, in files and after mesh operations; and animations of several meshes.
 
-use crate::common::files;
+use super::common::files;
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, parse_textured_mesh, write_animation, write_mesh};
 use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};

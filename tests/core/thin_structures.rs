@@ -1,7 +1,7 @@
 //! Walls, gaps, strands and cavities that a uniform δ would lose, at the default settings: right components and Euler
 //! characteristics, and a mean error of at most 0.15 voxels.
 
-use crate::common::{Random, euler_of_parts, scenes};
+use super::common::{Random, euler_of_parts, scenes};
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{

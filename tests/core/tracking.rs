@@ -1,6 +1,6 @@
 //! A surface tracked through a beating heart with known geometry.
 
-use crate::common::cine::Cine;
+use super::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
@@ -99,7 +99,7 @@ fn bits_are_the_same_on_every_platform() {
     let cine = Cine::small().first(3);
     let tracker = tracked(open_ended(&cine));
     let positions: Vec<Vec3> = tracker.meshes().iter().flat_map(|mesh| mesh.positions.clone()).collect();
-    assert_eq!(format!("{:016x}", crate::common::fingerprint(&positions)), BITS);
+    assert_eq!(format!("{:016x}", super::common::fingerprint(&positions)), BITS);
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn a_sequence_of_the_papers_size_is_tracked_within_tolerances() {
 
 /// Returns a pulsating tube along the third axis through the whole volume, whose signal falls to a third along it.
 fn tube(mirrored: bool) -> Volume {
-    let mut random = crate::common::Random(5);
+    let mut random = super::common::Random(5);
     let mut values = Vec::new();
     for frame in 0..6 {
         let radius = 7.0 + libm::cos(f64::from(frame) * std::f64::consts::TAU / 6.0);
@@ -419,25 +419,25 @@ fn invalid_input_is_refused_by_name() {
     let refusal = SurfaceTracker::new(TrackingOptions { start: Some(open), ..good() });
     assert!(matches!(refusal, Err(MethodError::Mesh(_))));
     assert_eq!(refused(TrackingOptions { start: Some(TriangleMesh::default()), ..good() }).0, "start");
-    let far = crate::common::torus_around(Vec3::splat(-500.0), [24, 12], [3.0, 1.0]);
+    let far = super::common::torus_around(Vec3::splat(-500.0), [24, 12], [3.0, 1.0]);
     let (parameter, problem) = refused(TrackingOptions { start: Some(far), ..good() });
     assert!(parameter == "start" && problem.contains("inside the box"), "{problem}");
-    let mut turned = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    let mut turned = super::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     turned.triangles.iter_mut().for_each(|corners| corners.reverse());
     let (parameter, problem) = refused(TrackingOptions { start: Some(turned), ..good() });
     assert!(parameter == "start" && problem.contains("face inwards"), "{problem}");
-    let mut speck = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    let mut speck = super::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
     let (parameter, problem) = refused(TrackingOptions { start: Some(speck), ..good() });
     assert!(parameter == "start" && problem.contains("≥ 1e-12"), "{problem}");
-    let mut fine = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    let mut fine = super::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     fine.positions.iter_mut().for_each(|p| *p *= 1e-6);
     let (parameter, problem) = refused(TrackingOptions { start: Some(fine), ..good() });
     assert!(parameter == "start" && problem.contains("a tenth of a voxel"), "{problem}");
     // Two interlocked rings.
     let middle = Vec3::splat(35.0);
-    let mut crossing = crate::common::torus_around(middle, [24, 12], [3.0, 1.0]);
-    let other = crate::common::torus_around(middle + Vec3::X, [24, 12], [3.0, 1.0]);
+    let mut crossing = super::common::torus_around(middle, [24, 12], [3.0, 1.0]);
+    let other = super::common::torus_around(middle + Vec3::X, [24, 12], [3.0, 1.0]);
     let first = crossing.positions.len() as u32;
     crossing.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
     crossing.positions.extend(other.positions);

@@ -3,7 +3,7 @@
 //!
 //! `FUZZ_SEEDS=<first>..<last>` runs other seeds; a failing seed is printed.
 
-use crate::common::{Named, Random, assert_at_least, seeds};
+use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;

@@ -1,7 +1,7 @@
 //! Volume files of every accepted format, compared with what their usual libraries (nibabel, pynrrd, SimpleITK) read,
 //! and the errors of broken files.
 
-use crate::common::Random;
+use super::common::Random;
 use vesicle::io::{FormatError, parse_volume, write_nifti};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};

@@ -154,7 +154,7 @@ impl LabelSurfaces {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if it never had one.
-    pub(crate) fn number_of(&self, label: f64) -> Result<u16, MethodError> {
+    pub fn number_of(&self, label: f64) -> Result<u16, MethodError> {
         self.nets.grid.number(label).ok_or_else(|| {
             let problem =
                 format!("must be a label that has a surface ({}), got {label}", listed(self.labels()));
