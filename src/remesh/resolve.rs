@@ -301,6 +301,14 @@ impl Resolver {
         self.embedding.refine(mesh)
     }
 
+    /// Renumbers the vertices of the mesh as [`Mesh::reorder`] does, also those that the last call of [`Self::resolve`] left
+    /// to the next one.
+    pub fn reorder(&mut self, mesh: &mut Mesh) {
+        self.embedding.free();
+        let names = mesh.reorder();
+        self.set_pending(self.pending().renumbered(&names));
+    }
+
     /// Returns the vertices that edits of the last call of [`Self::resolve`] created or displaced; some may have been
     /// deleted since.
     pub fn edited(&self) -> &[VertexId] {

@@ -29,7 +29,9 @@ impl Embedding {
                 self.measure(mesh, v);
             }
             if self.is_searched_around(v) {
-                self.nearby[v.index()].clear();
+                if let Some(near) = &mut self.nearby[v.index()] {
+                    near.clear();
+                }
                 self.may_touch[v.index()] = false;
                 self.motion_bounds[v.index()].set(Check::Search, SEARCH_SKIN * self.ordinary_edge);
                 if !is_entered {
@@ -52,7 +54,8 @@ impl Embedding {
     /// at least one has a pending search.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let proximity = self.proximity();
-        let balls = mesh.vertices().map(|v| self.grid.ball(v)).collect();
+        let mut balls = Vec::with_capacity(mesh.vertex_count());
+        balls.extend(mesh.vertices().map(|v| self.grid.ball(v)));
         near_pairs(balls, proximity, |a, b| {
             if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
                 self.add_pair(mesh, a, b, proximity);
@@ -103,8 +106,8 @@ impl Embedding {
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
             if self.position_of(v, w).is_none() {
                 // The other vertex may still have a certificate of the pair.
-                let until = self.position_of(w, v).map_or(0.0, |k| self.nearby[w.index()][k].until);
-                self.nearby[v.index()].push(Nearby { vertex: w, until });
+                let until = self.position_of(w, v).map_or(0.0, |k| self.near(w)[k].until);
+                self.nearby[v.index()].get_or_insert_default().push(Nearby { vertex: w, until });
             }
             if is_close {
                 self.may_touch[v.index()] = true;
@@ -115,7 +118,20 @@ impl Embedding {
     /// Returns the index of `w` in the list of vertices that the broad phase found near `v`; `None` if `w` is not in
     /// this list.
     pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
-        self.nearby[v.index()].iter().position(|near| near.vertex == w)
+        self.near(v).iter().position(|near| near.vertex == w)
+    }
+
+    /// Returns the vertices that the broad phase found near `v`.
+    pub(super) fn near(&self, v: VertexId) -> &[Nearby] {
+        self.nearby[v.index()].as_ref().map_or(&[], |near| near.as_slice())
+    }
+
+    /// Stores for the pair of `v` and a vertex near it, at `position` in its list, the sum of odometers `until` which it is
+    /// certified.
+    pub(super) fn certify_nearby(&mut self, v: VertexId, position: usize, until: f32) {
+        if let Some(near) = &mut self.nearby[v.index()] {
+            near[position].until = until;
+        }
     }
 
     /// Returns the distance up to which two vertices have to be paired: below it their triangles may intersect, or they
@@ -142,7 +158,7 @@ impl Embedding {
 
     /// Returns whether [`Self::for_each_contact`] may find any contact of `v`.
     pub fn may_have_contacts(&self, v: VertexId) -> bool {
-        self.may_touch[v.index()]
+        self.may_touch.get(v.index()).is_none_or(|&may_touch| may_touch)
     }
 
     /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and the squared

@@ -13,9 +13,10 @@ impl Embedding {
     /// # Errors
     /// As [`Mesh::refine`].
     pub fn refine(&mut self, mesh: &mut Mesh) -> Result<bool, MeshError> {
-        let before = mesh.clone();
+        self.free();
+        let (before, slots) = (mesh.connectivity(), mesh.slots());
         mesh.refine()?;
-        let is_new = |v: &VertexId| v.index() >= before.slots();
+        let is_new = |v: &VertexId| v.index() >= slots;
         loop {
             let intersecting = self.check_all(mesh);
             if intersecting.is_empty() {
@@ -27,8 +28,9 @@ impl Embedding {
                 flips += across.into_iter().filter(|&w| mesh.flip(v, w).is_ok()).count();
             }
             if flips == 0 {
-                let refined = std::mem::replace(mesh, before);
-                mesh.advance_versions_past(&refined);
+                // Neither refinement nor flips changed old vertices but for their one-rings.
+                let positions = mesh.positions()[..slots].to_vec();
+                mesh.set_back(&before, &positions);
                 return Ok(false);
             }
         }
