@@ -302,10 +302,10 @@ impl Resolver {
     }
 
     /// Renumbers the vertices of the mesh as [`Mesh::reorder`] does, also those that the last call of [`Self::resolve`] left
-    /// to the next one.
-    pub fn reorder(&mut self, mesh: &mut Mesh) {
+    /// to the next one, with memory for at least `room` slots.
+    pub fn reorder(&mut self, mesh: &mut Mesh, room: usize) {
         self.embedding.free();
-        let names = mesh.reorder();
+        let names = mesh.reorder_with_room(room);
         self.set_pending(self.pending().renumbered(&names));
     }
 

@@ -13,6 +13,9 @@ use crate::math::order::{combined_rank, median, rank_f32, sort_by_rank, sort_ran
 /// edges of an ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
 const FIRST_CLASS_BOUND: f32 = 1.6;
 
+/// The number of balls, spread over all, of which the median radius is computed: fewer may not represent them.
+const MEDIAN_SAMPLE: usize = 1 << 16;
+
 /// The ratio of the radius bounds of consecutive size classes. If smaller, there are more classes; if larger, more
 /// pairs are tested and rejected.
 const FACTOR: f32 = 4.0;
@@ -39,10 +42,13 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
-        // Nearly all balls are in the first class, so that the others are copied.
-        let larger = left.iter().filter(|ball| ball.radius > bound).copied().collect();
+        // Nearly all balls of most meshes are in the first class, so that the others are copied.
+        let is_larger = |ball: &&VertexBall| ball.radius > bound;
+        let mut larger = Vec::with_capacity(left.iter().filter(is_larger).count());
+        larger.extend(left.iter().filter(is_larger).copied());
         let mut class = std::mem::replace(&mut left, larger);
         class.retain(|ball| ball.radius <= bound);
+        class.shrink_to_fit();
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
@@ -56,10 +62,11 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// Returns the median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
+/// Returns the approximate median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
 /// normal number, and 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
-    let middle = median(balls.iter().map(|ball| ball.radius)).unwrap_or(1.0);
+    let step = balls.len() / MEDIAN_SAMPLE + 1;
+    let middle = median(balls.iter().step_by(step).map(|ball| ball.radius)).unwrap_or(1.0);
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 

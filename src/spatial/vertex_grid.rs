@@ -1,7 +1,7 @@
 //! A hashed grid of the vertices of a moving mesh, for the broad phase of collision handling. Each vertex has a ball
 //! that contains its triangles.
 
-use crate::math::{Bounds, Vec3, resize};
+use crate::math::{Bounds, Vec3, resize, resize_within};
 use crate::mesh::VertexId;
 
 /// The number of levels of the grid, whose cell sizes differ by [`FACTOR`]. Vertices whose longest edge is at most the
@@ -121,6 +121,11 @@ impl VertexGrid {
         }
         grid.entries = vec![ABSENT_ENTRY; vertices];
         grid
+    }
+
+    /// Makes entries for `vertices` vertices, with memory for `room` if that is more.
+    pub fn resize(&mut self, vertices: usize, room: usize) {
+        resize_within(&mut self.entries, vertices, ABSENT_ENTRY, room);
     }
 
     /// Inserts `v`, or updates its position and the length `radius` of its longest edge.

@@ -472,7 +472,7 @@ impl DeformableModel {
     }
 
     fn reorder(&mut self) {
-        self.resolver.reorder(&mut self.mesh);
+        self.resolver.reorder(&mut self.mesh, 0);
     }
 
     fn count_components(&mut self, changes: Changes) {
@@ -484,8 +484,8 @@ impl DeformableModel {
     /// Marks the edge bounds and contacts of every vertex as checked at its current position, and counts the connected
     /// components.
     fn mark_checked(&mut self) {
-        let positions = self.mesh.positions().to_vec();
-        self.mesh.vector_mut(self.keys.checked_position).copy_from_slice(&positions);
+        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
+        checked.copy_from_slice(positions);
         self.components = self.mesh.component_count() as u32;
     }
 

@@ -429,7 +429,10 @@ impl DeformableModel {
     fn vertices_followed_on(&self, level: usize) -> Vec<VertexId> {
         let bounds = self.bounds_on(level);
         let is_in = |v: &VertexId| bounds.is_none_or(|bounds| bounds.contains(self.mesh.position(*v)));
-        self.mesh.vertices().filter(is_in).collect()
+        let followed = self.mesh.vertices().filter(is_in);
+        let mut vertices = Vec::with_capacity(followed.clone().count());
+        vertices.extend(followed);
+        vertices
     }
 
     fn awake_vertices(&self) -> Vec<VertexId> {
@@ -452,6 +455,19 @@ impl DeformableModel {
             * (1.0 + self.first_size(self.level - 1));
         let ratio = f64::from(self.model_delta() / shortest);
         (libm::log(ratio) / libm::log(REDUCTION) + ROUNDING) as u32
+    }
+
+    /// Returns the number of vertices that the next finer level will have when it begins, by the ratio of edge lengths: about
+    /// a tenth off.
+    pub(super) fn expected_below(&self) -> usize {
+        let edge = |level: usize| {
+            self.pyramid.delta_at(self.finest_delta, level) * (1.0 + self.first_size(level))
+        };
+        let ratio = f64::from(edge(self.level) / edge(self.level - 1));
+        let followed = self.vertices_followed_on(self.level - 1).len();
+        let others = self.mesh.vertex_count() - followed;
+        let expected = others.saturating_add((followed as f64 * ratio * ratio) as usize);
+        expected.min(self.resolver.max_vertices())
     }
 
     /// Returns the size, less 1, of the vertices of a sparse level when it begins: the largest on the finest level if it

@@ -7,7 +7,7 @@
 //! structures for mobile data*, 1999.)
 
 use super::one_ring::ORDINARY_RING;
-use crate::math::{lower, resize};
+use crate::math::{lower, resize_within};
 use crate::mesh::VertexId;
 use smallvec::SmallVec;
 
@@ -51,10 +51,11 @@ impl Certificates {
         *self = Self { edge, ..Self::default() };
     }
 
-    pub(super) fn resize(&mut self, slots: usize) {
-        resize(&mut self.odometer, slots, 0.0);
-        resize(&mut self.own, slots, 0.0);
-        resize(&mut self.along_edges, slots, SmallVec::new());
+    /// Resizes the arrays to `slots`, with memory for `room` slots.
+    pub(super) fn resize(&mut self, slots: usize, room: usize) {
+        resize_within(&mut self.odometer, slots, 0.0, room);
+        resize_within(&mut self.own, slots, 0.0, room);
+        resize_within(&mut self.along_edges, slots, SmallVec::new(), room);
     }
 
     /// Returns whether an odometer exceeds [`MAX_ODOMETER`], so that the certificates must be reset.

@@ -27,7 +27,7 @@ mod refine;
 mod replace;
 mod separate;
 
-use crate::math::{Bounds, DAffine3, higher, resize, triangle};
+use crate::math::{Bounds, DAffine3, higher, resize, resize_within, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
@@ -150,9 +150,10 @@ impl Embedding {
             return;
         }
         self.free();
-        self.grid = VertexGrid::new(self.ordinary_edge, SEARCH_SKIN * self.ordinary_edge, mesh.slots());
+        self.grid = VertexGrid::new(self.ordinary_edge, SEARCH_SKIN * self.ordinary_edge, 0);
+        self.grid.resize(mesh.slots(), mesh.room());
         self.stuck = false;
-        resize(&mut self.longest, mesh.slots(), 0.0);
+        resize_within(&mut self.longest, mesh.slots(), 0.0, mesh.room());
         for v in mesh.vertices() {
             self.measure(mesh, v);
             self.enter(mesh, v);
@@ -260,7 +261,7 @@ impl Embedding {
     ) -> Result<(Vec<VertexId>, Vec<VertexId>), MeshError> {
         self.sync(mesh);
         let added = mesh.append(components)?;
-        self.resize_for_checks(mesh.slots());
+        self.resize_for_checks(mesh);
         for &v in &added {
             // Its slot may be one of a deleted vertex.
             self.forget(v);
@@ -284,14 +285,15 @@ impl Embedding {
         count
     }
 
-    /// Resizes all arrays indexed by vertex slot to `slots`, before collision checks; those of new vertices are due.
-    fn resize_for_checks(&mut self, slots: usize) {
-        resize(&mut self.longest, slots, 0.0);
-        resize(&mut self.nearby, slots, None);
-        resize(&mut self.may_touch, slots, true);
-        resize(&mut self.pending, slots, Checks::default());
-        resize(&mut self.motion_bounds, slots, MotionBounds::NONE);
-        self.certificates.resize(slots);
+    /// Resizes all arrays indexed by vertex slot to that of the mesh, before collision checks; those of new vertices are due.
+    fn resize_for_checks(&mut self, mesh: &Mesh) {
+        let (slots, room) = (mesh.slots(), mesh.room());
+        resize_within(&mut self.longest, slots, 0.0, room);
+        resize_within(&mut self.nearby, slots, None, room);
+        resize_within(&mut self.may_touch, slots, true, room);
+        resize_within(&mut self.pending, slots, Checks::default(), room);
+        resize_within(&mut self.motion_bounds, slots, MotionBounds::NONE, room);
+        self.certificates.resize(slots, room);
     }
 
     /// Measures and stores the longest edge at `v`.
@@ -307,7 +309,7 @@ impl Embedding {
     /// Updates the grid and the motion bounds with the edits since [`Mesh::begin`]; `changed` are the triangles that
     /// these created or moved, by their corners.
     fn sync_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
-        resize(&mut self.longest, mesh.slots(), 0.0);
+        resize_within(&mut self.longest, mesh.slots(), 0.0, mesh.room());
         for v in mesh.touched_vertices() {
             self.forget(v);
             self.list_as_edited(v);
@@ -354,7 +356,7 @@ impl Embedding {
 
     /// Clears the visited marks of all vertices.
     fn new_marks(&mut self, mesh: &Mesh) {
-        resize(&mut self.marks, mesh.slots(), 0);
+        resize_within(&mut self.marks, mesh.slots(), 0, mesh.room());
         self.newest = self.newest.wrapping_add(1);
         if self.newest == 0 {
             self.marks.fill(0);

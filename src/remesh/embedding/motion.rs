@@ -38,7 +38,7 @@ impl Embedding {
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         let positions = mesh.positions_mut();
         moving.iter().map(|v| v.index()).for_each(|i| positions[i] += displacements[i]);
-        self.resize_for_checks(mesh.slots());
+        self.resize_for_checks(mesh);
         self.mark_edited_dirty(mesh);
         self.apply_motion(mesh, moving.iter().copied().zip(from.iter().copied()));
         let mut shares = BTreeMap::new();

@@ -21,7 +21,7 @@ impl Embedding {
     /// the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.sync_without_cells(mesh);
-        self.resize_for_checks(mesh.slots());
+        self.resize_for_checks(mesh);
         mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
         self.check(mesh, true)
     }
@@ -299,7 +299,7 @@ mod tests {
             let mut embedding = Embedding::default();
             embedding.sync_with_edge(&mesh, one_of(random, [1.0, 0.3, 5.0]));
             let dirty: Vec<VertexId> = mesh.vertices().filter(|_| random.below(3) > 0).collect();
-            embedding.resize_for_checks(mesh.slots());
+            embedding.resize_for_checks(&mesh);
             dirty.iter().for_each(|&v| embedding.mark_dirty(v, Checks::ALL));
             embedding.may_touch.fill(false);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
