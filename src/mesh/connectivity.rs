@@ -3,10 +3,16 @@
 use super::{Mesh, Ring, VertexId};
 use crate::math::Vec3;
 
+/// The least valence that takes more than a byte.
+const LARGE: u8 = u8::MAX;
+
 /// The one-rings of all slots of a mesh, one after the other: half of the memory that they take in a [`Mesh`].
 #[derive(Clone, Debug)]
 pub struct Connectivity {
-    valences: Vec<u32>,
+    /// The valence of each slot, or [`LARGE`] if it is in `large`.
+    valences: Vec<u8>,
+    /// The valences of [`LARGE`] or more, in the order of slots.
+    large: Vec<usize>,
     neighbours: Vec<VertexId>,
     free: Vec<VertexId>,
     euler: i64,
@@ -17,8 +23,14 @@ impl Mesh {
     pub fn connectivity(&self) -> Connectivity {
         let mut neighbours = Vec::with_capacity(self.half_edges);
         self.rings.iter().for_each(|ring| neighbours.extend_from_slice(ring.as_slice()));
-        let valences = self.rings.iter().map(|ring| ring.valence() as u32).collect();
-        Connectivity { valences, neighbours, free: self.free.clone(), euler: self.euler }
+        let valences = self.rings.iter().map(Ring::valence);
+        Connectivity {
+            large: valences.clone().filter(|&valence| valence >= LARGE.into()).collect(),
+            valences: valences.map(|valence| u8::try_from(valence).unwrap_or(LARGE)).collect(),
+            neighbours,
+            free: self.free.clone(),
+            euler: self.euler,
+        }
     }
 
     /// Sets the mesh back to the connectivity and the positions, by slot, that it had before; the attributes of all
@@ -26,9 +38,10 @@ impl Mesh {
     pub fn set_back(&mut self, before: &Connectivity, positions: &[Vec3]) {
         let slots = before.valences.len();
         self.rings.resize(slots, Ring::default());
-        let mut left = &before.neighbours[..];
+        let (mut left, mut large) = (&before.neighbours[..], before.large.iter());
         for (ring, &valence) in self.rings.iter_mut().zip(&before.valences) {
-            let (own, others) = left.split_at(valence as usize);
+            let valence = if valence == LARGE { large.next().copied() } else { Some(valence.into()) };
+            let (own, others) = left.split_at(valence.unwrap_or(0));
             *ring = Ring::new(own.iter().copied());
             left = others;
         }

@@ -260,6 +260,10 @@ impl Resolver {
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
         self.small.find(mesh);
+        // After a call for the whole mesh they have memory for as many vertices.
+        self.queue.shrink_to_fit();
+        self.dirty.shrink_to_fit();
+        self.edited = Vec::new();
         self.embedding.sync_with_edge(mesh, sampling.longest());
         let held = self.embedding.move_some(mesh, moving, displacements);
         self.stuck.clear();

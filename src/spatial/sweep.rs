@@ -7,6 +7,7 @@
 //! once.
 
 use super::vertex_grid::{Proximity, VertexBall};
+use crate::math::make_room;
 use crate::math::order::{combined_rank, median, rank_f32, sort_by_rank, sort_ranks};
 
 /// The radius bound of the first size class of balls, as a multiple of the median radius. If smaller, the few long
@@ -55,7 +56,9 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
             let class = sweep_class(class, &smaller, near, &mut found);
             if smaller.is_empty() {
                 smaller = class;
-            } else {
+            } else if !left.is_empty() {
+                let count = smaller.len() + class.len();
+                make_room(&mut smaller, count);
                 smaller.extend(class);
             }
         }

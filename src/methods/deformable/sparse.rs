@@ -31,7 +31,7 @@ pub(super) const REACH: f32 = 2.5;
 
 /// The distance beyond [`REACH`], in δ, up to which missing bricks are asked for when one within it is missing, so that
 /// asking is rare. With more, more bricks are loaded that the surface never reaches.
-const MARGIN: f32 = 1.0;
+const MARGIN: f32 = 0.5;
 
 /// The largest ratio of the loaded bricks of a level to those near the surface; above it the others are dropped.
 const MOST_SPARE: usize = 2;
@@ -460,9 +460,8 @@ impl DeformableModel {
     /// Returns the number of vertices that the next finer level will have when it begins, by the ratio of edge lengths: about
     /// a tenth off.
     pub(super) fn expected_below(&self) -> usize {
-        let edge = |level: usize| {
-            self.pyramid.delta_at(self.finest_delta, level) * (1.0 + self.first_size(level))
-        };
+        let edge =
+            |level: usize| self.pyramid.delta_at(self.finest_delta, level) * (1.0 + self.first_size(level));
         let ratio = f64::from(edge(self.level) / edge(self.level - 1));
         let followed = self.vertices_followed_on(self.level - 1).len();
         let others = self.mesh.vertex_count() - followed;

@@ -3,8 +3,8 @@
 
 use super::motion_bound::Check;
 use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
-use crate::math::Bounds;
 use crate::math::order::{combined_rank, sort_ranks};
+use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId, sort_distinct};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
@@ -50,12 +50,23 @@ impl Embedding {
         self.pending[v.index()].has(Check::Search)
     }
 
-    /// Finds pairs of non-adjacent vertices near each other by a sweep over the whole mesh, and stores those of which
-    /// at least one has a pending search.
+    /// Finds pairs of non-adjacent vertices near each other by a sweep over the part of the mesh that is searched, and
+    /// stores those of which at least one has a pending search.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let proximity = self.proximity();
-        let mut balls = Vec::with_capacity(mesh.vertex_count());
-        balls.extend(mesh.vertices().map(|v| self.grid.ball(v)));
+        let (mut searched, mut longest) = (Bounds::EMPTY, 0.0f32);
+        for ball in mesh.vertices().map(|v| self.grid.ball(v)) {
+            longest = if ball.radius > longest { ball.radius } else { longest };
+            if self.is_searched_around(ball.vertex) {
+                searched = searched.union(&Bounds::from_points(&[ball.position]));
+            }
+        }
+        // Others are too far from all that are searched around, up to rounding.
+        let reach = Vec3::splat(2.0 * proximity.distance_for(longest, longest));
+        let wide = Bounds { min: searched.min - reach, max: searched.max + reach };
+        let is_near = |v: &VertexId| wide.contains(self.grid.position(*v));
+        let mut balls = Vec::with_capacity(mesh.vertices().filter(is_near).count());
+        balls.extend(mesh.vertices().filter(is_near).map(|v| self.grid.ball(v)));
         near_pairs(balls, proximity, |a, b| {
             if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
                 self.add_pair(mesh, a, b, proximity);

@@ -308,8 +308,7 @@ mod tests {
             searched.search(&mesh, &dirty);
             for v in mesh.vertices() {
                 let [swept, searched] = [&swept, &searched].map(|embedding| {
-                    let mut near: Vec<VertexId> =
-                        embedding.near(v).iter().map(|near| near.vertex).collect();
+                    let mut near: Vec<VertexId> = embedding.near(v).iter().map(|near| near.vertex).collect();
                     near.sort_unstable();
                     near
                 });
