@@ -58,6 +58,7 @@ impl Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TriangleMesh;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -84,6 +85,26 @@ mod tests {
             let changed = mesh.versions();
             mesh.set_back(&connectivity, before.positions());
             assert!(mesh.versions().iter().zip(changed).all(|(now, then)| *now > then));
+            mesh.set_versions(before.versions());
+            assert_eq!(mesh, before);
+        }
+    }
+
+    /// The tips of a double pyramid have more neighbours than fit into a byte, its other vertices few.
+    #[test]
+    fn large_valences_are_set_back() {
+        for count in [254u32, 255, 256, 700] {
+            let positions = [Vec3::Z, -Vec3::Z].into_iter().chain((0..count).map(|k| {
+                let angle = f64::from(k) / f64::from(count) * std::f64::consts::TAU;
+                Vec3::new(libm::cos(angle) as f32, libm::sin(angle) as f32, 0.0)
+            }));
+            let sides = (0..count).map(|k| [k + 2, (k + 1) % count + 2]);
+            let triangles = sides.flat_map(|[a, b]| [[0, a, b], [1, b, a]]).collect();
+            let list = TriangleMesh { positions: positions.collect(), triangles, ..TriangleMesh::default() };
+            let mut mesh = Mesh::from_triangles(&list).unwrap();
+            let (before, connectivity) = (mesh.clone(), mesh.connectivity());
+            mesh.flip(VertexId(0), VertexId(2)).unwrap();
+            mesh.set_back(&connectivity, before.positions());
             mesh.set_versions(before.versions());
             assert_eq!(mesh, before);
         }
