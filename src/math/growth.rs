@@ -12,6 +12,14 @@ pub fn make_room<T>(list: &mut Vec<T>, len: usize) {
     }
 }
 
+/// Sets the length of a list as [`resize`] does, but makes room for `room` items at once if there is too little.
+pub fn resize_within<T: Clone>(list: &mut Vec<T>, len: usize, value: T, room: usize) {
+    if len > list.capacity() {
+        list.reserve_exact(room.max(len) - list.len());
+    }
+    list.resize(len, value);
+}
+
 /// Sets the length of a list as [`Vec::resize`] does, after [`make_room`].
 pub fn resize<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {
     make_room(list, len);

@@ -1,6 +1,7 @@
 //! Per-vertex attributes of a [`Mesh`](super::Mesh), such as data of a method, that edits keep up to date.
 
 use super::VertexId;
+use super::renumber::in_order;
 use crate::math::{Vec3, resize};
 use serde::{Deserialize, Serialize};
 
@@ -96,13 +97,14 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.truncate(slots));
     }
 
-    /// Moves the attributes of slot `order[i]` to slot `i`, when vertices are renumbered.
-    pub(super) fn reorder(&mut self, order: &[VertexId]) {
+    /// Moves the attributes of slot `order[i]` to slot `i`, when vertices are renumbered, with memory for at least `room`
+    /// slots.
+    pub(super) fn reorder(&mut self, order: &[VertexId], room: usize) {
         for v in &mut self.vectors {
-            *v = order.iter().map(|id| v[id.index()]).collect();
+            *v = in_order(order, room, |slot| v[slot]);
         }
         for s in &mut self.scalars {
-            *s = order.iter().map(|id| s[id.index()]).collect();
+            *s = in_order(order, room, |slot| s[slot]);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Connected components of a dynamic mesh.
 
 use super::{Mesh, VertexId};
+use std::collections::VecDeque;
 
 /// The largest `limit` for which [`Mesh::component_of`] searches the vertices found so far linearly, instead of marking
 /// them in an array over the whole mesh, which is slower for few vertices.
@@ -16,32 +17,59 @@ impl Mesh {
         if limit <= LINEAR_SEARCH_LIMIT {
             return self.small_component_of(v, limit);
         }
-        let mut found = self.flood(v, &mut vec![false; self.slots()]);
+        let mut found = Vec::new();
+        self.flood(v, &mut vec![false; self.slots()], &mut found);
         found.truncate(limit);
         found
     }
 
     /// Returns the vertices of each connected component, components in the order of their lowest slot.
     pub fn component_members(&self) -> Vec<Vec<VertexId>> {
-        self.components().collect()
+        let mut seen = vec![false; self.slots()];
+        let members = |v: VertexId| {
+            let mut found = Vec::new();
+            self.flood(v, &mut seen, &mut found);
+            (!found.is_empty()).then_some(found)
+        };
+        self.vertices().filter_map(members).collect()
+    }
+
+    /// Returns the vertices of [`Self::component_members`] one after the other.
+    pub(super) fn in_component_order(&self) -> Vec<VertexId> {
+        let mut seen = vec![false; self.slots()];
+        let mut order = Vec::with_capacity(self.vertex_count());
+        self.vertices().for_each(|v| self.flood(v, &mut seen, &mut order));
+        order
     }
 
     /// Returns the number of connected components.
     pub fn component_count(&self) -> usize {
-        self.components().count()
-    }
-
-    fn components(&self) -> impl Iterator<Item = Vec<VertexId>> + '_ {
         let mut seen = vec![false; self.slots()];
-        self.vertices()
-            .filter_map(move |v| if seen[v.index()] { None } else { Some(self.flood(v, &mut seen)) })
+        let mut front = VecDeque::new();
+        let mut count = 0;
+        for v in self.vertices() {
+            if std::mem::replace(&mut seen[v.index()], true) {
+                continue;
+            }
+            count += 1;
+            front.push_back(v);
+            // Unlike `flood`, this keeps only the vertices whose neighbours have not been visited.
+            while let Some(u) = front.pop_front() {
+                let new = |w: &&VertexId| !std::mem::replace(&mut seen[w.index()], true);
+                front.extend(self.ring(u).as_slice().iter().filter(new));
+            }
+        }
+        count
     }
 
-    /// Marks the vertices connected with `v` in `seen`, by slot, and returns them in breadth-first order.
-    fn flood(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
-        let mut found = vec![v];
-        seen[v.index()] = true;
-        let mut next = 0;
+    /// Marks the vertices connected with `v` in `seen`, by slot, and appends them to `found` in breadth-first order, unless
+    /// `v` is marked already.
+    fn flood(&self, v: VertexId, seen: &mut [bool], found: &mut Vec<VertexId>) {
+        if std::mem::replace(&mut seen[v.index()], true) {
+            return;
+        }
+        let mut next = found.len();
+        found.push(v);
         while next < found.len() {
             for &w in self.ring(found[next]).as_slice() {
                 if !std::mem::replace(&mut seen[w.index()], true) {
@@ -50,7 +78,6 @@ impl Mesh {
             }
             next += 1;
         }
-        found
     }
 
     fn small_component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {

@@ -109,6 +109,13 @@ impl Mesh {
         self.rings.len()
     }
 
+    /// Returns the number of slots that the memory of the mesh suffices for; other lists by slot that have as much grow no
+    /// sooner than the mesh.
+    #[inline]
+    pub fn room(&self) -> usize {
+        self.rings.capacity()
+    }
+
     /// Returns the Euler characteristic χ = V − E + F, updated incrementally by edits; [`Mesh::check`] compares it with
     /// a full count.
     #[inline]

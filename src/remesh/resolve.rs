@@ -260,6 +260,10 @@ impl Resolver {
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
         self.small.find(mesh);
+        // After a call for the whole mesh they have memory for as many vertices.
+        self.queue.shrink_to_fit();
+        self.dirty.shrink_to_fit();
+        self.edited = Vec::new();
         self.embedding.sync_with_edge(mesh, sampling.longest());
         let held = self.embedding.move_some(mesh, moving, displacements);
         self.stuck.clear();
@@ -299,6 +303,14 @@ impl Resolver {
     pub fn refine(&mut self, mesh: &mut Mesh, sampling: Sampling) -> Result<bool, MeshError> {
         self.embedding.sync_with_edge(mesh, sampling.longest());
         self.embedding.refine(mesh)
+    }
+
+    /// Renumbers the vertices of the mesh as [`Mesh::reorder`] does, also those that the last call of [`Self::resolve`] left
+    /// to the next one, with memory for at least `room` slots.
+    pub fn reorder(&mut self, mesh: &mut Mesh, room: usize) {
+        self.embedding.free();
+        let names = mesh.reorder_with_room(room);
+        self.set_pending(self.pending().renumbered(&names));
     }
 
     /// Returns the vertices that edits of the last call of [`Self::resolve`] created or displaced; some may have been

@@ -7,11 +7,15 @@
 //! once.
 
 use super::vertex_grid::{Proximity, VertexBall};
+use crate::math::make_room;
 use crate::math::order::{combined_rank, median, rank_f32, sort_by_rank, sort_ranks};
 
 /// The radius bound of the first size class of balls, as a multiple of the median radius. If smaller, the few long
 /// edges of an ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
 const FIRST_CLASS_BOUND: f32 = 1.6;
+
+/// The number of balls, spread over all, of which the median radius is computed: fewer may not represent them.
+const MEDIAN_SAMPLE: usize = 1 << 16;
 
 /// The ratio of the radius bounds of consecutive size classes. If smaller, there are more classes; if larger, more
 /// pairs are tested and rejected.
@@ -39,38 +43,45 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
-        // Nearly all balls are in the first class, so that the others are copied.
-        let larger = left.iter().filter(|ball| ball.radius > bound).copied().collect();
+        // Nearly all balls of most meshes are in the first class, so that the others are copied.
+        let is_larger = |ball: &&VertexBall| ball.radius > bound;
+        let mut larger = Vec::with_capacity(left.iter().filter(is_larger).count());
+        larger.extend(left.iter().filter(is_larger).copied());
         let mut class = std::mem::replace(&mut left, larger);
         class.retain(|ball| ball.radius <= bound);
+        class.shrink_to_fit();
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
-            sweep_class(&class, &smaller, near, &mut found);
+            let class = sweep_class(class, &smaller, near, &mut found);
             if smaller.is_empty() {
                 smaller = class;
-            } else {
+            } else if !left.is_empty() {
+                let count = smaller.len() + class.len();
+                make_room(&mut smaller, count);
                 smaller.extend(class);
             }
         }
     }
 }
 
-/// Returns the median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
+/// Returns the approximate median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
 /// normal number, and 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
-    let middle = median(balls.iter().map(|ball| ball.radius)).unwrap_or(1.0);
+    let step = balls.len() / MEDIAN_SAMPLE + 1;
+    let middle = median(balls.iter().step_by(step).map(|ball| ball.radius)).unwrap_or(1.0);
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
 /// Calls `found` with the pairs of balls that are no farther apart than `near` allows: those within the size class
-/// `class`, and those of one ball of `class` and one of `smaller`, the balls of smaller classes.
+/// `class`, and those of one ball of `class` and one of `smaller`, the balls of smaller classes. Returns the balls of
+/// `class`, in another order.
 fn sweep_class(
-    class: &[VertexBall],
+    class: Vec<VertexBall>,
     smaller: &[VertexBall],
     near: Proximity,
     found: &mut impl FnMut(&VertexBall, &VertexBall),
-) {
+) -> Vec<VertexBall> {
     let largest = class.iter().fold(0.0, |most, ball| if ball.radius > most { ball.radius } else { most });
     let reach = near.distance_for(largest, largest);
     let width = Width(1.0 / (COLUMN_MARGIN * f64::from(reach)));
@@ -80,13 +91,14 @@ fn sweep_class(
             found(a, b);
         }
     };
-    let large = Columns::new(width, class.iter());
+    let large = Columns::new(width, class);
     large.pairs(reach, &mut test);
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
-        let around = smaller.iter().filter(|ball| filter.may_contain(width.column(ball)));
-        large.pairs_with(&Columns::new(width, around), reach, &mut test);
+        let around = smaller.iter().filter(|ball| filter.may_contain(width.column(ball))).copied();
+        large.pairs_with(&Columns::new(width, around.collect()), reach, &mut test);
     }
+    large.balls
 }
 
 /// The width of the columns into which the xy-plane is divided, stored as its inverse.
@@ -145,6 +157,22 @@ fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     order
 }
 
+/// Moves the ball `order[i]` to position `i`, cycle by cycle, so that no second list of balls takes memory.
+fn put_in_order(balls: &mut [VertexBall], mut order: Vec<u32>) {
+    for start in 0..balls.len() {
+        let (first, mut to) = (balls[start], start);
+        loop {
+            let from = std::mem::replace(&mut order[to], to as u32) as usize;
+            if from == start {
+                break;
+            }
+            balls[to] = balls[from];
+            to = from;
+        }
+        balls[to] = first;
+    }
+}
+
 /// Balls sorted by column, a square cell of the xy-plane, then by height (z), so that balls near each other are found
 /// without testing all pairs.
 struct Columns {
@@ -154,8 +182,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn new<'a>(width: Width, balls: impl Iterator<Item = &'a VertexBall>) -> Self {
-        let balls: Vec<&VertexBall> = balls.collect();
+    fn new(width: Width, mut balls: Vec<VertexBall>) -> Self {
         let column_of: Vec<[i32; 2]> = balls.iter().map(|ball| width.column(ball)).collect();
         let mut order = column_order(&column_of);
         let mut by_height = Vec::new();
@@ -175,7 +202,9 @@ impl Columns {
             }
         }
         columns.push(([i32::MAX; 2], order.len()));
-        Self { balls: order.iter().map(|&i| *balls[i as usize]).collect(), columns }
+        drop(column_of);
+        put_in_order(&mut balls, order);
+        Self { balls, columns }
     }
 
     fn count(&self) -> usize {

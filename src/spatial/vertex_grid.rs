@@ -1,7 +1,7 @@
 //! A hashed grid of the vertices of a moving mesh, for the broad phase of collision handling. Each vertex has a ball
 //! that contains its triangles.
 
-use crate::math::{Bounds, Vec3, resize};
+use crate::math::{Bounds, Vec3, resize, resize_within};
 use crate::mesh::VertexId;
 
 /// The number of levels of the grid, whose cell sizes differ by [`FACTOR`]. Vertices whose longest edge is at most the
@@ -19,8 +19,8 @@ const CELL: f32 = 1.5;
 /// The largest mean number of vertices per hash bucket when [`VertexGrid::link_cells`] creates the buckets.
 const LOAD: usize = 2;
 
-/// The level stored for a vertex that is not in the grid.
-const ABSENT: u32 = u32::MAX;
+/// The radius stored for a vertex that is not in the grid.
+const ABSENT: f32 = -1.0;
 
 /// Marks the end of a linked list of vertices, of which each hash bucket has one.
 const NONE: u32 = u32::MAX;
@@ -70,11 +70,10 @@ pub struct VertexBall {
     pub vertex: VertexId,
 }
 
-/// A vertex in the grid: its level, the hash `key` of its cell, whose low bits are the index of the bucket, its
-/// position and its longest edge `radius`.
+/// A vertex in the grid: the hash `key` of its cell, whose low bits are the index of the bucket, its position and its
+/// longest edge `radius`, which determines its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
-    level: u32,
     key: u32,
     position: Vec3,
     radius: f32,
@@ -106,7 +105,13 @@ impl Proximity {
     }
 }
 
-const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, radius: 0.0, next: NONE };
+const ABSENT_ENTRY: Entry = Entry { key: 0, position: Vec3::ZERO, radius: ABSENT, next: NONE };
+
+impl Entry {
+    fn is_absent(&self) -> bool {
+        self.radius == ABSENT
+    }
+}
 
 impl VertexGrid {
     /// Creates an empty grid for about `vertices` vertices that may move by `max_displacement` after insertion. It is
@@ -123,6 +128,11 @@ impl VertexGrid {
         grid
     }
 
+    /// Makes entries for `vertices` vertices, with memory for `room` if that is more.
+    pub fn resize(&mut self, vertices: usize, room: usize) {
+        resize_within(&mut self.entries, vertices, ABSENT_ENTRY, room);
+    }
+
     /// Inserts `v`, or updates its position and the length `radius` of its longest edge.
     pub fn set(&mut self, v: VertexId, position: Vec3, radius: f32) {
         if v.index() >= self.entries.len() {
@@ -132,13 +142,13 @@ impl VertexGrid {
         }
         let level = self.level_of(radius);
         let old = self.entries[v.index()];
-        let mut entry = Entry { level: level as u32, position, radius, ..old };
+        let mut entry = Entry { position, radius, ..old };
         if self.linked {
             if radius > self.largest_radius[level] {
                 self.largest_radius[level] = radius;
             }
             entry.key = self.key(self.cell(position, level), level);
-            if (old.level, old.key) != (entry.level, entry.key) {
+            if old.is_absent() || (self.level_of(old.radius), old.key) != (level, entry.key) {
                 self.unlink(v, old);
                 self.counts[level] += 1;
                 let head = self.head_mut(entry.key);
@@ -167,11 +177,11 @@ impl VertexGrid {
         (self.counts, self.largest_radius) = ([0; LEVELS], [0.0; LEVELS]);
         // In reverse, so that lists are in memory order.
         for i in (0..self.entries.len()).rev() {
-            let Entry { level, position, radius, .. } = self.entries[i];
-            if level == ABSENT {
+            let Entry { position, radius, .. } = self.entries[i];
+            if self.entries[i].is_absent() {
                 continue;
             }
-            let level = level as usize;
+            let level = self.level_of(radius);
             self.counts[level] += 1;
             if radius > self.largest_radius[level] {
                 self.largest_radius[level] = radius;
@@ -220,10 +230,11 @@ impl VertexGrid {
 
     /// Removes `v` from the linked list of its hash bucket; `old` is its entry.
     fn unlink(&mut self, v: VertexId, old: Entry) {
-        if old.level == ABSENT || !self.linked {
+        if old.is_absent() || !self.linked {
             return;
         }
-        self.counts[old.level as usize] -= 1;
+        let level = self.level_of(old.radius);
+        self.counts[level] -= 1;
         let mut at = *self.head_mut(old.key);
         if at == v.0 {
             *self.head_mut(old.key) = old.next;
@@ -294,7 +305,7 @@ impl VertexGrid {
         radius: impl Fn(f32) -> f32,
         found: &mut impl FnMut(&VertexBall),
     ) {
-        for (i, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.level != ABSENT) {
+        for (i, entry) in self.entries.iter().enumerate().filter(|(_, entry)| !entry.is_absent()) {
             let around = Vec3::splat(radius(entry.radius) + self.max_displacement);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
             if wide.contains(entry.position) {
@@ -336,7 +347,7 @@ impl VertexGrid {
 
     fn search_all(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         for (i, entry) in self.entries.iter().enumerate() {
-            if entry.level as usize == level && wide.contains(entry.position) {
+            if !entry.is_absent() && self.level_of(entry.radius) == level && wide.contains(entry.position) {
                 found(&self.ball(VertexId::from_index(i)));
             }
         }

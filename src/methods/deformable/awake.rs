@@ -63,6 +63,11 @@ impl Awake {
             }
         }
     }
+
+    /// Frees all but [`Self::moving`], so that less memory is taken while vertices move on a sparse level.
+    pub(super) fn keep_moving(&mut self) {
+        *self = Self { moving: std::mem::take(&mut self.moving), ..Self::default() };
+    }
 }
 
 /// Returns the speed along the normal, in δ per unit of time, below which a vertex is still and may fall asleep; δ is

@@ -342,10 +342,9 @@ impl DeformableModel {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
-            self.move_vertices(&mut times);
-            if self.pyramid.is_sparse()
-                && let Some(before) = before
-            {
+            let mut before = before.filter(|_| self.pyramid.is_sparse());
+            self.move_vertices(before.as_deref_mut(), &mut times);
+            if let Some(before) = before {
                 self.prepare_edits(before)?;
             }
             if self.params.topology == Topology::Adaptive {
@@ -362,13 +361,16 @@ impl DeformableModel {
         Ok(self.report(changes, times))
     }
 
-    fn move_vertices(&mut self, times: &mut Times) {
+    fn move_vertices(&mut self, before: Option<&mut Before>, times: &mut Times) {
         let begin = (self.clock)();
         if self.pyramid.is_sparse() && std::mem::take(&mut self.needs_factor) {
             self.image_force_factor = self.measured_factor();
         }
         let examine_all = std::mem::take(&mut self.convergence.examine_next);
         self.motion.prepare(&self.mesh, self.keys, examine_all, self.followed_bounds());
+        if let Some(before) = before {
+            before.keep(&self.mesh, self.keys, &self.motion.awake.with_neighbours);
+        }
         let normals = (self.clock)();
         let delta = self.model_delta();
         let attractors = self.local_attractors();
@@ -470,9 +472,7 @@ impl DeformableModel {
     }
 
     fn reorder(&mut self) {
-        let names = self.mesh.reorder();
-        let waiting = self.resolver.pending().renumbered(&names);
-        self.resolver.set_pending(waiting);
+        self.resolver.reorder(&mut self.mesh, 0);
     }
 
     fn count_components(&mut self, changes: Changes) {
@@ -484,8 +484,8 @@ impl DeformableModel {
     /// Marks the edge bounds and contacts of every vertex as checked at its current position, and counts the connected
     /// components.
     fn mark_checked(&mut self) {
-        let positions = self.mesh.positions().to_vec();
-        self.mesh.vector_mut(self.keys.checked_position).copy_from_slice(&positions);
+        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
+        checked.copy_from_slice(positions);
         self.components = self.mesh.component_count() as u32;
     }
 

@@ -110,6 +110,7 @@ impl Motion {
         self.clamp_displacements(mesh, keys, context);
         if context.field.image.bricks().is_some() {
             self.forces.keep_normals();
+            self.awake.keep_moving();
         }
         let held = displace(mesh, &self.awake.moving, &mut self.displacements);
         let velocities = mesh.vector_mut(keys.velocity);

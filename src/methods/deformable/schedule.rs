@@ -231,8 +231,9 @@ impl DeformableModel {
         if is_renewed {
             return Ok(Changes { seeds, ..Changes::default() });
         }
+        let room = if self.pyramid.is_sparse() { self.expected_below() } else { 0 };
         self.descend_refined()?;
-        self.reorder();
+        self.resolver.reorder(&mut self.mesh, room);
         self.mark_checked();
         let mut changes = self.check_everything(times);
         if seeds > 0 {

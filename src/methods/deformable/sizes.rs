@@ -67,16 +67,16 @@ impl DeformableModel {
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
         let share = self.params.adaptivity as f32;
-        let edges = self.edges_at(members);
         // Other vertices keep their sizes, and bound those of their neighbours.
         let of = self.mesh.scalar(self.keys.size);
-        let mut is_member = vec![false; self.mesh.slots()];
-        members.iter().for_each(|v| is_member[v.index()] = true);
-        for v in edges.iter().flat_map(|&(u, v)| [u, v]).filter(|v| !is_member[v.index()]) {
-            sizes[v.index()] = 1.0 + of[v.index()] / share;
+        let is_member = self.marked(members);
+        for v in self.edges_at(members, &is_member).flat_map(|(u, v)| [u, v]) {
+            if !is_member[v.index()] {
+                sizes[v.index()] = 1.0 + of[v.index()] / share;
+            }
         }
         for _ in 0..PASSES {
-            self.bound_gradation(&edges, &mut sizes);
+            self.bound_gradation(self.edges_at(members, &is_member), &mut sizes);
         }
         let size = self.mesh.scalar_mut(self.keys.size);
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
@@ -87,9 +87,9 @@ impl DeformableModel {
     /// below 1.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
-        let edges = self.edges_at(members);
-        let offsets = self.offsets_from_contour(&edges);
-        for (u, v) in edges {
+        let is_member = self.marked(members);
+        let offsets = self.offsets_from_contour(self.edges_at(members, &is_member));
+        for (u, v) in self.edges_at(members, &is_member) {
             let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
@@ -127,20 +127,29 @@ impl DeformableModel {
         object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
     }
 
-    /// Returns the edges with an end in `members`, each once as (lower id, higher id).
-    fn edges_at(&self, members: &[VertexId]) -> Vec<(VertexId, VertexId)> {
+    /// Returns for each slot whether its vertex is in `members`.
+    fn marked(&self, members: &[VertexId]) -> Vec<bool> {
         let mut is_member = vec![false; self.mesh.slots()];
         members.iter().for_each(|v| is_member[v.index()] = true);
+        is_member
+    }
+
+    /// Iterates over the edges with an end in `members`, which `is_member` marks, each once as (lower id, higher id).
+    fn edges_at<'a>(
+        &'a self,
+        members: &'a [VertexId],
+        is_member: &'a [bool],
+    ) -> impl Iterator<Item = (VertexId, VertexId)> + 'a {
         let edges_of = |&u: &VertexId| self.mesh.ring(u).as_slice().iter().map(move |&v| (u, v));
         let edges = members.iter().flat_map(edges_of);
         let once = edges.filter(|&(u, v)| u < v || !is_member[v.index()]);
-        once.map(|(u, v)| if u < v { (u, v) } else { (v, u) }).collect()
+        once.map(|(u, v)| if u < v { (u, v) } else { (v, u) })
     }
 
-    fn bound_gradation(&self, edges: &[(VertexId, VertexId)], sizes: &mut [f32]) {
+    fn bound_gradation(&self, edges: impl Iterator<Item = (VertexId, VertexId)>, sizes: &mut [f32]) {
         let before = sizes.to_vec();
         let per_length = GRADATION / (MEAN_EDGE * self.model_delta());
-        for &(u, v) in edges {
+        for (u, v) in edges {
             let growth = per_length * self.mesh.position(u).distance(self.mesh.position(v));
             for (a, b) in [(u.index(), v.index()), (v.index(), u.index())] {
                 let most = before[b] + growth;
@@ -151,9 +160,9 @@ impl DeformableModel {
 
     /// Returns the offset of each end of `edges` from the contour along its normal, by slot, in voxels of the finest
     /// level; positive inside the contour.
-    fn offsets_from_contour(&self, edges: &[(VertexId, VertexId)]) -> Vec<f32> {
+    fn offsets_from_contour(&self, edges: impl Iterator<Item = (VertexId, VertexId)>) -> Vec<f32> {
         let mut offsets = vec![f32::NAN; self.mesh.slots()];
-        for v in edges.iter().flat_map(|&(u, v)| [u, v]) {
+        for v in edges.flat_map(|(u, v)| [u, v]) {
             if !offsets[v.index()].is_nan() {
                 continue;
             }

@@ -14,14 +14,15 @@ use super::image::{LevelImage, Pyramid, REDUCTION, SparseLevels};
 use super::motion::SpeedSummary;
 use super::schedule::Convergence;
 use super::sizes::LARGEST;
-use super::{DeformableModel, DeformableParams, Origin, Seeding, Start, Topology, coarse};
+use super::{DeformableModel, DeformableParams, Keys, Origin, Seeding, Start, Topology, coarse};
 use crate::math::order::{median, sort_ranks};
 use crate::math::{Bounds, DVec3, Vec3};
-use crate::mesh::{Connectivity, Mesh, VertexId};
+use crate::mesh::{Connectivity, Mesh, ScalarKey, VertexId};
 use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
 use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
+use fixedbitset::FixedBitSet;
 
 /// The distance from a vertex, in δ, within which the bricks of a level are loaded before a step: the vertex moves by at
 /// most half a δ, and thin walls are searched for up to 2.3 δ away. A step that reads beyond it is undone and repeated,
@@ -30,7 +31,7 @@ pub(super) const REACH: f32 = 2.5;
 
 /// The distance beyond [`REACH`], in δ, up to which missing bricks are asked for when one within it is missing, so that
 /// asking is rare. With more, more bricks are loaded that the surface never reaches.
-const MARGIN: f32 = 1.0;
+const MARGIN: f32 = 0.5;
 
 /// The largest ratio of the loaded bricks of a level to those near the surface; above it the others are dropped.
 const MOST_SPARE: usize = 2;
@@ -79,13 +80,10 @@ pub(super) struct Follow {
 
 /// The state before a step, to which it is undone if a brick was missing. Meshes take most of the memory, so each part of
 /// this one is copied before the phase of the step that changes it, in compact form.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Before {
-    positions: Vec<Vec3>,
-    velocities: Vec<Vec3>,
-    still_iterations: Vec<f32>,
-    since_edit: Vec<f32>,
-    reversals: Vec<f32>,
+    /// The vertices that the motion may change; all of them once there are edits.
+    vertices: VertexStates,
     /// The part that only edits change; `None` while vertices are moved.
     edited: Option<BeforeEdits>,
     waiting: Pending,
@@ -100,11 +98,71 @@ pub(super) struct Before {
     refreshed: Changes,
 }
 
-#[derive(Clone, Debug)]
+/// The part of the state of some vertices that motion changes, in the order of their slots.
+#[derive(Debug, Default)]
+struct VertexStates {
+    slots: FixedBitSet,
+    vectors: [Vec<Vec3>; 2],
+    scalars: [Vec<f32>; 3],
+}
+
+#[derive(Debug)]
 struct BeforeEdits {
     connectivity: Connectivity,
     checked_positions: Vec<Vec3>,
     sizes: Vec<f32>,
+}
+
+impl Before {
+    /// Copies what motion may change, of the given vertices.
+    pub(super) fn keep(&mut self, mesh: &Mesh, keys: Keys, vertices: &[VertexId]) {
+        let mut slots = FixedBitSet::with_capacity(mesh.slots());
+        vertices.iter().for_each(|v| slots.insert(v.index()));
+        self.vertices = VertexStates::of(mesh, keys, slots);
+    }
+}
+
+impl VertexStates {
+    fn of(mesh: &Mesh, keys: Keys, slots: FixedBitSet) -> Self {
+        let vectors = [mesh.positions(), mesh.vector(keys.velocity)].map(|from| gathered(from, &slots));
+        let scalars = moved_scalars(keys).map(|key| gathered(mesh.scalar(key), &slots));
+        Self { slots, vectors, scalars }
+    }
+
+    /// Returns these states, and of all other vertices those that they have now.
+    fn completed(self, mesh: &Mesh, keys: Keys) -> Self {
+        let mut slots = FixedBitSet::with_capacity(mesh.slots());
+        slots.insert_range(..);
+        let mut all = Self::of(mesh, keys, slots);
+        all.vectors.iter_mut().zip(&self.vectors).for_each(|(to, from)| scatter(from, &self.slots, to));
+        all.scalars.iter_mut().zip(&self.scalars).for_each(|(to, from)| scatter(from, &self.slots, to));
+        all
+    }
+
+    fn put_back(&self, mesh: &mut Mesh, keys: Keys) {
+        let [positions, velocities] = &self.vectors;
+        scatter(positions, &self.slots, mesh.positions_mut());
+        scatter(velocities, &self.slots, mesh.vector_mut(keys.velocity));
+        for (key, from) in moved_scalars(keys).into_iter().zip(&self.scalars) {
+            scatter(from, &self.slots, mesh.scalar_mut(key));
+        }
+    }
+}
+
+fn moved_scalars(keys: Keys) -> [ScalarKey; 3] {
+    [keys.still_iterations, keys.since_edit, keys.reversals]
+}
+
+/// Returns the values of some slots, one after the other.
+fn gathered<T: Copy>(values: &[T], slots: &FixedBitSet) -> Vec<T> {
+    let mut some = Vec::with_capacity(slots.count_ones(..));
+    some.extend(slots.ones().map(|slot| values[slot]));
+    some
+}
+
+/// Sets the values of some slots to those that [`gathered`] has returned.
+fn scatter<T: Copy>(some: &[T], slots: &FixedBitSet, values: &mut [T]) {
+    slots.ones().zip(some).for_each(|(slot, &value)| values[slot] = value);
 }
 
 impl DeformableModel {
@@ -237,6 +295,7 @@ impl DeformableModel {
         self.check_missed()?;
         self.motion.free_buffers();
         let Self { mesh, keys, .. } = self;
+        before.vertices = std::mem::take(&mut before.vertices).completed(mesh, *keys);
         before.edited = Some(BeforeEdits {
             connectivity: mesh.connectivity(),
             checked_positions: mesh.vector(keys.checked_position).to_vec(),
@@ -266,13 +325,8 @@ impl DeformableModel {
     }
 
     fn before(&self) -> Before {
-        let scalar = |key| self.mesh.scalar(key).to_vec();
         Before {
-            positions: self.mesh.positions().to_vec(),
-            velocities: self.mesh.vector(self.keys.velocity).to_vec(),
-            still_iterations: scalar(self.keys.still_iterations),
-            since_edit: scalar(self.keys.since_edit),
-            reversals: scalar(self.keys.reversals),
+            vertices: VertexStates::default(),
             edited: None,
             waiting: self.resolver.pending(),
             level: self.level,
@@ -289,18 +343,12 @@ impl DeformableModel {
 
     fn undo(&mut self, before: Before) {
         let Self { mesh, keys, .. } = self;
-        match before.edited {
-            Some(BeforeEdits { connectivity, checked_positions, sizes }) => {
-                mesh.set_back(&connectivity, &before.positions);
-                mesh.vector_mut(keys.checked_position).copy_from_slice(&checked_positions);
-                mesh.scalar_mut(keys.size).copy_from_slice(&sizes);
-            }
-            None => mesh.positions_mut().copy_from_slice(&before.positions),
+        if let Some(BeforeEdits { connectivity, checked_positions, sizes }) = before.edited {
+            mesh.set_back(&connectivity, &before.vertices.vectors[0]);
+            mesh.vector_mut(keys.checked_position).copy_from_slice(&checked_positions);
+            mesh.scalar_mut(keys.size).copy_from_slice(&sizes);
         }
-        mesh.vector_mut(keys.velocity).copy_from_slice(&before.velocities);
-        mesh.scalar_mut(keys.still_iterations).copy_from_slice(&before.still_iterations);
-        mesh.scalar_mut(keys.since_edit).copy_from_slice(&before.since_edit);
-        mesh.scalar_mut(keys.reversals).copy_from_slice(&before.reversals);
+        before.vertices.put_back(mesh, *keys);
         self.resolver.set_pending(before.waiting);
         self.resolver.take_overflow();
         self.motion.free_buffers();
@@ -381,7 +429,10 @@ impl DeformableModel {
     fn vertices_followed_on(&self, level: usize) -> Vec<VertexId> {
         let bounds = self.bounds_on(level);
         let is_in = |v: &VertexId| bounds.is_none_or(|bounds| bounds.contains(self.mesh.position(*v)));
-        self.mesh.vertices().filter(is_in).collect()
+        let followed = self.mesh.vertices().filter(is_in);
+        let mut vertices = Vec::with_capacity(followed.clone().count());
+        vertices.extend(followed);
+        vertices
     }
 
     fn awake_vertices(&self) -> Vec<VertexId> {
@@ -404,6 +455,18 @@ impl DeformableModel {
             * (1.0 + self.first_size(self.level - 1));
         let ratio = f64::from(self.model_delta() / shortest);
         (libm::log(ratio) / libm::log(REDUCTION) + ROUNDING) as u32
+    }
+
+    /// Returns the number of vertices that the next finer level will have when it begins, by the ratio of edge lengths: about
+    /// a tenth off.
+    pub(super) fn expected_below(&self) -> usize {
+        let edge =
+            |level: usize| self.pyramid.delta_at(self.finest_delta, level) * (1.0 + self.first_size(level));
+        let ratio = f64::from(edge(self.level) / edge(self.level - 1));
+        let followed = self.vertices_followed_on(self.level - 1).len();
+        let others = self.mesh.vertex_count() - followed;
+        let expected = others.saturating_add((followed as f64 * ratio * ratio) as usize);
+        expected.min(self.resolver.max_vertices())
     }
 
     /// Returns the size, less 1, of the vertices of a sparse level when it begins: the largest on the finest level if it
@@ -441,8 +504,13 @@ fn ranks_around(
     reach: f32,
 ) -> Vec<u64> {
     let half = image.scale() * reach + Vec3::ONE;
-    let mut ranks = Vec::new();
+    let (mut ranks, mut most) = (Vec::new(), 1 << 16);
     for &v in vertices {
+        // Most are there several times.
+        if ranks.len() > most {
+            sort_distinct_ranks(&mut ranks);
+            most = most.max(2 * ranks.len());
+        }
         let at = image.index(mesh.position(v));
         bricks.for_each_around(at - half, at + half, |rank| {
             if ranks.last() != Some(&rank) {
@@ -450,9 +518,13 @@ fn ranks_around(
             }
         });
     }
-    sort_ranks(&mut ranks);
-    ranks.dedup();
+    sort_distinct_ranks(&mut ranks);
     ranks
+}
+
+fn sort_distinct_ranks(ranks: &mut Vec<u64>) {
+    sort_ranks(ranks);
+    ranks.dedup();
 }
 
 /// Returns an error for parameters that a sparse volume does not support.
@@ -527,14 +599,25 @@ mod tests {
     }
 
     /// With a negative reach nothing is asked for in advance: steps read missing bricks while vertices move, and then in
-    /// edits, and are undone.
+    /// edits, and are undone. In a box only some vertices move.
     #[test]
     fn a_step_that_reads_a_missing_brick_is_undone() {
+        let half = WorldBox { min: DVec3::ZERO, max: DVec3::new(30.0, 64.0, 64.0) };
+        for within in [None, Some(half)] {
+            let options = SparseOptions { within, ..SparseOptions::default() };
+            let [while_moving, in_edits] = undone_steps(&options);
+            assert!(while_moving > 0 && in_edits > 0, "{while_moving} and {in_edits} with {within:?}");
+        }
+    }
+
+    /// Runs a model that gets bricks when it has missed them beside one that has all, and asserts that they are the same
+    /// and that an undone step changes nothing. Returns the numbers of steps undone while vertices moved, and in edits.
+    fn undone_steps(options: &SparseOptions) -> [u32; 2] {
         let (whole, voxels) = volume();
         whole.missing(0).unwrap().iter().for_each(|at| whole.insert(*at, &voxels(at)).unwrap());
-        let mut expected = DeformableModel::on_sparse(&whole, SparseOptions::default()).unwrap();
+        let mut expected = DeformableModel::on_sparse(&whole, options.clone()).unwrap();
         let (volume, voxels) = volume();
-        let mut model = DeformableModel::on_sparse(&volume, SparseOptions::default()).unwrap();
+        let mut model = DeformableModel::on_sparse(&volume, options.clone()).unwrap();
         if let Some(sparse) = &mut model.pyramid.sparse {
             sparse.reach = -100.0;
         }
@@ -547,7 +630,7 @@ mod tests {
                     assert_eq!(model.mesh.positions(), expected.mesh.positions());
                     assert!(model.save() == expected.save(), "iteration {}", report.iteration);
                     if report.done {
-                        break;
+                        return [while_moving, in_edits];
                     }
                 }
                 Err(MethodError::NeedsData { needs }) => {
@@ -561,6 +644,5 @@ mod tests {
                 Err(error) => panic!("{error}"),
             }
         }
-        assert!(while_moving > 0 && in_edits > 0, "{while_moving} and {in_edits}");
     }
 }

@@ -3,8 +3,8 @@
 
 use super::motion_bound::Check;
 use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
-use crate::math::Bounds;
 use crate::math::order::{combined_rank, sort_ranks};
+use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId, sort_distinct};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
@@ -29,7 +29,9 @@ impl Embedding {
                 self.measure(mesh, v);
             }
             if self.is_searched_around(v) {
-                self.nearby[v.index()].clear();
+                if let Some(near) = &mut self.nearby[v.index()] {
+                    near.clear();
+                }
                 self.may_touch[v.index()] = false;
                 self.motion_bounds[v.index()].set(Check::Search, SEARCH_SKIN * self.ordinary_edge);
                 if !is_entered {
@@ -48,11 +50,23 @@ impl Embedding {
         self.pending[v.index()].has(Check::Search)
     }
 
-    /// Finds pairs of non-adjacent vertices near each other by a sweep over the whole mesh, and stores those of which
-    /// at least one has a pending search.
+    /// Finds pairs of non-adjacent vertices near each other by a sweep over the part of the mesh that is searched, and
+    /// stores those of which at least one has a pending search.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let proximity = self.proximity();
-        let balls = mesh.vertices().map(|v| self.grid.ball(v)).collect();
+        let (mut searched, mut longest) = (Bounds::EMPTY, 0.0f32);
+        for ball in mesh.vertices().map(|v| self.grid.ball(v)) {
+            longest = if ball.radius > longest { ball.radius } else { longest };
+            if self.is_searched_around(ball.vertex) {
+                searched = searched.union(&Bounds::from_points(&[ball.position]));
+            }
+        }
+        // Others are too far from all that are searched around, up to rounding.
+        let reach = Vec3::splat(2.0 * proximity.distance_for(longest, longest));
+        let wide = Bounds { min: searched.min - reach, max: searched.max + reach };
+        let is_near = |v: &VertexId| wide.contains(self.grid.position(*v));
+        let mut balls = Vec::with_capacity(mesh.vertices().filter(is_near).count());
+        balls.extend(mesh.vertices().filter(is_near).map(|v| self.grid.ball(v)));
         near_pairs(balls, proximity, |a, b| {
             if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
                 self.add_pair(mesh, a, b, proximity);
@@ -103,8 +117,8 @@ impl Embedding {
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
             if self.position_of(v, w).is_none() {
                 // The other vertex may still have a certificate of the pair.
-                let until = self.position_of(w, v).map_or(0.0, |k| self.nearby[w.index()][k].until);
-                self.nearby[v.index()].push(Nearby { vertex: w, until });
+                let until = self.position_of(w, v).map_or(0.0, |k| self.near(w)[k].until);
+                self.nearby[v.index()].get_or_insert_default().push(Nearby { vertex: w, until });
             }
             if is_close {
                 self.may_touch[v.index()] = true;
@@ -115,7 +129,20 @@ impl Embedding {
     /// Returns the index of `w` in the list of vertices that the broad phase found near `v`; `None` if `w` is not in
     /// this list.
     pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
-        self.nearby[v.index()].iter().position(|near| near.vertex == w)
+        self.near(v).iter().position(|near| near.vertex == w)
+    }
+
+    /// Returns the vertices that the broad phase found near `v`.
+    pub(super) fn near(&self, v: VertexId) -> &[Nearby] {
+        self.nearby[v.index()].as_ref().map_or(&[], |near| near.as_slice())
+    }
+
+    /// Stores for the pair of `v` and a vertex near it, at `position` in its list, the sum of odometers `until` which it is
+    /// certified.
+    pub(super) fn certify_nearby(&mut self, v: VertexId, position: usize, until: f32) {
+        if let Some(near) = &mut self.nearby[v.index()] {
+            near[position].until = until;
+        }
     }
 
     /// Returns the distance up to which two vertices have to be paired: below it their triangles may intersect, or they
@@ -142,7 +169,7 @@ impl Embedding {
 
     /// Returns whether [`Self::for_each_contact`] may find any contact of `v`.
     pub fn may_have_contacts(&self, v: VertexId) -> bool {
-        self.may_touch[v.index()]
+        self.may_touch.get(v.index()).is_none_or(|&may_touch| may_touch)
     }
 
     /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and the squared

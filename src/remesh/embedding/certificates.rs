@@ -7,7 +7,7 @@
 //! structures for mobile data*, 1999.)
 
 use super::one_ring::ORDINARY_RING;
-use crate::math::{lower, resize};
+use crate::math::{lower, resize_within};
 use crate::mesh::VertexId;
 use smallvec::SmallVec;
 
@@ -47,15 +47,15 @@ pub(super) struct Certificates {
 
 impl Certificates {
     /// Discards all certificates and resets the odometers; `edge` is the ordinary edge, to which limits are relative.
-    pub(super) fn begin(&mut self, edge: f32, slots: usize) {
+    pub(super) fn begin(&mut self, edge: f32) {
         *self = Self { edge, ..Self::default() };
-        self.resize(slots);
     }
 
-    pub(super) fn resize(&mut self, slots: usize) {
-        resize(&mut self.odometer, slots, 0.0);
-        resize(&mut self.own, slots, 0.0);
-        resize(&mut self.along_edges, slots, SmallVec::new());
+    /// Resizes the arrays to `slots`, with memory for `room` slots.
+    pub(super) fn resize(&mut self, slots: usize, room: usize) {
+        resize_within(&mut self.odometer, slots, 0.0, room);
+        resize_within(&mut self.own, slots, 0.0, room);
+        resize_within(&mut self.along_edges, slots, SmallVec::new(), room);
     }
 
     /// Returns whether an odometer exceeds [`MAX_ODOMETER`], so that the certificates must be reset.
@@ -73,7 +73,9 @@ impl Certificates {
     /// Invalidates all certificates of `v`, which an edit created or changed: clears those stored at `v`, and advances
     /// its odometer, so that those stored elsewhere expire.
     pub(super) fn revoke(&mut self, v: VertexId) {
-        self.along_edges[v.index()].clear();
+        // A vertex made since the last resizing has none.
+        let Some(along_edges) = self.along_edges.get_mut(v.index()) else { return };
+        along_edges.clear();
         self.own[v.index()] = 0.0;
         self.advance(v, 2.0 * MAX_CLEARANCE * self.edge);
     }

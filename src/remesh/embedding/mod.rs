@@ -27,7 +27,7 @@ mod refine;
 mod replace;
 mod separate;
 
-use crate::math::{Bounds, DAffine3, Vec3, higher, resize, triangle};
+use crate::math::{Bounds, DAffine3, higher, resize, resize_within, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
@@ -53,6 +53,9 @@ const SEARCH_SKIN: f32 = 0.04;
 /// rounding. Edges and displacements count as at least this long, and a smaller clearance as none.
 const MIN_LENGTH: f32 = 1e-17;
 
+/// The vertices found near one vertex. Few vertices have any, so that a list takes one pointer where there is none.
+type NearbyList = Option<Box<SmallVec<[Nearby; 4]>>>;
+
 /// A non-adjacent vertex found near another by the broad phase, and the sum of both odometers (see [`Certificates`]) up
 /// to which their triangles are certified not to intersect.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +66,9 @@ struct Nearby {
 
 /// Collision guard of one mesh: tests edits and moves, and prevents those that would cause self-intersections.
 ///
-/// Motion bounds decide when a pair is tested, never the result of a test.
+/// Motion bounds decide when a pair is tested, never the result of a test. What only checks need has entries for the
+/// slots at the last check (`resize_for_checks`): where the mesh has grown since, or everything was discarded, edits need
+/// none of it.
 #[derive(Clone, Debug, Default)]
 pub struct Embedding {
     grid: VertexGrid,
@@ -72,7 +77,7 @@ pub struct Embedding {
     /// The longest edge at each vertex, as last measured, by slot.
     longest: Vec<f32>,
     /// The non-adjacent vertices that the broad phase found near each vertex, by slot.
-    nearby: Vec<SmallVec<[Nearby; 4]>>,
+    nearby: Vec<NearbyList>,
     /// Whether any non-adjacent vertex may be within the contact distance of each vertex, by slot.
     may_touch: Vec<bool>,
     /// The remaining motion bounds of each vertex, by slot: the displacements of its one-ring up to its next tests.
@@ -80,14 +85,13 @@ pub struct Embedding {
     certificates: Certificates,
     /// The largest displacement in the one-ring of each vertex during a move, by slot.
     ring_displacement: Vec<f32>,
-    /// The vertices whose `ring_displacement` is not 0.
-    touched: Vec<VertexId>,
-    /// Vertices that edits created or changed since the last move; lists of near vertices do not contain them yet.
+    /// Vertices that edits created or changed since the last move, each once; lists of near vertices do not contain them
+    /// yet.
     edited: Vec<VertexId>,
+    /// Whether each vertex is in `edited`, by slot.
+    is_edited: Vec<bool>,
     /// The pending collision checks of each vertex, by slot.
     pending: Vec<Checks>,
-    /// The vertices with pending collision checks.
-    dirty: Vec<VertexId>,
     /// The geometry version of the mesh for which grid, motion bounds and certificates are up to date.
     version: Option<u32>,
     /// The geometry version at which all vertices of the mesh were set in the grid; as long as the mesh has it, none
@@ -97,8 +101,6 @@ pub struct Embedding {
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
-    /// Vertex positions before the current move.
-    from: Vec<Vec3>,
     /// Whether, in a move since everything was last rebuilt, an intersecting triangle had a corner without
     /// displacement: then shortening displacements may not have resolved the intersection.
     stuck: bool,
@@ -147,20 +149,29 @@ impl Embedding {
         if self.version == Some(mesh.geometry_version()) && !self.certificates.are_worn() {
             return;
         }
-        self.grid = VertexGrid::new(self.ordinary_edge, SEARCH_SKIN * self.ordinary_edge, mesh.slots());
+        self.free();
+        self.grid = VertexGrid::new(self.ordinary_edge, SEARCH_SKIN * self.ordinary_edge, 0);
+        self.grid.resize(mesh.slots(), mesh.room());
         self.stuck = false;
-        self.motion_bounds.clear();
-        self.nearby.clear();
-        self.may_touch.clear();
-        self.certificates.begin(self.ordinary_edge, mesh.slots());
-        self.resize_for(mesh.slots());
-        self.edited.clear();
+        resize_within(&mut self.longest, mesh.slots(), 0.0, mesh.room());
         for v in mesh.vertices() {
             self.measure(mesh, v);
             self.enter(mesh, v);
         }
         self.version = Some(mesh.geometry_version());
         self.entered = self.version;
+    }
+
+    /// Frees nearly all of the memory, before a change of the whole mesh after which everything has to be computed anew.
+    pub fn free(&mut self) {
+        self.grid = VertexGrid::default();
+        self.motion_bounds = Vec::new();
+        self.nearby = Vec::new();
+        self.may_touch = Vec::new();
+        self.certificates.begin(self.ordinary_edge);
+        self.edited = Vec::new();
+        self.is_edited = Vec::new();
+        self.version = None;
     }
 
     /// Performs one or more edits as a transaction, and rolls it back if triangles would intersect.
@@ -250,8 +261,7 @@ impl Embedding {
     ) -> Result<(Vec<VertexId>, Vec<VertexId>), MeshError> {
         self.sync(mesh);
         let added = mesh.append(components)?;
-        self.resize_for(mesh.slots());
-        self.pending.resize(mesh.slots(), Checks::default());
+        self.resize_for_checks(mesh);
         for &v in &added {
             // Its slot may be one of a deleted vertex.
             self.forget(v);
@@ -275,13 +285,15 @@ impl Embedding {
         count
     }
 
-    /// Resizes the arrays indexed by vertex slot to `slots`; all collision checks of new vertices are due.
-    fn resize_for(&mut self, slots: usize) {
-        resize(&mut self.longest, slots, 0.0);
-        resize(&mut self.nearby, slots, SmallVec::new());
-        self.may_touch.resize(slots, true);
-        resize(&mut self.motion_bounds, slots, MotionBounds::NONE);
-        self.certificates.resize(slots);
+    /// Resizes all arrays indexed by vertex slot to that of the mesh, before collision checks; those of new vertices are due.
+    fn resize_for_checks(&mut self, mesh: &Mesh) {
+        let (slots, room) = (mesh.slots(), mesh.room());
+        resize_within(&mut self.longest, slots, 0.0, room);
+        resize_within(&mut self.nearby, slots, None, room);
+        resize_within(&mut self.may_touch, slots, true, room);
+        resize_within(&mut self.pending, slots, Checks::default(), room);
+        resize_within(&mut self.motion_bounds, slots, MotionBounds::NONE, room);
+        self.certificates.resize(slots, room);
     }
 
     /// Measures and stores the longest edge at `v`.
@@ -297,10 +309,10 @@ impl Embedding {
     /// Updates the grid and the motion bounds with the edits since [`Mesh::begin`]; `changed` are the triangles that
     /// these created or moved, by their corners.
     fn sync_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
-        self.resize_for(mesh.slots());
+        resize_within(&mut self.longest, mesh.slots(), 0.0, mesh.room());
         for v in mesh.touched_vertices() {
-            self.edited.push(v);
             self.forget(v);
+            self.list_as_edited(v);
             if mesh.is_live(v) {
                 self.measure(mesh, v);
                 self.enter(mesh, v);
@@ -322,16 +334,29 @@ impl Embedding {
 
     /// Discards the motion bounds and certificates of `v`, which an edit created, moved or gave other triangles.
     fn forget(&mut self, v: VertexId) {
-        self.may_touch[v.index()] = true;
+        if let Some(may_touch) = self.may_touch.get_mut(v.index()) {
+            *may_touch = true;
+        }
         self.certificates.revoke(v);
-        if std::mem::replace(&mut self.motion_bounds[v.index()], MotionBounds::NONE) != MotionBounds::NONE {
+        if let Some(bounds) = self.motion_bounds.get_mut(v.index())
+            && std::mem::replace(bounds, MotionBounds::NONE) != MotionBounds::NONE
+        {
+            self.list_as_edited(v);
+        }
+    }
+
+    fn list_as_edited(&mut self, v: VertexId) {
+        if v.index() >= self.is_edited.len() {
+            resize(&mut self.is_edited, v.index() + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_edited[v.index()], true) {
             self.edited.push(v);
         }
     }
 
     /// Clears the visited marks of all vertices.
     fn new_marks(&mut self, mesh: &Mesh) {
-        resize(&mut self.marks, mesh.slots(), 0);
+        resize_within(&mut self.marks, mesh.slots(), 0, mesh.room());
         self.newest = self.newest.wrapping_add(1);
         if self.newest == 0 {
             self.marks.fill(0);

@@ -2,7 +2,7 @@
 
 use super::Embedding;
 use super::motion_bound::Checks;
-use crate::math::{Vec3, resize};
+use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
@@ -24,8 +24,8 @@ impl Embedding {
     }
 
     /// Moves the vertices `moving` by `displacements`, given by slot; those whose triangles would intersect move by a
-    /// quarter of it, or not at all. `displacements` is set to the displacements applied. Returns the vertices that
-    /// were held back, sorted, and the share of its displacement by which each moved: 1/4 or 0.
+    /// quarter of it, or not at all. `moving` must be sorted by id. `displacements` is set to the displacements applied.
+    /// Returns the vertices that were held back, sorted, and the share of its displacement by which each moved: 1/4 or 0.
     ///
     /// A mesh without self-intersections has none afterwards: in the worst case no vertex moves.
     pub fn move_some(
@@ -35,40 +35,39 @@ impl Embedding {
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
         self.sync_without_cells(mesh);
-        let mut from = std::mem::take(&mut self.from);
-        resize(&mut from, mesh.slots(), Vec3::ZERO);
+        let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         let positions = mesh.positions_mut();
-        for i in moving.iter().map(|v| v.index()) {
-            from[i] = positions[i];
-            positions[i] += displacements[i];
-        }
-        self.pending.resize(mesh.slots(), Checks::default());
+        moving.iter().map(|v| v.index()).for_each(|i| positions[i] += displacements[i]);
+        self.resize_for_checks(mesh);
         self.mark_edited_dirty(mesh);
-        self.apply_motion(mesh, moving.iter().map(|&v| (v, from[v.index()])));
+        self.apply_motion(mesh, moving.iter().copied().zip(from.iter().copied()));
         let mut shares = BTreeMap::new();
         loop {
-            let mut held = self.check_dirty(mesh);
-            let intersecting = held.len();
-            held.retain(|v| displacements[v.index()] != Vec3::ZERO);
-            self.stuck |= held.len() < intersecting;
+            let intersecting = self.check_dirty(mesh);
+            let can_be_held = |v: &VertexId| displacements[v.index()] != Vec3::ZERO;
+            let held = intersecting.iter().filter(|v| can_be_held(v));
+            // Each with its index among the moving ones.
+            let held: Vec<(VertexId, usize)> =
+                held.filter_map(|&v| Some((v, moving.binary_search(&v).ok()?))).collect();
+            self.stuck |= held.len() < intersecting.len();
             if held.is_empty() {
                 break;
             }
-            let before: Vec<Vec3> = held.iter().map(|&v| mesh.position(v)).collect();
-            for (&v, &before) in held.iter().zip(&before) {
+            let before: Vec<Vec3> = held.iter().map(|&(v, _)| mesh.position(v)).collect();
+            for (&(v, k), &before) in held.iter().zip(&before) {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
                 let factor = if *share == 1.0 { HELD_BACK } else { 0.0 };
                 (*share, displacements[i]) = (*share * factor, displacements[i] * factor);
-                mesh.set_position(v, from[i] + displacements[i]);
+                mesh.set_position(v, from[k] + displacements[i]);
                 if mesh.position(v) == before {
                     // A displacement lost in rounding uses up no motion bound.
                     self.mark_dirty(v, Checks::ALL);
                 }
             }
-            self.apply_motion(mesh, held.into_iter().zip(before));
+            self.apply_motion(mesh, held.into_iter().map(|(v, _)| v).zip(before));
         }
-        self.from = from;
+        self.ring_displacement = Vec::new();
         self.version = Some(mesh.geometry_version());
         shares.into_iter().collect()
     }

@@ -81,7 +81,6 @@ impl Embedding {
     /// positions.
     pub(super) fn apply_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
         resize(&mut self.ring_displacement, mesh.slots(), 0.0);
-        let mut touched = std::mem::take(&mut self.touched);
         for (v, from) in moved {
             // The displacement after rounding of the position.
             let to = mesh.position(v);
@@ -89,41 +88,38 @@ impl Embedding {
                 let displacement = higher(MIN_LENGTH, to.distance(from));
                 for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
                     let travelled = &mut self.ring_displacement[w.index()];
-                    if *travelled == 0.0 {
-                        touched.push(w);
-                    }
                     *travelled = higher(*travelled, displacement);
                 }
             }
         }
-        for v in touched.drain(..) {
-            let travelled = std::mem::take(&mut self.ring_displacement[v.index()]);
-            let bounds = &mut self.motion_bounds[v.index()];
+        for i in 0..mesh.slots() {
+            let travelled = std::mem::take(&mut self.ring_displacement[i]);
+            if travelled == 0.0 {
+                continue;
+            }
+            let v = VertexId::from_index(i);
+            let bounds = &mut self.motion_bounds[i];
             bounds.subtract(travelled);
             self.certificates.advance(v, travelled);
             let used_up = bounds.used_up();
             self.mark_dirty(v, used_up);
         }
-        self.touched = touched;
     }
 
     /// Marks the vertices that edits created or changed since the last move as dirty, for the checks whose motion
     /// bounds are used up.
     pub(super) fn mark_edited_dirty(&mut self, mesh: &Mesh) {
-        let mut edited = std::mem::take(&mut self.edited);
-        for v in edited.drain(..).filter(|&v| mesh.is_live(v)) {
-            self.mark_dirty(v, self.motion_bounds[v.index()].used_up());
+        for v in std::mem::take(&mut self.edited) {
+            self.is_edited[v.index()] = false;
+            if mesh.is_live(v) {
+                self.mark_dirty(v, self.motion_bounds[v.index()].used_up());
+            }
         }
-        self.edited = edited;
     }
 
     pub(super) fn mark_dirty(&mut self, v: VertexId, what: Checks) {
-        let pending = &mut self.pending[v.index()];
-        if pending.is_empty() && !what.is_empty() {
-            self.dirty.push(v);
-        }
         // New pairs have to be tested, too.
         let what = if what.has(Check::Search) { what.with(Check::Nearby) } else { what };
-        pending.0 |= what.0;
+        self.pending[v.index()].0 |= what.0;
     }
 }

@@ -21,7 +21,7 @@ impl Embedding {
     /// the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.sync_without_cells(mesh);
-        self.pending.resize(mesh.slots(), Checks::default());
+        self.resize_for_checks(mesh);
         mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
         self.check(mesh, true)
     }
@@ -33,7 +33,7 @@ impl Embedding {
     }
 
     fn check(&mut self, mesh: &Mesh, anew: bool) -> Vec<VertexId> {
-        let dirty = std::mem::take(&mut self.dirty);
+        let dirty = self.dirty_vertices();
         self.update_pairs(mesh, &dirty);
         for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
             if self.pending[v.index()].has(check) {
@@ -55,10 +55,17 @@ impl Embedding {
             }
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
-        self.dirty = dirty;
-        self.dirty.clear();
         sort_distinct(&mut intersecting);
         intersecting
+    }
+
+    /// Returns the vertices with pending collision checks, by ascending id.
+    fn dirty_vertices(&self) -> Vec<VertexId> {
+        let is_dirty = |checks: &Checks| !checks.is_empty();
+        let mut dirty = Vec::with_capacity(self.pending.iter().filter(|checks| is_dirty(checks)).count());
+        let pending = self.pending.iter().enumerate().filter(|(_, checks)| is_dirty(checks));
+        dirty.extend(pending.map(|(i, _)| VertexId::from_index(i)));
+        dirty
     }
 
     fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
@@ -107,8 +114,8 @@ impl Embedding {
     }
 
     fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
-        for k in 0..self.nearby[v.index()].len() {
-            let Nearby { vertex: w, until } = self.nearby[v.index()][k];
+        for k in 0..self.near(v).len() {
+            let Nearby { vertex: w, until } = self.near(v)[k];
             // Edits may have changed either vertex since the pair was found.
             if !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
                 continue;
@@ -118,9 +125,9 @@ impl Embedding {
             } else if !self.is_checked_from(w, v, Check::Nearby) {
                 let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
                 let until = self.record_clearance(mesh, [v, w], Check::Nearby, clearance, intersecting);
-                self.nearby[v.index()][k].until = until;
+                self.certify_nearby(v, k, until);
                 if let Some(position) = self.position_of(w, v) {
-                    self.nearby[w.index()][position].until = until;
+                    self.certify_nearby(w, position, until);
                 }
             }
         }
@@ -292,7 +299,7 @@ mod tests {
             let mut embedding = Embedding::default();
             embedding.sync_with_edge(&mesh, one_of(random, [1.0, 0.3, 5.0]));
             let dirty: Vec<VertexId> = mesh.vertices().filter(|_| random.below(3) > 0).collect();
-            embedding.pending.resize(mesh.slots(), Checks::default());
+            embedding.resize_for_checks(&mesh);
             dirty.iter().for_each(|&v| embedding.mark_dirty(v, Checks::ALL));
             embedding.may_touch.fill(false);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
@@ -301,8 +308,7 @@ mod tests {
             searched.search(&mesh, &dirty);
             for v in mesh.vertices() {
                 let [swept, searched] = [&swept, &searched].map(|embedding| {
-                    let mut near: Vec<VertexId> =
-                        embedding.nearby[v.index()].iter().map(|near| near.vertex).collect();
+                    let mut near: Vec<VertexId> = embedding.near(v).iter().map(|near| near.vertex).collect();
                     near.sort_unstable();
                     near
                 });

@@ -114,3 +114,36 @@ fn are_apart((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&O
     let reach = (whole.max - whole.min).max_element();
     are_apart_in_plane(&s.points, &t.points, reach, 2.0 * exact_below(output))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Edits around the same vertices again and again, as on a level whose edges are too long, list each vertex once.
+    #[test]
+    fn vertices_that_are_edited_often_are_listed_once() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.0).unwrap();
+        let mut embedding = Embedding::default();
+        embedding.sync_with_edge(&mesh, 1.3);
+        let mut displacements = vec![Vec3::X * 0.01; mesh.slots()];
+        embedding.move_all(&mut mesh, &mut displacements);
+        let v = mesh.vertices().next().unwrap();
+        for k in 0..50 {
+            let up = Vec3::Z * if k % 2 == 0 { 0.01 } else { -0.01 };
+            let edit = |mesh: &mut Mesh| {
+                mesh.set_position(v, mesh.position(v) + up);
+                Ok(())
+            };
+            embedding.attempt(&mut mesh, edit).unwrap();
+        }
+        let mut listed = embedding.edited.clone();
+        sort_distinct(&mut listed);
+        assert_eq!(listed.len(), embedding.edited.len());
+        assert_eq!(listed.len(), 1 + mesh.ring(v).valence());
+        let held = embedding.move_all(&mut mesh, &mut displacements);
+        assert!(held.is_empty() && embedding.edited.is_empty());
+    }
+}

@@ -38,8 +38,7 @@ impl Embedding {
 
     /// Updates the grid with the edits since [`Mesh::begin`], and marks the vertices that they touched for all checks.
     fn sync_touched(&mut self, mesh: &Mesh) {
-        self.resize_for(mesh.slots());
-        self.pending.resize(mesh.slots(), Checks::default());
+        self.resize_for_checks(mesh);
         for v in mesh.touched_vertices() {
             self.forget(v);
             if mesh.is_live(v) {
