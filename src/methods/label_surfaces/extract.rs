@@ -52,11 +52,19 @@ impl<'a> Extraction<'a> {
         self.first.clear();
         self.first.resize((last - start) as usize + 1, 0);
         for &slot in slots {
+            if nets.coarse.target(slot) != slot {
+                continue;
+            }
             let count = cube_loops()[nets.cells.get(slot).case(number)].count;
             self.first[(slot - start) as usize] = self.mesh.positions.len() as u32;
             for on in 0..count {
                 self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));
             }
+        }
+        for &slot in slots {
+            // Merged cells have one vertex of each label, and so have those that they are merged into.
+            let target = nets.coarse.target(slot);
+            self.first[(slot - start) as usize] = self.first[(target - start) as usize];
         }
         for &slot in slots {
             for crossing in nets.crossings(slot) {
@@ -67,7 +75,11 @@ impl<'a> Extraction<'a> {
                     if reflected {
                         corners.swap(1, 2);
                     }
-                    self.mesh.triangles.push(corners);
+                    let [a, b, c] = corners;
+                    // Between merged cells, nothing is left.
+                    if a != b && b != c && c != a {
+                        self.mesh.triangles.push(corners);
+                    }
                 }
             }
         }

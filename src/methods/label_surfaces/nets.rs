@@ -9,6 +9,7 @@
 //! saddle, where vertices in the cells alone leave no gap.
 
 use super::cells::{Cell, CellBox, Cells};
+use super::coarsen::Coarsening;
 use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::order::sort_distinct;
@@ -88,6 +89,8 @@ pub struct Nets {
     pub grid: LabelGrid,
     /// The cells through which surfaces pass.
     pub cells: Cells,
+    /// Which cells are merged.
+    pub coarse: Coarsening,
     /// Slots of the cells in which each label is, in ascending order; those of the label with number 1 come first.
     of_labels: Vec<Vec<u32>>,
     to_world: DAffine3,
@@ -100,7 +103,8 @@ impl Nets {
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
-        let mut nets = Self { cells: Cells::new(grid.dims())?, of_labels: Vec::new(), grid, to_world };
+        let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
+        let mut nets = Self { cells, coarse, of_labels, grid, to_world };
         nets.update(nets.everywhere())?;
         Ok(nets)
     }
@@ -135,7 +139,7 @@ impl Nets {
         for (slot, cell) in (0..).zip(cells.slots()) {
             cell.numbers().for_each(|number| of_labels[usize::from(number) - 1].push(slot));
         }
-        (self.grid, self.cells, self.of_labels) = (grid, cells, of_labels);
+        *self = Self { grid, cells, coarse: Coarsening::default(), of_labels, to_world: self.to_world };
     }
 
     /// Returns the slots of the cells in which a label is, in ascending order.

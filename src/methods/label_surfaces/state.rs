@@ -9,7 +9,7 @@ use crate::methods::saved::{Hash, Magic, decode, encode};
 use crate::methods::{MethodError, Parameters};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLLAB\x01";
+const MAGIC: Magic = *b"VSCLLAB\x02";
 
 /// The saved state of [`LabelSurfaces`].
 #[derive(Serialize, Deserialize)]
@@ -74,6 +74,7 @@ impl LabelSurfaces {
         self.nets.restore(grid, cells);
         self.recount();
         self.params = state.params;
+        self.coarsen(self.nets.everywhere(), &[]);
         self.zone = None;
         if let Some([low, high]) = state.area {
             self.wake(CellBox { low, high });

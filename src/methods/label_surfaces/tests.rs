@@ -26,9 +26,9 @@ fn check(surfaces: &LabelSurfaces, what: &str) {
         "{what}: {found:?}"
     );
     let measures = measure(&all);
-    let counts = surfaces.counts;
-    assert_eq!([all.positions.len(), all.triangles.len()], [counts.vertices, counts.triangles], "{what}");
-    assert_eq!((measures.components, measures.euler), (surfaces.components, counts.euler()), "{what}");
+    let counts = LiveSurface::counts(surfaces);
+    assert_eq!([all.positions.len(), all.triangles.len()], counts, "{what}");
+    assert_eq!((measures.components, measures.euler), (surfaces.components, surfaces.counts.euler()), "{what}");
 }
 
 fn settle(surfaces: &mut LabelSurfaces) {
@@ -328,7 +328,7 @@ fn only_surfaces_near_a_stroke_change() {
 #[test]
 fn a_saved_run_continues_with_the_same_bits() {
     let mut volume = balls(40, 5, 6);
-    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25 }).unwrap();
+    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25, ..LabelParams::default() }).unwrap();
     let mut brush = Brush { random: Random::new(1), labels: 6 };
     for _ in 0..4 {
         surfaces.step().unwrap();
@@ -382,7 +382,7 @@ fn bad_input_is_named_and_changes_nothing() {
         (Some(vec![1.0, 77.0]), 20, "labels: must be labels of the volume, got 77"),
         (None, 201, "smoothing: must be"),
     ] {
-        let found = refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing }));
+        let found = refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing, ..LabelParams::default() }));
         assert!(found.starts_with(start), "{found}");
     }
     let floats = Volume::new(VolumeInit::new(Voxels::F32(vec![1.0; 8]), [2, 2, 2, 1])).unwrap();
@@ -423,10 +423,37 @@ fn too_many_labels_are_refused_and_change_nothing() {
     let some = (0..65_535).map(|i| f64::from(i + 1)).collect();
     assert!(LabelGrid::new(&many, Some(some)).is_ok());
 
-    let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0 }).unwrap();
+    let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
     let before = surfaces.save();
     let refused = surfaces.refresh(&many, Region { min: [0; 3], dims }).unwrap_err().to_string();
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     assert!(surfaces.save() == before);
     assert_eq!((surfaces.labels(), surfaces.nets.grid.number(9.0)), (vec![7.0], None));
+}
+
+#[test]
+#[ignore]
+fn figures_of_edges() {
+    for (name, volume) in [("9 balls", balls(96, 5, 9)), ("12 balls", balls(52, 2, 12)), ("noise", noise([12; 3], 4, 3))] {
+        for edge in [1.0, 1.5, 2.0, 3.0, 5.0] {
+            let params = LabelParams { edge: 1.0, ..LabelParams::default() };
+            let mut surfaces = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
+            settle(&mut surfaces);
+            let start = std::time::Instant::now();
+            surfaces.set_params(LabelParams { edge, ..params }).unwrap();
+            let time = start.elapsed().as_secs_f64();
+            let all = surfaces.surface();
+            let (mut sum, mut count) = (0.0, 0.0);
+            for [a, b, c] in all.corners() {
+                sum += f64::from(a.distance(b) + b.distance(c) + c.distance(a));
+                count += 3.0;
+            }
+            let worst = volume.labels(0).unwrap().iter().filter(|l| l.voxels >= 500).map(|label| {
+                measure(&surfaces.mesh(label.value).unwrap()).volume / label.voxels as f64 - 1.0
+            }).fold(0.0_f64, |w, e| if e.abs() > w.abs() { e } else { w });
+            println!("{name} edge {edge}: {:?} mean {:.3} volume {worst:.4} {time:.2} s {:?}", LiveSurface::counts(&surfaces), sum / count, report(&all).unwrap().self_intersections);
+            check(&surfaces, "edges");
+            assert_voxels_are_inside(&surfaces, &volume);
+        }
+    }
 }
