@@ -22,6 +22,11 @@ impl Counts {
         self.vertices as i64 - self.triangles as i64 / 2
     }
 
+    /// Returns the numbers of vertices and triangles after collapses of `edges` edges.
+    pub fn without(&self, edges: usize) -> [usize; 2] {
+        [self.vertices - edges, self.triangles - 2 * edges]
+    }
+
     /// Adds those of a part.
     pub fn add(&mut self, part: Self) {
         self.vertices += part.vertices;

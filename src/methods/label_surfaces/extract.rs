@@ -52,10 +52,14 @@ impl<'a> Extraction<'a> {
         self.first.clear();
         self.first.resize((last - start) as usize + 1, 0);
         for &slot in slots {
+            if nets.coarse.target(slot) != slot {
+                continue;
+            }
             let count = cube_loops()[nets.cells.get(slot).case(number)].count;
             self.first[(slot - start) as usize] = self.mesh.positions.len() as u32;
             for on in 0..count {
-                self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));
+                let vertex = NetVertex::Cell { slot, on };
+                self.mesh.positions.push(nets.shifted_position(number, vertex, nets.coarse.shift(slot)));
             }
         }
         for &slot in slots {
@@ -63,11 +67,16 @@ impl<'a> Extraction<'a> {
                 let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
                 let mut on_edge = None;
                 for triangle in nets.patch(&crossing, far == 1).triangles() {
-                    let mut corners = triangle.map(|vertex| self.index(number, vertex, &mut on_edge));
+                    let index = |vertex| self.index(number, nets.coarse.follow(vertex), &mut on_edge);
+                    let mut corners = triangle.map(index);
                     if reflected {
                         corners.swap(1, 2);
                     }
-                    self.mesh.triangles.push(corners);
+                    let [a, b, c] = corners;
+                    // Between merged cells, nothing is left.
+                    if a != b && b != c && c != a {
+                        self.mesh.triangles.push(corners);
+                    }
                 }
             }
         }

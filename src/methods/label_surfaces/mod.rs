@@ -10,6 +10,7 @@
 
 mod balance;
 mod cells;
+mod coarsen;
 mod counts;
 mod cube_loops;
 mod extract;
@@ -79,7 +80,8 @@ impl LiveSurface for LabelSurfaces {
     }
 
     fn counts(&self) -> [usize; 2] {
-        [self.counts.vertices, self.counts.triangles]
+        let merged = (1..=self.label_counts.len() as u16).map(|number| self.nets.coarse.merged(number)).sum();
+        self.counts.without(merged)
     }
 
     fn versions(&self) -> [u32; 2] {
@@ -115,6 +117,7 @@ impl LabelSurfaces {
         surfaces.recount();
         surfaces.nets.untangle(everywhere);
         surfaces.wake(everywhere);
+        surfaces.coarsen(everywhere, &[], &mut []);
         Ok(surfaces)
     }
 
@@ -138,7 +141,7 @@ impl LabelSurfaces {
     pub fn mesh_counts(&self, label: f64) -> Result<[usize; 2], MethodError> {
         let number = self.number_of(label)?;
         let counts = self.label_counts.get(usize::from(number) - 1).copied().unwrap_or_default();
-        Ok([counts.vertices, counts.triangles])
+        Ok(counts.without(self.nets.coarse.merged(number)))
     }
 
     /// Returns the topology and the geometry version of the surface of one label, as [`LiveSurface::versions`] does for
@@ -190,14 +193,24 @@ impl LabelSurfaces {
             self.nets.update(changed)?;
         }
         self.count(&touched, Counts::add);
-        let mut reconnected = updated?;
-        let untangled = self.nets.untangle(touched);
+        let untangled = if updated.is_ok() { self.nets.untangle(touched) } else { Vec::new() };
+        let area = changed.grown(HALO, dims);
+        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
+        let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
+        self.coarsen(touched, &untangled, &mut reconnected);
+        updated?;
         self.nets.flag_labels_in(untangled, &mut reconnected);
         self.versions.record(&[], &reconnected);
         self.components = self.nets.components();
-        let area = changed.grown(HALO, dims);
-        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         Ok(())
+    }
+
+    /// Coarsens the surfaces around a box, and cells in slots, that have changed, or prepares that while surfaces are yet to
+    /// be smoothed; sets the flag, by number, of each label whose triangles have changed by that.
+    fn coarsen(&mut self, area: CellBox, slots: &[u32], reconnected: &mut [bool]) {
+        let cells = slots.iter().map(|&slot| self.nets.cells.get(slot).at);
+        let area = cells.fold(area, |area, at| area.union(&CellBox { low: at, high: at }));
+        self.nets.coarsen(self.params.edge, &area, self.zone.is_some(), reconnected);
     }
 
     /// Counts again from the beginning, when labels may have other numbers.
@@ -224,15 +237,20 @@ impl LabelSurfaces {
         &self.params
     }
 
-    /// Replaces the parameters; all surfaces are smoothed again with them, from where they are.
+    /// Replaces the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`]; nothing has changed then.
     pub fn set_params(&mut self, params: LabelParams) -> Result<(), MethodError> {
         params.check_ranges()?;
-        if params != self.params {
-            self.params = params;
+        let before = std::mem::replace(&mut self.params, params);
+        if self.params.smoothing != before.smoothing {
             self.wake(self.nets.everywhere());
+        }
+        if self.params.edge != before.edge {
+            let mut reconnected = self.nets.no_labels();
+            self.coarsen(self.nets.everywhere(), &[], &mut reconnected);
+            self.versions.record(&[], &reconnected);
         }
         Ok(())
     }
@@ -268,17 +286,22 @@ impl LabelSurfaces {
                 (0..balances).for_each(|_| zone.balance());
                 zone.write(&mut surfaces.nets);
             });
+            let area = zone.area.grown(1, self.nets.grid.dims());
+            let mut untangled = Vec::new();
+            let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
             self.timed("intersections", &mut times, |surfaces| {
-                let untangled = surfaces.nets.untangle(zone.area.grown(1, surfaces.nets.grid.dims()));
+                untangled = surfaces.nets.untangle(area);
                 zone.read(&surfaces.nets);
-                let [mut moved, mut reconnected] = [(); 2].map(|()| surfaces.nets.no_labels());
                 surfaces.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
                 zone.flag_reconnected(&diagonals, &mut reconnected);
                 // Diagonals around these are not known, as far as they are outside the zone.
-                surfaces.nets.flag_labels_in(untangled, &mut reconnected);
-                surfaces.versions.record(&moved, &reconnected);
+                surfaces.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
             });
             self.zone = (!is_last).then_some(zone);
+            self.timed("coarsening", &mut times, |surfaces| {
+                surfaces.coarsen(area, &untangled, &mut reconnected);
+            });
+            self.versions.record(&moved, &reconnected);
         }
         Ok(self.report(times))
     }
@@ -296,6 +319,7 @@ impl LabelSurfaces {
 
     fn report(&self, times: Times) -> StepReport {
         let done = self.zone.is_none();
+        let [vertices, triangles] = LiveSurface::counts(self);
         let share = f64::from(self.iterations) / f64::from(self.params.smoothing.max(1));
         StepReport {
             iteration: self.steps,
@@ -304,8 +328,8 @@ impl LabelSurfaces {
             progress: if done { 1.0 } else { share.min(1.0) },
             residual: self.residual,
             tolerance: 0.0,
-            vertices: self.counts.vertices as u32,
-            triangles: self.counts.triangles as u32,
+            vertices: vertices as u32,
+            triangles: triangles as u32,
             components: self.components as u32,
             euler: self.counts.euler() as i32,
             events: Changes::default(),

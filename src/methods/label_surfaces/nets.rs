@@ -9,6 +9,7 @@
 //! saddle, where vertices in the cells alone leave no gap.
 
 use super::cells::{Cell, CellBox, Cells};
+use super::coarsen::Coarsening;
 use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::order::sort_distinct;
@@ -88,6 +89,8 @@ pub struct Nets {
     pub grid: LabelGrid,
     /// The cells through which surfaces pass.
     pub cells: Cells,
+    /// Which cells are merged.
+    pub coarse: Coarsening,
     /// Slots of the cells in which each label is, in ascending order; those of the label with number 1 come first.
     of_labels: Vec<Vec<u32>>,
     to_world: DAffine3,
@@ -100,7 +103,8 @@ impl Nets {
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
-        let mut nets = Self { cells: Cells::new(grid.dims())?, of_labels: Vec::new(), grid, to_world };
+        let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
+        let mut nets = Self { cells, coarse, of_labels, grid, to_world };
         nets.update(nets.everywhere())?;
         Ok(nets)
     }
@@ -120,8 +124,8 @@ impl Nets {
             }
         }
         let Self { cells, of_labels, .. } = self;
-        for (slots, number) in
-            of_labels.iter_mut().zip(1..).filter(|&(_, number)| changed[usize::from(number)])
+        for (number, slots) in
+            (1..=u16::MAX).zip(of_labels).filter(|&(number, _)| changed[usize::from(number)])
         {
             slots.retain(|&slot| cells.get(slot).corners.contains(&number));
             sort_distinct(slots);
@@ -135,7 +139,7 @@ impl Nets {
         for (slot, cell) in (0..).zip(cells.slots()) {
             cell.numbers().for_each(|number| of_labels[usize::from(number) - 1].push(slot));
         }
-        (self.grid, self.cells, self.of_labels) = (grid, cells, of_labels);
+        *self = Self { grid, cells, coarse: Coarsening::default(), of_labels, to_world: self.to_world };
     }
 
     /// Returns the slots of the cells in which a label is, in ascending order.
@@ -150,8 +154,10 @@ impl Nets {
 
     /// Sets the flag, by number, of each label that is in the cell in one of the given slots.
     pub fn flag_labels_in(&self, slots: impl IntoIterator<Item = u32>, flags: &mut [bool]) {
-        for slot in slots {
-            self.cells.get(slot).corners.iter().for_each(|&number| flags[usize::from(number)] = true);
+        for number in slots.into_iter().flat_map(|slot| self.cells.get(slot).corners) {
+            if let Some(flag) = flags.get_mut(usize::from(number)) {
+                *flag = true;
+            }
         }
     }
 
@@ -297,6 +303,11 @@ impl Nets {
 
     /// Returns the position of a vertex of a label in world space.
     pub fn world_position(&self, number: u16, vertex: NetVertex) -> Vec3 {
+        self.shifted_position(number, vertex, Vec3::ZERO)
+    }
+
+    /// Returns the position in world space of a vertex of a label that is displaced by `shift` in index space.
+    pub fn shifted_position(&self, number: u16, vertex: NetVertex, shift: Vec3) -> Vec3 {
         let slot = match vertex {
             NetVertex::Cell { slot, .. } | NetVertex::Face { slot, .. } | NetVertex::Edge { slot, .. } => {
                 slot
@@ -304,7 +315,7 @@ impl Nets {
         };
         let at = self.cells.get(slot).at;
         let centre = DVec3::from(at.map(|n| f64::from(n) - 0.5));
-        let local = self.position(number, vertex, at).as_dvec3();
+        let local = (self.position(number, vertex, at) + shift).as_dvec3();
         self.to_world.transform_point3(centre + local).as_vec3()
     }
 

@@ -15,5 +15,15 @@ parameters! {
             step: 1.0,
             unit: "iterations",
         },
+
+        /// Edge length wanted of the triangles, in voxels; 1 leaves a vertex for each cell between voxels.
+        pub edge: f64 = 1.0 => {
+            name: "edge",
+            label: "Edge length",
+            help: "Edge length wanted of the triangles: longer gives fewer, as far as no voxel changes sides; 1 keeps all.",
+            range: 1.0..=10.0,
+            step: 0.5,
+            unit: "voxels",
+        },
     }
 }

@@ -1,7 +1,9 @@
 use super::*;
 use crate::math::{DAffine3, DVec3, Random, Vec3};
 use crate::mesh::{measure, report};
+use crate::spatial::TriangleTree;
 use crate::volume::{VolumeInit, Voxels, voxels_inside};
+use nets::NetVertex;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -26,9 +28,13 @@ fn check(surfaces: &LabelSurfaces, what: &str) {
         "{what}: {found:?}"
     );
     let measures = measure(&all);
-    let counts = surfaces.counts;
-    assert_eq!([all.positions.len(), all.triangles.len()], [counts.vertices, counts.triangles], "{what}");
-    assert_eq!((measures.components, measures.euler), (surfaces.components, counts.euler()), "{what}");
+    let counts = LiveSurface::counts(surfaces);
+    assert_eq!([all.positions.len(), all.triangles.len()], counts, "{what}");
+    assert_eq!(
+        (measures.components, measures.euler),
+        (surfaces.components, surfaces.counts.euler()),
+        "{what}"
+    );
 }
 
 fn settle(surfaces: &mut LabelSurfaces) {
@@ -255,6 +261,21 @@ fn versions_increase_only_for_surfaces_that_change() {
     assert_eq!((surfaces.versions(), versions(&surfaces)), before);
 }
 
+/// Asserts that the surfaces are coarsened as they would be from the beginning.
+fn assert_coarse_anew(surfaces: &LabelSurfaces, what: &str) {
+    let mut anew = surfaces.nets.clone();
+    anew.coarse = super::coarsen::Coarsening::default();
+    let edge = surfaces.params.edge;
+    anew.coarsen(edge, &anew.everywhere(), false, &mut []);
+    if let Some(pending) = surfaces.nets.coarse.pending {
+        anew.coarsen(edge, &pending, true, &mut []);
+    }
+    for slot in surfaces.nets.cells.within(&anew.everywhere()) {
+        let found = [&surfaces.nets, &anew].map(|nets| (nets.coarse.target(slot), nets.coarse.shift(slot)));
+        assert_eq!(found[0], found[1], "{what}, slot {slot}");
+    }
+}
+
 /// Paints strokes, and compares the surfaces after each with those of the label map as it is then.
 fn fuzz_strokes(seed: u64, strokes: usize) {
     let mut random = Random::new(seed);
@@ -262,13 +283,15 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
     let labels = 1 + random.below(5);
     let mut volume = noise(dims, if random.below(2) == 0 { 0 } else { labels }, seed);
     let mut brush = Brush { random, labels };
-    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    let params = LabelParams { edge: [1.0, 1.5, 2.0, 4.0][seed as usize % 4], ..LabelParams::default() };
+    let mut surfaces = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
     let mut copies = Copies::of(&surfaces);
     for stroke in 0..strokes {
         let what = format!("seed {seed}, stroke {stroke}");
         let region = brush.paint(&mut volume);
         surfaces.refresh(&volume, region).unwrap();
         check(&surfaces, &what);
+        assert_coarse_anew(&surfaces, &what);
         copies.update(&surfaces, &what);
         // Some strokes follow before the surfaces are settled.
         if brush.random.below(3) > 0 {
@@ -276,7 +299,7 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
             check(&surfaces, &what);
             copies.update(&surfaces, &what);
         }
-        let anew = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+        let anew = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
         assert_eq!(
             (surfaces.labels(), surfaces.counts, surfaces.components),
             (anew.labels(), anew.counts, anew.components),
@@ -328,7 +351,8 @@ fn only_surfaces_near_a_stroke_change() {
 #[test]
 fn a_saved_run_continues_with_the_same_bits() {
     let mut volume = balls(40, 5, 6);
-    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25 }).unwrap();
+    let mut surfaces =
+        LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25, ..LabelParams::default() }).unwrap();
     let mut brush = Brush { random: Random::new(1), labels: 6 };
     for _ in 0..4 {
         surfaces.step().unwrap();
@@ -382,7 +406,8 @@ fn bad_input_is_named_and_changes_nothing() {
         (Some(vec![1.0, 77.0]), 20, "labels: must be labels of the volume, got 77"),
         (None, 201, "smoothing: must be"),
     ] {
-        let found = refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing }));
+        let found =
+            refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing, ..LabelParams::default() }));
         assert!(found.starts_with(start), "{found}");
     }
     let floats = Volume::new(VolumeInit::new(Voxels::F32(vec![1.0; 8]), [2, 2, 2, 1])).unwrap();
@@ -421,12 +446,111 @@ fn too_many_labels_are_refused_and_change_nothing() {
     let refused = LabelSurfaces::new(&many, None, LabelParams::default()).err().unwrap().to_string();
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     let some = (0..65_535).map(|i| f64::from(i + 1)).collect();
-    assert!(LabelGrid::new(&many, Some(some)).is_ok());
+    let mut most =
+        LabelSurfaces::new(&many, Some(some), LabelParams { smoothing: 0, ..LabelParams::default() })
+            .unwrap();
+    assert_eq!((most.labels().len(), most.components), (65_535, 65_535));
+    most.refresh(&many, Region { min: [0; 3], dims }).unwrap();
+    most.restore(&most.save()).unwrap();
+    assert_eq!(most.mesh(65_535.0).unwrap().components().len(), 1);
 
-    let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0 }).unwrap();
+    let mut surfaces =
+        LabelSurfaces::new(&few, None, LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
     let before = surfaces.save();
     let refused = surfaces.refresh(&many, Region { min: [0; 3], dims }).unwrap_err().to_string();
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     assert!(surfaces.save() == before);
     assert_eq!((surfaces.labels(), surfaces.nets.grid.number(9.0)), (vec![7.0], None));
+}
+
+/// Returns the mean edge length of a mesh.
+fn mean_edge(mesh: &TriangleMesh) -> f64 {
+    let sum: f64 =
+        mesh.corners().map(|[a, b, c]| f64::from(a.distance(b) + b.distance(c) + c.distance(a))).sum();
+    sum / (3.0 * mesh.triangles.len() as f64)
+}
+
+/// Returns the largest distance, where labels touch, of the centres of triangles from the surface of the other label: these
+/// triangles come from polygons around edges of the grid between the two.
+fn largest_gap(surfaces: &LabelSurfaces) -> f64 {
+    let nets = &surfaces.nets;
+    let trees: Vec<_> = (1..=9).map(|number| TriangleTree::new(&nets.mesh(number)).unwrap()).collect();
+    let mut largest = 0.0_f64;
+    for slot in nets.cells.within(&nets.everywhere()) {
+        for crossing in nets.crossings(slot).filter(|crossing| !crossing.ends.contains(&0)) {
+            for (far, other) in [(false, crossing.ends[1]), (true, crossing.ends[0])] {
+                let number = crossing.ends[usize::from(far)];
+                for triangle in nets.patch(&crossing, far).triangles() {
+                    let position = |vertex: &NetVertex| {
+                        let vertex = nets.coarse.follow(*vertex);
+                        let NetVertex::Cell { slot, .. } = vertex else {
+                            return nets.world_position(number, vertex);
+                        };
+                        nets.shifted_position(number, vertex, nets.coarse.shift(slot))
+                    };
+                    let centre = triangle.iter().map(position).sum::<Vec3>() / 3.0;
+                    let distance = trees[usize::from(other) - 1].closest(centre).unwrap().distance;
+                    largest = largest.max(distance);
+                }
+            }
+        }
+    }
+    largest
+}
+
+#[test]
+fn longer_edges_keep_voxels_gaps_and_topology() {
+    let volume = balls(44, 4, 9);
+    let mut surfaces = settled(&volume);
+    let (fine, before) = (surfaces.surface(), surfaces.versions());
+    let mut triangles = fine.triangles.len();
+    for edge in [1.5, 2.0, 3.0] {
+        let what = format!("edge {edge}");
+        surfaces.set_params(LabelParams { edge, ..LabelParams::default() }).unwrap();
+        assert!(surfaces.step().unwrap().done, "nothing is smoothed again");
+        check(&surfaces, &what);
+        assert_voxels_are_inside(&surfaces, &volume);
+        let mesh = surfaces.surface();
+        let mean = mean_edge(&mesh);
+        assert!((0.8 * edge..1.1 * edge).contains(&mean), "{what}: {mean}");
+        assert!(f64::from(mesh.triangles.len() as u32) < 0.7 * f64::from(triangles as u32), "{what}");
+        triangles = mesh.triangles.len();
+        let gap = largest_gap(&surfaces);
+        assert!(gap < 0.05, "{what}: {gap}");
+        for label in volume.labels(0).unwrap().iter().filter(|label| label.voxels >= 500) {
+            let error = measure(&surfaces.mesh(label.value).unwrap()).volume / label.voxels as f64 - 1.0;
+            assert!(error.abs() < 0.015, "{what}, label {}: {error}", label.value);
+        }
+    }
+    assert!(surfaces.versions()[0] > before[0]);
+    surfaces.set_params(LabelParams::default()).unwrap();
+    assert!(surfaces.surface() == fine);
+}
+
+#[test]
+fn coarse_surfaces_follow_strokes_as_if_made_anew() {
+    let mut volume = balls(44, 4, 9);
+    let params = LabelParams { edge: 1.5, ..LabelParams::default() };
+    let mut surfaces = LabelSurfaces::new(&volume, None, params).unwrap();
+    settle(&mut surfaces);
+    let mut copies = Copies::of(&surfaces);
+    let mut random = Random::new(7);
+    for stroke in 0..6 {
+        let what = format!("stroke {stroke}");
+        let min = [0; 3].map(|_| 8 + random.below(22) as usize);
+        let region = Region { min, dims: [5, 6, 4] };
+        volume.write(region, &Voxels::U8(vec![random.below(10) as u8; 120]), 0).unwrap();
+        surfaces.refresh(&volume, region).unwrap();
+        for what in [format!("{what}, refreshed"), what] {
+            check(&surfaces, &what);
+            assert_coarse_anew(&surfaces, &what);
+            copies.update(&surfaces, &what);
+            settle(&mut surfaces);
+        }
+    }
+    assert_voxels_are_inside(&surfaces, &volume);
+    let state = surfaces.save();
+    let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    other.restore(&state).unwrap();
+    assert!(other.surface() == surfaces.surface());
 }

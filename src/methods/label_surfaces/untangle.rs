@@ -25,13 +25,23 @@ const NEEDLE: f32 = 1e-3;
 const MARGIN: f32 = 1e-3;
 
 /// A triangle of a polygon around one of the edges of a cell.
-struct Piece {
+pub struct Piece {
     /// Indices of its vertices.
-    corners: [u32; 3],
-    /// Positions in index space, relative to the cell.
-    points: [Vec3; 3],
+    pub corners: [u32; 3],
+    /// Positions in index space, relative to a cell.
+    pub points: [Vec3; 3],
     /// Unit normal; zero for needles.
-    normal: Vec3,
+    pub normal: Vec3,
+}
+
+impl Piece {
+    /// Creates a triangle.
+    pub fn new(corners: [u32; 3], points: [Vec3; 3]) -> Self {
+        let area = (points[1] - points[0]).cross(points[2] - points[0]);
+        let length = area.length();
+        let normal = if length > NEEDLE { area / length } else { Vec3::ZERO };
+        Self { corners, points, normal }
+    }
 }
 
 /// A polygon around one of the edges of a cell.
@@ -133,10 +143,7 @@ impl Neighbourhood {
         for &triangle in patch.triangles() {
             let corners = triangle.map(|vertex| self.index_of(nets, at, (number, vertex)));
             let points = corners.map(|corner| self.positions[corner as usize]);
-            let area = (points[1] - points[0]).cross(points[2] - points[0]);
-            let length = area.length();
-            let normal = if length > NEEDLE { area / length } else { Vec3::ZERO };
-            self.pieces.push(Piece { corners, points, normal });
+            self.pieces.push(Piece::new(corners, points));
         }
         let mut polygon =
             Polygon { pieces: first..self.pieces.len(), corners: None, points: [Vec3::ZERO; 4] };
@@ -241,7 +248,7 @@ fn are_sides_of_a_plane(one: &Polygon, other: &Polygon) -> bool {
 }
 
 /// Returns whether two triangles have nothing in common but their common corners, as far as that is quickly seen.
-fn surely_apart(s: &Piece, t: &Piece) -> bool {
+pub fn surely_apart(s: &Piece, t: &Piece) -> bool {
     let common = s.corners.iter().filter(|corner| t.corners.contains(corner)).count();
     match common {
         0 => is_beside(s, t) || is_beside(t, s),
