@@ -1,6 +1,6 @@
 import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
-import type { Failure } from '../protocol';
+import type { CodeRequest, CodeRequests, Failure, RunCode } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
@@ -24,7 +24,17 @@ interface Engine {
 interface RunEngine extends Engine {
   request(kind: 'play' | 'pause', body: undefined): Promise<unknown>;
   request(kind: 'step', body: { count: number }): Promise<unknown>;
+  request(kind: 'code', body: CodeRequest): Promise<RunCode>;
+  request(kind: 'data', body: undefined): Promise<CodeRequests['data']['reply']>;
 }
+
+/** What is said of copied code, by what its function is given. */
+const COPIED = {
+  files: 'sessions.codeCopied',
+  saved: 'sessions.codeCopiedSaved',
+  folder: 'sessions.codeCopiedFolder',
+  nothing: 'sessions.codeCopiedAlone',
+} as const;
 
 type AnySource<Example> = Source<Example, unknown, unknown>;
 
@@ -207,7 +217,32 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       onUndo: () => this.#travel('undo'),
       onRedo: () => this.#travel('redo'),
       onSaveSession: (included) => void this.saveSession(included),
+      onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
+      onSaveData: () => this.ask(this.#saveData(), text('sessions.dataFailed')),
     };
+  }
+
+  /** What a request for code says besides the edits of the surface. */
+  protected codeRequest(): Pick<CodeRequest, 'frame'> {
+    return {};
+  }
+
+  /** Copies code that repeats the run and the edits of its surface; without a clipboard, saves it as a file. */
+  async #copyCode(): Promise<void> {
+    const { saving, status, finish } = this.ui;
+    const request = { stem: saving.stem, edits: finish?.log ?? [], ...this.codeRequest() };
+    const { code, needs, name, note = '' } = await this.client.request('code', request);
+    try {
+      await navigator.clipboard.writeText(code);
+      status.say(`${text(COPIED[needs], { name })} ${note}`.trim());
+    } catch {
+      saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
+    }
+  }
+
+  async #saveData(): Promise<void> {
+    const { extension, bytes } = await this.client.request('data', undefined);
+    this.ui.saving.bytes(extension, bytes, 'application/octet-stream');
   }
 
   protected beginRuns(own: Shortcut[] = [], toggleText?: string): void {

@@ -5,10 +5,10 @@ import { h, uniqueId, wideButton } from './dom';
 export interface SessionEvents {
   /** Saves a session; `included`: with the data that it was made from. */
   onSaveSession: (included: boolean) => void;
-  /** Copies the run as code; without it, the lab has none. */
-  onCopyCode?: () => void;
-  /** Saves the volume as a file that the code reads; without it, the lab has none. */
-  onSaveVolume?: () => void;
+  /** Copies the run as code. */
+  onCopyCode: () => void;
+  /** Saves the data as a file that the code reads. */
+  onSaveData: () => void;
 }
 
 /** Controls that save the session, and copy the run as code. */
@@ -16,7 +16,7 @@ export class SessionControls {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[] = [];
 
-  constructor({ onSaveSession, onCopyCode, onSaveVolume }: SessionEvents) {
+  constructor({ onSaveSession, onCopyCode, onSaveData }: SessionEvents) {
     const included = h('input', { type: 'checkbox', 'data-session': 'included' });
     this.element = h(
       'div',
@@ -25,10 +25,8 @@ export class SessionControls {
         onSaveSession(included.checked),
       ),
       h('label', { class: 'check' }, included, text('sessions.include')),
-      ...(onCopyCode ? this.#action('code', text('sessions.copyCode'), text('sessions.copyCodeHelp'), onCopyCode) : []),
-      ...(onSaveVolume
-        ? this.#action('volume', text('sessions.saveVolume'), text('sessions.saveVolumeHelp'), onSaveVolume)
-        : []),
+      ...this.#action('code', text('sessions.copyCode'), text('sessions.copyCodeHelp'), onCopyCode),
+      ...this.#action('data', text('sessions.saveData'), text('sessions.saveDataHelp'), onSaveData),
     );
   }
 
