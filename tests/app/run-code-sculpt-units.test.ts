@@ -66,7 +66,7 @@ async function interactiveRun(seed: number, source: SceneSource, params: object 
   await worker.request('show', { layout: 'result', quantity: undefined, textured: false });
   const can: (() => Promise<unknown>)[] = [
     () => pose(target(), false),
-    // A drag of some frames, after which the surface may come to rest.
+    // A drag of some frames, after which the surface may settle.
     async () => {
       for (let i = 0; i < 4; i++) await pose(target(), true);
       await pose(target(), false);

@@ -194,11 +194,11 @@ export interface CodeRequest {
 /** JavaScript that repeats a run. */
 export interface RunCode {
   code: string;
-  /** What its function is given: files that were opened, or one that the lab saves for it, or a folder. */
+  /** Data that its function takes: files that were opened, or one that the lab saves for it, or a folder. */
   needs: 'files' | 'saved' | 'folder' | 'nothing';
   /** Names of the files, or of the folder. */
   name: string;
-  /** What the code lacks, in a sentence. */
+  /** Part of the run that the code lacks, in a sentence. */
   note?: string | undefined;
 }
 

@@ -64,7 +64,7 @@ class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
   #volume: Volume | undefined;
   #large: LargeVolume | undefined;
-  /** What the code of a run needs to know of the volume. */
+  /** Origin of the volume, for the code of a run. */
   #origin: RunData | undefined;
   #model: DeformableModel | undefined;
   /** Intensities of the volume that are displayed as black and as white. */

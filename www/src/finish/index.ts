@@ -75,12 +75,18 @@ export class Finish {
     return this.#finishing.edited?.log ?? [];
   }
 
-  /** Makes edits of a session again. */
-  async repeat(edits: Edit[]): Promise<void> {
-    for (const edit of edits) {
+  /** The edits that were undone and can be redone, for a session. */
+  get undone(): Edit[] {
+    return this.#finishing.edited?.undone ?? [];
+  }
+
+  /** Makes edits of a session again, also those that were undone there, which can be redone then. */
+  async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
+    for (const edit of [...edits, ...undone]) {
       if (!OPERATIONS.includes(edit.op)) throw new Error(text('sessions.badIndex'));
       await this.#finishing.change('edit', edit);
     }
+    for (const _ of undone) await this.#finishing.change('undo', undefined);
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

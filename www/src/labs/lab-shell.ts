@@ -28,7 +28,7 @@ interface RunEngine extends Engine {
   request(kind: 'data', body: undefined): Promise<CodeRequests['data']['reply']>;
 }
 
-/** What is said of copied code, by what its function is given. */
+/** Messages about copied code, by the data that its function takes. */
 const COPIED = {
   files: 'sessions.codeCopied',
   saved: 'sessions.codeCopiedSaved',
@@ -131,6 +131,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
+      onSaveSession: (included) => void this.#sessions?.save(included),
       onError: (title, error) => this.states.fail(title, error),
     };
   }
@@ -144,10 +145,6 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Shows an error message if a request fails, without waiting for the reply. */
   protected ask(request: Promise<unknown>, title = text('labs.requestFailed')): void {
     request.catch((error) => this.states.fail(title, error));
-  }
-
-  protected async saveSession(included: boolean): Promise<void> {
-    await this.#sessions?.save(included);
   }
 
   /** Waits no longer for the data of a session, since the user does something else. */
@@ -216,13 +213,12 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       onReset: () => void this.#reset(),
       onUndo: () => this.#travel('undo'),
       onRedo: () => this.#travel('redo'),
-      onSaveSession: (included) => void this.saveSession(included),
       onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
       onSaveData: () => this.ask(this.#saveData(), text('sessions.dataFailed')),
     };
   }
 
-  /** What a request for code says besides the edits of the surface. */
+  /** Returns the lab's own part of a request for code. */
   protected codeRequest(): Pick<CodeRequest, 'frame'> {
     return {};
   }

@@ -7,7 +7,7 @@ import { literal } from './literal';
 import { Refusal } from './refusal';
 import type { Call, RunLog } from './run-log';
 
-/** What differs between the labs in the code of a run. */
+/** Code of a run, as far as it differs between the labs. */
 export interface Program {
   /** Names that the code imports from the package. */
   names: string[];
@@ -26,7 +26,7 @@ export interface Program {
   calls: Record<string, (given: never) => string>;
   /** The surface of the model. */
   mesh?: string;
-  /** What the code lacks, in a sentence. */
+  /** Part of the run that the code lacks, in a sentence. */
   note?: string | undefined;
 }
 

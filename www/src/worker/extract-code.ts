@@ -5,7 +5,10 @@ import { bytesOf, callsOf, chosen, type Program, volumeOf } from './code';
 import { literal } from './literal';
 import { startOf } from './models';
 
-/** What a run is of: a frame of a volume, or an image larger than memory with so many coarser levels. A volume that was computed has no files. */
+/**
+ * Volume of a run: a frame of files, of which a computed volume has none, or an image larger than memory and the number
+ * of its coarser levels.
+ */
 export type RunData =
   | { files: { name: string }[]; frame: number | undefined; volume: Volume }
   | { source: LargeSource; name: string; coarserLevels: number };
