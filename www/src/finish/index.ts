@@ -1,6 +1,6 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
 import type { Unit } from '../examples';
-import type { MeshFormat } from '../protocol';
+import type { Measures, MeshFormat } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
@@ -25,6 +25,8 @@ export interface FinishHost {
 /** Panels that edit the surface of a lab and compare it with a reference. */
 export class Finish {
   readonly elements: HTMLElement[];
+  /** Called after each edit or undo, with the measures of the edited surface; undefined if no edits are left. */
+  onEdited: (measures: Measures | undefined) => void = () => undefined;
   readonly #host: FinishHost;
   readonly #finishing: Finishing;
   readonly #edits: EditPanel;
@@ -102,7 +104,10 @@ export class Finish {
     this.#edits.show(edited);
     this.#reference.clear();
     this.#show();
-    if (edited) void this.#reference.compare();
+    if (!edited) return;
+    const { log, undone, measures } = edited;
+    if (log.length + undone.length > 0) this.onEdited(log.length > 0 ? measures : undefined);
+    void this.#reference.compare();
   }
 
   /** Shows the edited surface, or the lab's own as long as there are neither edits nor colours. */

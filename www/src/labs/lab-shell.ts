@@ -1,6 +1,6 @@
 import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
-import type { CodeRequest, CodeRequests, Failure, RunCode } from '../protocol';
+import type { CodeRequest, CodeRequests, Failure, Measures, RunCode } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
@@ -26,6 +26,11 @@ interface RunEngine extends Engine {
   request(kind: 'step', body: { count: number }): Promise<unknown>;
   request(kind: 'code', body: CodeRequest): Promise<RunCode>;
   request(kind: 'data', body: undefined): Promise<CodeRequests['data']['reply']>;
+}
+
+function describeEdited({ info }: Measures): string {
+  const vertices = plural('counts.vertex', info.vertices);
+  return text('finish.edited', { vertices, triangles: plural('counts.triangle', info.triangles) });
 }
 
 /** Messages about copied code, by the data that its function takes. */
@@ -243,6 +248,8 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
 
   protected beginRuns(own: Shortcut[] = [], toggleText?: string): void {
     this.begin(labShortcuts(this.runEvents(), own, toggleText));
+    const { finish, status } = this.ui;
+    if (finish) finish.onEdited = (edited) => status.say(edited ? describeEdited(edited) : this.describe());
   }
 
   /** Takes the events that the workers of all labs send; returns whether this was one of them. */
