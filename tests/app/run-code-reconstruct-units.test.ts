@@ -86,7 +86,7 @@ test('the code of random runs gives the same surfaces, of computed points and of
   await expect(worker.request('data', undefined)).rejects.toThrow('no file but those');
 });
 
-test('the code has cameras, and says that it lacks their photographs', async () => {
+test('the code has cameras, and says that it lacks their pictures', async () => {
   const projection = [100, 0, 0, 100, 0, 100, 0, 100, 0, 0, 1, 5].map((x) => x + 0.1);
   const camera: CameraView = { projection, width: 200, height: 200 };
   const source: CloudSource = { shape: 'two balls' };
@@ -98,7 +98,7 @@ test('the code has cameras, and says that it lacks their photographs', async () 
   await programs.expectSame([plain], [{ name: 'points.xyz', bytes }]);
   const image = new Uint8ClampedArray(4 * 200 * 200).fill(200);
   const coloured = await interactiveRun(11, source, [{ ...camera, image }]);
-  expect((await code()).note).toContain('not the photographs');
+  expect((await code()).note).toContain('lacks the pictures');
   const shape = (ply: Uint8Array) => Mesh.parse(ply).arrays();
   expect(shape(coloured).positions).toEqual(shape(plain).positions);
   expect(shape(coloured).indices).toEqual(shape(plain).indices);

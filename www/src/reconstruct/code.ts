@@ -27,7 +27,7 @@ export function programOf(
       ...(Object.values(edits).some(({ length }) => length > 0) ? [setEdits(edits)] : []),
     ],
     calls: { ...callsOf('step', 'setParams'), setEdits },
-    note: cameras.some(({ image }) => image) ? text('sessions.noPhotographs') : undefined,
+    note: cameras.some(({ image }) => image) ? text('sessions.noPictures') : undefined,
   };
 }
 

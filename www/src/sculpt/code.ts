@@ -40,6 +40,8 @@ export function programOf({ start, params }: PoseLog['setup'], origins: Origins,
     names: ['MultiresolutionModel', ...(meshes.length > 0 ? ['Mesh'] : [])],
     begin: [`const model = new MultiresolutionModel({ ${given}${options});`],
     calls: callsOf('step', 'setParams', 'setEllipsoids'),
+    // Its map is drawn by the app.
+    note: needs === 'saved' ? text('sessions.noPictures') : undefined,
   };
 }
 
