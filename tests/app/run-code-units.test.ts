@@ -6,7 +6,7 @@ import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
 import { uniform } from '../../www/src/random';
-import { toCode } from '../../www/src/worker/code';
+import { bytesOf, callsOf, type Program, toCode } from '../../www/src/worker/code';
 import { programOf } from '../../www/src/worker/extract-code';
 import { literal } from '../../www/src/worker/literal';
 import { filesOf, serveImage, zipOf } from '../js/zarr-stores';
@@ -142,6 +142,24 @@ test('values are written so that they are read as the same, whatever they contai
   const value = { a: [0.1 + 0.2, -0, 1e-300, 5], 'b*/': "it's\n`#{x}`", c: true, d: Number.NaN, e: {} };
   // biome-ignore lint/security/noGlobalEval: what the user does with the code
   expect(eval(`(${literal(value)})`)).toStrictEqual(value);
+});
+
+test('a log, which may come from anyone, cannot choose what the code does', () => {
+  const program: Program = { names: ['DeformableModel'], begin: [], calls: callsOf('step') };
+  const code = (call: string, given: unknown) =>
+    toCode({ setup: {}, calls: [{ call, given }] }, () => program, []).code;
+  for (const call of ['constructor', 'free(); evil', 'toString', '__proto__', 'seed'])
+    expect(() => code(call, 1)).toThrow('which this app does not know');
+  const given = { 'x: evil(), y': "`'\n'); evil(); //" };
+  const [line = ''] = code('step', given)
+    .split('\n')
+    .filter((one) => one.includes('model.step'));
+  const taken: unknown[] = [];
+  new Function('model', line)({ step: (value: unknown) => taken.push(value) });
+  expect(taken).toEqual([given]);
+  const files = bytesOf(['a.nii */ evil(); /*'], ['bytes']);
+  const named = toCode({ setup: {}, calls: [] }, () => ({ ...program, ...files }), []).code;
+  expect(named.match(/\*\//g)).toHaveLength(1);
 });
 
 describe('the code of runs on an image larger than memory', () => {

@@ -206,8 +206,17 @@ test('edits that were undone can be redone in a new browser', async () => {
   await unfold(page);
   for (const edit of ['smooth', 'decimate']) await page.click(`[data-finish=${edit}]:enabled`);
   await expect.poll(async () => (await edits(page)).length).toBe(2);
+  await expect.poll(() => page.textContent('.status')).toMatch(/Edited surface: [\d,]+ vertices/);
   const edited = await surface(page);
+  // Without a clipboard, code is saved as a file.
+  await page.evaluate(() => Object.assign(navigator.clipboard, { writeText: () => Promise.reject() }));
+  const code = new TextDecoder().decode(await saved(page, '[data-action=code]'));
+  expect(code).toMatch(/model\.step\(\d+\);\s*const mesh = .*\s*mesh\.smooth\(.*\s*mesh\.decimate\(/);
   await page.click('[data-finish=undo]:enabled');
+  await expect.poll(async () => (await edits(page)).length).toBe(1);
+  await page.click('[data-finish=undo]:enabled');
+  await expect.poll(() => page.textContent('.status')).toContain('Converged');
+  await page.click('[data-finish=redo]:enabled');
   await expect.poll(async () => (await edits(page)).length).toBe(1);
   const before = await surface(page);
   const file = await session(page);
