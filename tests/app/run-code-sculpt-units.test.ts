@@ -66,11 +66,12 @@ async function interactiveRun(seed: number, source: SceneSource, params: object 
   await worker.request('show', { layout: 'result', quantity: undefined, textured: false });
   const can: (() => Promise<unknown>)[] = [
     () => pose(target(), false),
-    // A drag of some frames, after which the surface may settle.
+    // A drag of some frames, after which the surface may follow for some more.
     async () => {
       for (let i = 0; i < 4; i++) await pose(target(), true);
       await pose(target(), false);
-      if (random() < 0.5) await until(() => state === 'done');
+      const serial = (last?.serial ?? 0) + 5;
+      if (random() < 0.5) await until(() => state !== 'running' || (last?.serial ?? 0) >= serial);
     },
     // Another ellipsoid, or one less.
     () => pose(random() < 0.5 ? [...target(), ball(off(), 0.8, off(), 0.3)] : target().slice(0, 2), false),
@@ -131,7 +132,8 @@ test('a session keeps the log of the present model', async () => {
   await worker.request('pause', undefined);
   const saved = await worker.request('save', undefined);
   const log = await worker.request('log', undefined);
-  await worker.request('open', { source: {}, setup, saved, log });
+  await worker.request('open', { source: {}, setup, saved: { ...saved, log: 'as in a new worker' }, log });
+  await worker.request('restore', { ...saved, log: 'as in a new worker' });
   await worker.request('step', { count: 2 });
   await programs.add(1, await worker.request('code', { stem: 'mesh', edits: [] }));
   await programs.expectSame([await worker.request('export', { format: 'ply' })], []);

@@ -230,3 +230,30 @@ test('edits that were undone can be redone in a new browser', async () => {
     expect(Buffer.compare(await surface(other), edited)).toBe(0);
   });
 });
+
+test('a session keeps the log of a run, also after a change of edge lengths in Sculpt', async () => {
+  const { page } = app;
+  const codeOf = async (one: Page) => {
+    await one.evaluate(() => Object.assign(navigator.clipboard, { writeText: () => Promise.reject() }));
+    return new TextDecoder().decode(await saved(one, '[data-action=code]'));
+  };
+  await open(app, 'sculpt?example=lava');
+  await reach(page, 'running');
+  await page.press('canvas', ' ');
+  await reach(page, 'paused', 'done');
+  await unfold(page);
+  const edge = page.locator('[data-param=edgeMax] input[type=number]');
+  const longer = String(Number((1.1 * Number(await edge.inputValue())).toFixed(3)));
+  await edge.fill(longer);
+  await edge.press('Enter');
+  await page.press('canvas', 's');
+  await expect.poll(() => page.inputValue('[data-param=edgeMax] input[type=number]')).toBe(longer);
+  await page.waitForSelector('#lab[data-state=paused], #lab[data-state=done]');
+  const [file, before, code] = [await session(page), await surface(page), await codeOf(page)];
+  expect(code).toContain(`edgeMax: ${longer}`);
+  await elsewhere('extract?example=linked-rings&v=2', async (other) => {
+    await reopened(other, asFile(file), 'sculpt');
+    expect(Buffer.compare(await surface(other), before)).toBe(0);
+    expect(await codeOf(other)).toBe(code);
+  });
+});

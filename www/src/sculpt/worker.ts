@@ -128,6 +128,7 @@ class Session {
       const { model, start } = saved ? restoredModel(scene, setup, saved) : firstModel(scene, setup);
       const ready = this.#adopt(model, start, setup);
       if (saved) this.#log.resume(log);
+      if (saved?.log) this.#logs.set(saved.log, log);
       freeScene(this.#scene);
       this.#scene = scene;
       this.#origins = originsOf(source);
