@@ -1,13 +1,16 @@
 /** Runs of the Extract lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
-import { mkdir, mkdtemp, readFile, rm, symlink, writeFile } from 'node:fs/promises';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { dirname, join } from 'node:path';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
-import { at, must } from '../../scripts/shell.mjs';
+import { at } from '../../scripts/shell.mjs';
 import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
 import { uniform } from '../../www/src/random';
+import { bytesOf, callsOf, type Program, toCode } from '../../www/src/worker/code';
+import { programOf } from '../../www/src/worker/extract-code';
 import { literal } from '../../www/src/worker/literal';
+import { filesOf, serveImage, zipOf } from '../js/zarr-stores';
+import { type Programs, pickFrom, programsIn } from './run-code';
 import { ball, ring } from './volumes';
 import { startWorker } from './worker-in-node';
 
@@ -25,7 +28,7 @@ async function tooth() {
 async function rings() {
   const source = (): VolumeSource => ({ shape: 'linked rings' });
   await worker.request('load', { name: 'linked rings', source: source(), setup: SETUP, frame: 0 });
-  return { name: 'linked rings.nii', bytes: await worker.request('volume', undefined), source };
+  return { name: 'rings.nii', bytes: (await worker.request('data', undefined)).bytes, source };
 }
 
 /** Returns a 4D file with a ball and a ring, of which the second frame is opened. */
@@ -36,20 +39,18 @@ async function secondFrame() {
   return { name: 'frames.nii', bytes, source, frame: 1 };
 }
 
-let folder = '';
+let programs: Programs;
 beforeAll(async () => {
   await init();
-  folder = await mkdtemp(join(tmpdir(), 'run-code-'));
-  await mkdir(join(folder, 'node_modules'));
-  await symlink(at('pkg'), join(folder, 'node_modules/vesicle'));
+  programs = await programsIn('extract');
 });
-afterAll(() => rm(folder, { recursive: true }));
+afterAll(() => programs.remove());
 
 const SETUP: Setup = { start: { kind: 'contour' }, levels: 1, edge: undefined, params: {}, attractors: [] };
 
 /** Returns the actions of a user between two steps, each with random values. */
 function actions(random: () => number, bounds: { middle: number[]; size: number }) {
-  const pick = <T>(list: readonly T[]): T => list[Math.floor(random() * list.length)] as T;
+  const pick = pickFrom(random);
   const point = () => bounds.middle.map((x) => x + (random() - 0.5) * bounds.size) as [number, number, number];
   const saves: SavedRun[] = [];
   const attractor = (): Attractor => ({ point: point(), strength: random(), radius: (0.1 + random()) * bounds.size });
@@ -112,20 +113,8 @@ async function interactiveRun(seed: number, source: VolumeSource, file: string, 
     await can[Math.floor(random() * can.length)]?.();
     await can[0]?.();
   }
-  await writeFile(join(folder, `${seed}.mjs`), await worker.request('code', { files: [file], frame }));
+  await programs.add(seed, await worker.request('code', { stem: 'rings', edits: [] }));
   return worker.request('export', { format: 'ply' });
-}
-
-/** Runs the code of each run in a Node of its own, and returns the surfaces. */
-async function repeated(file: string, seeds: number[]): Promise<Uint8Array[]> {
-  const program = `import { readFile, writeFile } from 'node:fs/promises';
-    for (const seed of ${JSON.stringify(seeds)}) {
-      const { run } = await import('./' + seed + '.mjs');
-      await writeFile(seed + '.ply', await run(new Uint8Array(await readFile(${JSON.stringify(file)}))));
-    }`;
-  await writeFile(join(folder, 'all.mjs'), program);
-  await must(process.execPath, ['all.mjs'], { cwd: folder });
-  return Promise.all(seeds.map((seed) => readFile(join(folder, `${seed}.ply`))));
 }
 
 interface Opened {
@@ -143,12 +132,9 @@ test.each([
   ['a frame of a 4D file', secondFrame],
 ])('the code of random runs on %s gives the same surfaces', async (_, open) => {
   const { name, bytes, source, frame }: Opened = await open();
-  await writeFile(join(folder, name), bytes);
   const made: Uint8Array[] = [];
   for (const seed of SEEDS) made.push(await interactiveRun(seed, source(), name, frame));
-  const again = await repeated(name, SEEDS);
-  for (const [index, seed] of SEEDS.entries())
-    expect(Buffer.compare(again[index] ?? new Uint8Array(), made[index] ?? new Uint8Array()), `seed ${seed}`).toBe(0);
+  await programs.expectSame(made, [{ name, bytes }]);
   expect(new Set(made.map(({ length }) => length)).size).toBeGreaterThan(5);
 });
 
@@ -156,4 +142,83 @@ test('values are written so that they are read as the same, whatever they contai
   const value = { a: [0.1 + 0.2, -0, 1e-300, 5], 'b*/': "it's\n`#{x}`", c: true, d: Number.NaN, e: {} };
   // biome-ignore lint/security/noGlobalEval: what the user does with the code
   expect(eval(`(${literal(value)})`)).toStrictEqual(value);
+});
+
+test('a log, which may come from anyone, cannot choose what the code does', () => {
+  const program: Program = { names: ['DeformableModel'], begin: [], calls: callsOf('step') };
+  const code = (call: string, given: unknown) =>
+    toCode({ setup: {}, calls: [{ call, given }] }, () => program, []).code;
+  for (const call of ['constructor', 'free(); evil', 'toString', '__proto__', 'seed'])
+    expect(() => code(call, 1)).toThrow('which this app does not know');
+  const given = { 'x: evil(), y': "`'\n'); evil(); //" };
+  const [line = ''] = code('step', given)
+    .split('\n')
+    .filter((one) => one.includes('model.step'));
+  const taken: unknown[] = [];
+  new Function('model', line)({ step: (value: unknown) => taken.push(value) });
+  expect(taken).toEqual([given]);
+  const files = bytesOf(['a.nii */ evil(); /*'], ['bytes']);
+  const named = toCode({ setup: {}, calls: [] }, () => ({ ...program, ...files }), []).code;
+  expect(named.match(/\*\//g)).toHaveLength(1);
+});
+
+describe('the code of runs on an image larger than memory', () => {
+  const LARGE: Setup = { ...SETUP, levels: 1, params: { isoForce: -1 } };
+
+  /** Opens an image, acts at random, and returns the surface. */
+  async function largeRun(seed: number, zarr: string | Blob): Promise<Uint8Array> {
+    const random = uniform(seed);
+    await worker.request('load', { name: 'image.zip', source: { zarr }, setup: LARGE, frame: 0 });
+    const point = (): [number, number, number] => [10 * random(), 10 * random(), 10 * random()];
+    const can = [
+      () => worker.request('setParams', { rigidity: random() }),
+      () => worker.request('setAttractors', [{ point: point(), strength: random(), radius: 5 }]),
+      () => worker.request('seed', undefined).catch(() => 0),
+      () => worker.request('rebuild', { ...LARGE, box: { min: [0, 0, 0], max: point() } }),
+    ];
+    for (let i = 0; i < 4; i++) {
+      await pickFrom(random)(can)();
+      await worker.request('step', { count: 1 + Math.floor(4 * random()) });
+    }
+    return worker.request('export', { format: 'ply' });
+  }
+  const code = () => worker.request('code', { stem: 'image', edits: [] });
+
+  test('gives the same surfaces, of an archive', async () => {
+    const made: Uint8Array[] = [];
+    for (const seed of [1, 2, 3]) {
+      made.push(await largeRun(seed, zipOf('v3-scaled-zyx')));
+      await programs.add(seed, await code());
+    }
+    const bytes = new Uint8Array(await zipOf('v3-scaled-zyx').arrayBuffer());
+    await programs.expectSame(made, [{ name: 'image.zip', bytes }]);
+  });
+
+  test('gives the same surface, of an address', async () => {
+    const images = await serveImage('v3-scaled-zyx');
+    try {
+      const made = await largeRun(4, images.url);
+      await programs.add(4, await code());
+      await programs.expectSame([made], []);
+    } finally {
+      await images.close();
+    }
+  });
+
+  test('gives the same surface, of a folder', async () => {
+    for (const [key, bytes] of await filesOf('v3-scaled-zyx')) {
+      await mkdir(dirname(join(programs.folder, 'image', key)), { recursive: true });
+      await writeFile(join(programs.folder, 'image', key), bytes);
+    }
+    await worker.request('load', { name: '', source: { zarr: zipOf('v3-scaled-zyx') }, setup: LARGE, frame: 0 });
+    await worker.request('step', { count: 5 });
+    // No folder of a browser can be sent to a worker of Node.
+    const data = { source: { zarr: {} as FileSystemDirectoryHandle }, name: 'image', coarserLevels: 1 };
+    const iso = Number(/iso: ([\d.]+)/.exec((await code()).code)?.[1]);
+    const log = { setup: { ...LARGE, params: { ...LARGE.params, iso } }, calls: [{ call: 'step', given: 5 }] };
+    const program = toCode(log, (setup) => programOf(setup, data, ''), []);
+    expect(program).toMatchObject({ needs: 'folder', name: 'image' });
+    await programs.add(5, program);
+    await programs.expectSame([await worker.request('export', { format: 'ply' })], ['image']);
+  });
 });

@@ -1,11 +1,12 @@
 /** Sessions of the labs: saved, and opened in a new browser, they go on as if nothing had been in between. */
 import { readFile } from 'node:fs/promises';
 import type { Page } from 'playwright-core';
+import { unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { readSession } from '../../www/src/session/file';
-import { type App, afterRun, drop, open, openApp, reach } from './browser';
+import { type App, afterRun, drop, open, openApp, QUICK, reach, unfold } from './browser';
 
 let app: App;
 /** A file of the user's: a tooth, of few voxels. */
@@ -161,4 +162,98 @@ test('a file of version 1 opens', async () => {
   const now = (await readSession(await session(page))).content;
   expect(now.state).toEqual(content.state);
   expect(now.undo).toEqual(content.undo);
+});
+
+test('labels go on in a new browser: the same voxels, surfaces, names and view', async () => {
+  const { page } = app;
+  await open(app, QUICK.segment);
+  await reach(page, 'done');
+  await afterRun(page, () => page.press('canvas', 'p'));
+  await page.press('canvas', 'n');
+  for (const key of ['.', '.', '.', '.', ']', ']']) await page.press('canvas', key);
+  await afterRun(page, () => page.press('canvas', 'p'));
+  await page.fill('[data-control=name][data-value="2"]', 'nucleus');
+  await page.keyboard.press('Enter');
+  await page.press('canvas', 'ArrowLeft');
+  await page.uncheck('[data-view=outlines]');
+  await page.click('[data-control=visible][data-value="1"]');
+  const file = await session(page);
+  const [map, surfaces] = [await saved(page, '[data-map=nrrd]'), unzipSync(await saved(page, '[data-export=ply]'))];
+  expect(Object.keys(surfaces)).toHaveLength(2);
+  await elsewhere('extract?example=linked-rings&v=2', async (other) => {
+    await drop(other, asFile(file));
+    await other.waitForSelector('#lab.segment[data-state=done]');
+    expect(Buffer.compare(await saved(other, '[data-map=nrrd]'), map)).toBe(0);
+    expect(unzipSync(await saved(other, '[data-export=ply]'))).toEqual(surfaces);
+    const [left, found] = [await readSession(file), await readSession(await session(other))];
+    expect(found.content.view).toEqual(nearly(left.content.view));
+    expect({ ...found.content, view: undefined }).toEqual({ ...left.content, view: undefined });
+    expect(await other.isDisabled('[data-transport=undo]')).toBe(true);
+    // Strokes go on from there.
+    for (const one of [page, other]) {
+      await one.press('canvas', ',');
+      await afterRun(one, () => one.press('canvas', 'p'));
+    }
+    expect(Buffer.compare(await saved(other, '[data-map=nrrd]'), await saved(page, '[data-map=nrrd]'))).toBe(0);
+  });
+});
+
+test('edits that were undone can be redone in a new browser', async () => {
+  const { page } = app;
+  const edits = (one: Page) => one.locator('.edit-log li').allTextContents();
+  await open(app, 'extract?example=linked-rings&v=2');
+  await reach(page, 'done');
+  await unfold(page);
+  for (const edit of ['smooth', 'decimate']) await page.click(`[data-finish=${edit}]:enabled`);
+  await expect.poll(async () => (await edits(page)).length).toBe(2);
+  await expect.poll(() => page.textContent('.status')).toMatch(/Edited surface: [\d,]+ vertices/);
+  const edited = await surface(page);
+  // Without a clipboard, code is saved as a file.
+  await page.evaluate(() => Object.assign(navigator.clipboard, { writeText: () => Promise.reject() }));
+  const code = new TextDecoder().decode(await saved(page, '[data-action=code]'));
+  expect(code).toMatch(/model\.step\(\d+\);\s*const mesh = .*\s*mesh\.smooth\(.*\s*mesh\.decimate\(/);
+  await page.click('[data-finish=undo]:enabled');
+  await expect.poll(async () => (await edits(page)).length).toBe(1);
+  await page.click('[data-finish=undo]:enabled');
+  await expect.poll(() => page.textContent('.status')).toContain('Converged');
+  await page.click('[data-finish=redo]:enabled');
+  await expect.poll(async () => (await edits(page)).length).toBe(1);
+  const before = await surface(page);
+  const file = await session(page);
+  await elsewhere('track?example=ventricle', async (other) => {
+    await reopened(other, asFile(file), 'extract');
+    await unfold(other);
+    await other.waitForSelector('[data-finish=redo]:enabled');
+    expect(Buffer.compare(await surface(other), before)).toBe(0);
+    await other.click('[data-finish=redo]');
+    await expect.poll(async () => (await edits(other)).length).toBe(2);
+    expect(Buffer.compare(await surface(other), edited)).toBe(0);
+  });
+});
+
+test('a session keeps the log of a run, also after a change of edge lengths in Sculpt', async () => {
+  const { page } = app;
+  const codeOf = async (one: Page) => {
+    await one.evaluate(() => Object.assign(navigator.clipboard, { writeText: () => Promise.reject() }));
+    return new TextDecoder().decode(await saved(one, '[data-action=code]'));
+  };
+  await open(app, 'sculpt?example=lava');
+  await reach(page, 'running');
+  await page.press('canvas', ' ');
+  await reach(page, 'paused', 'done');
+  await unfold(page);
+  const edge = page.locator('[data-param=edgeMax] input[type=number]');
+  const longer = String(Number((1.1 * Number(await edge.inputValue())).toFixed(3)));
+  await edge.fill(longer);
+  await edge.press('Enter');
+  await page.press('canvas', 's');
+  await expect.poll(() => page.inputValue('[data-param=edgeMax] input[type=number]')).toBe(longer);
+  await page.waitForSelector('#lab[data-state=paused], #lab[data-state=done]');
+  const [file, before, code] = [await session(page), await surface(page), await codeOf(page)];
+  expect(code).toContain(`edgeMax: ${longer}`);
+  await elsewhere('extract?example=linked-rings&v=2', async (other) => {
+    await reopened(other, asFile(file), 'sculpt');
+    expect(Buffer.compare(await surface(other), before)).toBe(0);
+    expect(await codeOf(other)).toBe(code);
+  });
 });

@@ -10,8 +10,8 @@ export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
   resolve: {
     alias: [
-      { find: /^vesicle$/, replacement: at('../../pkg/index.js') },
-      { find: /^vesicle\/import$/, replacement: at('../../pkg/import/index.js') },
+      { find: /^vesicle(\/index)?$/, replacement: at('../../pkg/index.js') },
+      { find: /^vesicle\/(import|zarr)$/, replacement: at('../../pkg/$1/index.js') },
     ],
   },
   test: {

@@ -18,6 +18,7 @@ import type {
   Vec3,
 } from 'vesicle';
 
+import type { Edit } from './finish/protocol';
 import type { Shape } from './shapes';
 import type { RunLog } from './worker/run-log';
 
@@ -87,8 +88,8 @@ export interface SavedRun {
   levels: number;
   iteration: number;
   done: boolean;
-  /** Log of the run up to this state. */
-  log: RunLog<Setup>;
+  /** Log of the run up to this state; undefined if its beginning is not known. */
+  log: RunLog<Setup> | undefined;
 }
 
 /**
@@ -181,8 +182,35 @@ export interface Loaded extends Ready {
   volume: VolumeView;
 }
 
+export interface CodeRequest {
+  /** Name, without an ending, of the file that the lab saves for the code. */
+  stem: string;
+  /** Edits of the finished surface, which follow the run. */
+  edits: readonly Edit[];
+  /** Index of the frame whose surface is the result, in the Track lab. */
+  frame?: number;
+}
+
+/** JavaScript that repeats a run. */
+export interface RunCode {
+  code: string;
+  /** Data that its function takes: files that were opened, or one that the lab saves for it, or a folder. */
+  needs: 'files' | 'saved' | 'folder' | 'nothing';
+  /** Names of the files, or of the folder. */
+  name: string;
+  /** Part of the run that the code lacks, in a sentence. */
+  note?: string | undefined;
+}
+
+/** Requests of the page to the workers of all labs whose model runs. */
+export interface CodeRequests {
+  code: { body: CodeRequest; reply: RunCode };
+  /** Replies with the data as a file that the code reads. */
+  data: { body: undefined; reply: { extension: string; bytes: Uint8Array } };
+}
+
 /** Requests of the page to the Extract lab's worker: the body of each and its reply. */
-export interface Requests {
+export interface Requests extends CodeRequests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
    * Opens a frame of a volume, the first is 0, and builds a model of it, or with `saved` restores a run of it. On failure, the previous volume and
@@ -229,10 +257,6 @@ export interface Requests {
   cancelCoverage: { body: undefined; reply: undefined };
   /** Adds to the surface the components and cavities of the object that it misses; replies with their number. */
   seed: { body: undefined; reply: number };
-  /** Replies with JavaScript that repeats the run; `files` are the names of the volume's files. */
-  code: { body: { files: string[]; frame?: number | undefined }; reply: string };
-  /** Replies with the volume as NIfTI. */
-  volume: { body: undefined; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

@@ -1,8 +1,9 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 
-import { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
+import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
 import type {
   Attractor,
+  CodeRequest,
   DataEvent,
   LargeSource,
   LevelView,
@@ -15,6 +16,7 @@ import type {
   Ready,
   Requests,
   ReturnMessage,
+  RunCode,
   SavedRun,
   Setup,
   SurfaceBuffers,
@@ -25,10 +27,11 @@ import type {
 import { text } from './texts';
 import { toCode } from './worker/code';
 import { compare } from './worker/compare';
+import { programOf, type RunData } from './worker/extract-code';
 import type { LargeVolume } from './worker/large';
 import { buildModel, restoredModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
-import { type RunLog, RunRecorder } from './worker/run-log';
+import { logged, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, openFrame, viewOf } from './worker/volumes';
@@ -61,6 +64,8 @@ class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
   #volume: Volume | undefined;
   #large: LargeVolume | undefined;
+  /** Origin of the volume, for the code of a run. */
+  #origin: RunData | undefined;
   #model: DeformableModel | undefined;
   /** Intensities of the volume that are displayed as black and as white. */
   #window: [number, number] = [0, 1];
@@ -70,7 +75,7 @@ class Session {
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
-  readonly #log = new RunRecorder<Setup>();
+  readonly #log = new RunRecorder<Setup>(['setParams', 'setAttractors']);
   /** Number of coarser pyramid levels the model was built with, besides the volume itself. */
   #levels = 0;
   #measuredAt = 0;
@@ -107,7 +112,7 @@ class Session {
     cancelCoverage: () => this.#coverageRun.stop(),
     seed: () => this.#seed(),
     code: (context) => this.#code(context),
-    volume: () => this.#image().toNifti(),
+    data: () => ({ extension: 'nii', bytes: this.#image().toNifti() }),
   };
 
   takeBack(buffers: SurfaceBuffers): void {
@@ -125,6 +130,8 @@ class Session {
       const ready = this.#replaceModel(model, setup, saved ? 'checked' : 'measured');
       if (saved) this.#continue(saved);
       this.#keep({ volume });
+      const files = 'files' in source ? source.files.map(({ name }) => ({ name })) : [];
+      this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
@@ -144,6 +151,7 @@ class Session {
       const fitting = { ...setup, levels };
       const ready = this.#replaceModel(large.model(fitting), fitting, 'measured');
       this.#keep({ large });
+      this.#origin = { source, name, coarserLevels: large.coarserLevels };
       return withTransfer({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
       large.free();
@@ -230,8 +238,6 @@ class Session {
   #stepped(report: StepReport): void {
     this.#reports.push(report);
     this.#done = report.done;
-    // Seeding is reported, too, and is no iteration.
-    if (report.iteration > this.#iteration) this.#log.add('step', report.iteration - this.#iteration);
     this.#iteration = report.iteration;
     if (this.#free.length === 0) {
       this.#flushReports();
@@ -276,14 +282,12 @@ class Session {
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     model.setParams(params);
-    this.#log.add('setParams', params);
     this.#done = false;
     return { ...model.params };
   }
 
   #setAttractors(attractors: Attractor[]): undefined {
     this.#current().setAttractors(attractors);
-    this.#log.add('setAttractors', attractors);
     this.#done = false;
   }
 
@@ -311,22 +315,14 @@ class Session {
     const model = this.#current();
     const state = model.save();
     return withTransfer(
-      { state, levels: this.#levels, iteration: this.#iteration, done: this.#done, log: this.#logged() },
+      { state, levels: this.#levels, iteration: this.#iteration, done: this.#done, log: this.#log.log },
       [state],
     );
   }
 
-  #logged(): RunLog<Setup> {
-    if (!this.#log.log) throw new Refusal('invalid-argument', text('extract.noVolume'));
-    return this.#log.log;
-  }
-
   /** Returns code that repeats the run with the package alone. */
-  #code(context: Requests['code']['body']): string {
-    // Of a volume larger than memory, the package reads parts while the model runs.
-    this.#image();
-    const defaults = Object.fromEntries(paramSpecs('deformable').map(({ name, default: value }) => [name, value]));
-    return toCode(this.#logged(), { ...context, version: version(), defaults });
+  #code({ stem, edits }: CodeRequest): RunCode {
+    return toCode(this.#log.log, (setup) => programOf(setup, this.#origin as RunData, stem), edits);
   }
 
   /**
@@ -355,7 +351,7 @@ class Session {
   #replaceBy(model: DeformableModel): void {
     this.#coverageRun.abort();
     this.#model?.free();
-    this.#model = model;
+    this.#model = logged(model, this.#log, ['step', 'setParams', 'setAttractors', 'seed']);
   }
 
   async #compare(setup: Setup): Promise<Requests['compare']['reply']> {
@@ -390,7 +386,6 @@ class Session {
   async #seed(): Promise<number> {
     await this.#pause();
     const report = this.#current().seed();
-    this.#log.add('seed', undefined);
     this.#stepped(report);
     this.#reportStopped();
     return report.events.seeds;

@@ -201,7 +201,7 @@ export class EditPanel {
     this.element.setAttribute('aria-busy', String(this.#busy));
     for (const button of this.#buttons) button.disabled = !idle;
     this.#undo.disabled ||= !edited?.undoable;
-    this.#redo.disabled ||= !edited?.redoable;
+    this.#redo.disabled ||= !edited?.undone.length;
     this.#choosing.disabled = !idle;
     this.#measuring.disabled = !idle;
   }

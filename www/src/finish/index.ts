@@ -1,6 +1,6 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
 import type { Unit } from '../examples';
-import type { MeshFormat } from '../protocol';
+import type { Measures, MeshFormat } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
@@ -25,6 +25,8 @@ export interface FinishHost {
 /** Panels that edit the surface of a lab and compare it with a reference. */
 export class Finish {
   readonly elements: HTMLElement[];
+  /** Called after each edit or undo, with the measures of the edited surface; undefined if no edits are left. */
+  onEdited: (measures: Measures | undefined) => void = () => undefined;
   readonly #host: FinishHost;
   readonly #finishing: Finishing;
   readonly #edits: EditPanel;
@@ -75,12 +77,18 @@ export class Finish {
     return this.#finishing.edited?.log ?? [];
   }
 
-  /** Makes edits of a session again. */
-  async repeat(edits: Edit[]): Promise<void> {
-    for (const edit of edits) {
+  /** The edits that were undone and can be redone, for a session. */
+  get undone(): Edit[] {
+    return this.#finishing.edited?.undone ?? [];
+  }
+
+  /** Makes edits of a session again, also those that were undone there, which can be redone then. */
+  async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
+    for (const edit of [...edits, ...undone]) {
       if (!OPERATIONS.includes(edit.op)) throw new Error(text('sessions.badIndex'));
       await this.#finishing.change('edit', edit);
     }
+    for (const _ of undone) await this.#finishing.change('undo', undefined);
   }
 
   /** Forgets the edits, as the lab's surface has changed. */
@@ -96,7 +104,10 @@ export class Finish {
     this.#edits.show(edited);
     this.#reference.clear();
     this.#show();
-    if (edited) void this.#reference.compare();
+    if (!edited) return;
+    const { log, undone, measures } = edited;
+    if (log.length + undone.length > 0) this.onEdited(log.length > 0 ? measures : undefined);
+    void this.#reference.compare();
   }
 
   /** Shows the edited surface, or the lab's own as long as there are neither edits nor colours. */

@@ -27,8 +27,8 @@ export interface Edited {
   log: Edit[];
   /** Whether the last edit can be undone: there is memory for some of the surfaces before. */
   undoable: boolean;
-  /** Whether an edit was undone last, and can be redone. */
-  redoable: boolean;
+  /** Edits that were undone last, and can be redone, the next one first. */
+  undone: Edit[];
 }
 
 /** A point on the surface, by the index of its triangle. */

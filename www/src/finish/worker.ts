@@ -36,7 +36,8 @@ function edited(): Edited {
   });
   const surface = copySurface(emptyArrays(), mesh);
   const measures = { info: mesh.info(), report: mesh.check() };
-  const rest = { undoable: present > 0, redoable: present < states.length - 1 };
+  const undone = states.at(-1)?.log.slice(log.length) ?? [];
+  const rest = { undoable: present > 0, undone };
   return withTransfer({ surface, measures, components, log, ...rest }, arraysOf(surface));
 }
 

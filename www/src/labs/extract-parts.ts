@@ -42,8 +42,6 @@ export interface PartEvents extends RunEvents<Example> {
   onCancelCoverage: () => void;
   onSeed: () => void;
   onSculpt: () => void;
-  onCopyCode: () => void;
-  onSaveVolume: () => void;
 }
 
 /** Controls and views of the Extract lab. */
@@ -169,11 +167,6 @@ export class ExtractParts extends RunParts<Example> {
 
   showFrame(source: ExtractSource): void {
     this.#frames.show(frameOf(source), this.#frameCount);
-  }
-
-  /** Index of the open frame of a 4D volume; undefined if the volume has one only. */
-  get frame(): number | undefined {
-    return this.#frames.frame;
   }
 
   showParams(params: ParamValues, example: Example | undefined): void {

@@ -2,7 +2,7 @@ import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
 import type { Moments } from '../session/moments';
-import { isRecord } from '../session/recognise';
+import { isLog, isRecord } from '../session/recognise';
 import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
@@ -37,9 +37,8 @@ export type ExtractMoments = Moments<SavedMoment<PageState, SavedRun>>;
 export function isExtractMoment(saved: Record<string, unknown>, page: Record<string, unknown>): boolean {
   const { levels, done, log } = saved;
   const { choice, params, attractors } = page;
-  const isLog = isRecord(log) && isRecord(log.setup) && Array.isArray(log.calls);
   return (
-    isLog &&
+    isLog(log) &&
     typeof levels === 'number' &&
     typeof done === 'boolean' &&
     isRecord(choice) &&

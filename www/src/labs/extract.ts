@@ -14,9 +14,6 @@ import { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
 import { linkOf, toHash } from './link';
 
-/** Files of volumes that the package reads by itself. */
-const PACKAGE_FILES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/i;
-
 /** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
 export class ExtractLab extends RunLab<Example> {
   protected readonly id = 'extract';
@@ -84,8 +81,6 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
-      onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
-      onSaveVolume: () => this.ask(this.#saveVolume(), text('sessions.volumeFailed')),
       onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
     };
   }
@@ -95,34 +90,6 @@ export class ExtractLab extends RunLab<Example> {
     if (!moments) return undefined;
     const view = { ...this.ui.stage.view, options: this.ui.options.value };
     return { ...(await import('../session/moments')).packMoments(moments), view };
-  }
-
-  /** Copies code that repeats the run; without a clipboard, saves it as a file. */
-  async #copyCode(): Promise<void> {
-    const { source } = this.opening;
-    if (!source) return;
-    const { saving, status, frame } = this.ui;
-    // A header before its voxels.
-    const names = this.opening.filesOf(await source.load()).map(({ name }) => name);
-    const files = names.sort((one, other) => Number(PACKAGE_FILES.test(other)) - Number(PACKAGE_FILES.test(one)));
-    const isRead = files.length < 3 && files.some((name) => PACKAGE_FILES.test(name));
-    // A saved volume has one frame.
-    const context = isRead ? { files, frame } : { files: [`${saving.stem}.nii`], frame: undefined };
-    const code = await this.client.request('code', context);
-    try {
-      await navigator.clipboard.writeText(code);
-      status.say(
-        text(isRead ? 'sessions.codeCopied' : 'sessions.codeCopiedVolume', {
-          name: (isRead && files[0]) || saving.stem,
-        }),
-      );
-    } catch {
-      saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
-    }
-  }
-
-  async #saveVolume(): Promise<void> {
-    this.ui.saving.bytes('nii', await this.client.request('volume', undefined), 'application/octet-stream');
   }
 
   #showSettings(): void {

@@ -11,14 +11,14 @@ import type { History } from '../ui/history';
 import type { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { PicturePanel, type PictureSubject } from '../ui/pictures';
-import { SessionControls, type SessionEvents } from '../ui/session';
+import { type CodeEvents, SessionControls, type SessionEvents } from '../ui/session';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import type { ExamplePanel, Listed } from './example-panel';
 import { Saving } from './saving';
 
 /** The user's actions that all labs have. */
-export interface LabEvents<Example> {
+export interface LabEvents<Example> extends SessionEvents {
   onFiles: (files: File[]) => void;
   onExample: (example: Example) => void;
   onParam: (name: string, value: unknown) => void;
@@ -29,7 +29,7 @@ export interface LabEvents<Example> {
 }
 
 /** The user's actions in a lab whose model runs. */
-export interface RunEvents<Example> extends LabEvents<Example>, TransportEvents, SessionEvents {}
+export interface RunEvents<Example> extends LabEvents<Example>, TransportEvents, CodeEvents {}
 
 /** Contents that differ between the labs. */
 interface PartsOptions<Example extends Listed> {
@@ -42,6 +42,8 @@ interface PartsOptions<Example extends Listed> {
   data: ExamplePanel<Example>;
   /** Names of parameters that have controls of their own. */
   ownControls?: string[];
+  /** Describes a session of the lab. */
+  sessionHelp?: string;
 }
 
 interface RunPartsOptions<Example extends Listed> extends PartsOptions<Example> {
@@ -82,6 +84,7 @@ export abstract class LabParts<Example extends Listed> {
   protected readonly canvas: HTMLCanvasElement;
   readonly #link: HTMLButtonElement;
   protected readonly cancel: HTMLButtonElement;
+  protected readonly session: SessionControls;
   readonly #paramsHolder = h('div');
   readonly #drop: HTMLElement;
   readonly #ownControls: string[];
@@ -96,7 +99,7 @@ export abstract class LabParts<Example extends Listed> {
     root: HTMLElement,
     signal: AbortSignal,
     events: LabEvents<Example>,
-    { viewLabel, drop, onFolder, data, ownControls = [] }: PartsOptions<Example>,
+    { viewLabel, drop, onFolder, data, ownControls = [], sessionHelp }: PartsOptions<Example>,
   ) {
     this.root = root;
     this.#signal = signal;
@@ -105,6 +108,7 @@ export abstract class LabParts<Example extends Listed> {
     this.#onParam = events.onParam;
     this.canvas = h('canvas', { tabindex: 0, role: 'application', 'aria-label': viewLabel });
     this.banner = new ErrorBanner(events.onDismiss);
+    this.session = new SessionControls(events, sessionHelp ?? text('sessions.saveHelp'));
     this.#link = wideButton(text('labs.copyLink'), 'link', events.onCopyLink);
     this.cancel = h(
       'button',
@@ -179,14 +183,16 @@ export abstract class LabParts<Example extends Listed> {
     });
     this.#pictures = pictures;
     this.#signal.addEventListener('abort', () => pictures.dispose());
-    return section(text('labs.sectionSave'), ...elements, pictures.element, this.#link);
+    return section(text('labs.sectionSave'), ...elements, this.session.element, pictures.element, this.#link);
   }
 
   /** Shows the button that cancels loading; returns whether nothing is being loaded. */
   protected showLoading(state: LabState, ready: boolean): boolean {
     this.cancel.hidden = state !== 'loading' || !ready;
     this.#pictures?.showState(state);
-    return ready && state !== 'loading';
+    const idle = ready && state !== 'loading';
+    this.session.enabled = idle;
+    return idle;
   }
 
   abstract dispose(): void;
@@ -197,7 +203,6 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   readonly transport: Transport;
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
-  protected readonly session: SessionControls;
   protected readonly history: History;
   readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
   finish: Finish | undefined;
@@ -212,7 +217,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     this.history = history;
     this.#fetchMesh = fetchMesh;
     this.transport = new Transport(events);
-    this.session = new SessionControls(events);
+    this.session.addCode(events);
     this.onRun = events.onToggle;
     this.exports = new ExportButtons((format, type) => {
       this.surfaceFile(format)
@@ -241,7 +246,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   }
 
   protected override saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
-    return super.saveSection(subject, this.exports.element, ...elements, this.session.element);
+    return super.saveSection(subject, this.exports.element, ...elements);
   }
 
   /**
@@ -265,7 +270,6 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     const idle = this.showLoading(state, ready);
     this.transport.showState(beneath, ready);
     this.exports.enabled = idle;
-    this.session.enabled = idle;
     if (!idle || state === 'running') this.finish?.reset();
     if (this.finish) this.finish.enabled = idle && state !== 'running' && hasSurface;
     return idle;

@@ -1,6 +1,6 @@
 import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
-import type { Failure } from '../protocol';
+import type { CodeRequest, CodeRequests, Failure, Measures, RunCode } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
@@ -24,7 +24,22 @@ interface Engine {
 interface RunEngine extends Engine {
   request(kind: 'play' | 'pause', body: undefined): Promise<unknown>;
   request(kind: 'step', body: { count: number }): Promise<unknown>;
+  request(kind: 'code', body: CodeRequest): Promise<RunCode>;
+  request(kind: 'data', body: undefined): Promise<CodeRequests['data']['reply']>;
 }
+
+function describeEdited({ info }: Measures): string {
+  const vertices = plural('counts.vertex', info.vertices);
+  return text('finish.edited', { vertices, triangles: plural('counts.triangle', info.triangles) });
+}
+
+/** Messages about copied code, by the data that its function takes. */
+const COPIED = {
+  files: 'sessions.codeCopied',
+  saved: 'sessions.codeCopiedSaved',
+  folder: 'sessions.codeCopiedFolder',
+  nothing: 'sessions.codeCopiedAlone',
+} as const;
 
 type AnySource<Example> = Source<Example, unknown, unknown>;
 
@@ -121,6 +136,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
+      onSaveSession: (included) => void this.#sessions?.save(included),
       onError: (title, error) => this.states.fail(title, error),
     };
   }
@@ -134,10 +150,6 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Shows an error message if a request fails, without waiting for the reply. */
   protected ask(request: Promise<unknown>, title = text('labs.requestFailed')): void {
     request.catch((error) => this.states.fail(title, error));
-  }
-
-  protected async saveSession(included: boolean): Promise<void> {
-    await this.#sessions?.save(included);
   }
 
   /** Waits no longer for the data of a session, since the user does something else. */
@@ -206,12 +218,38 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       onReset: () => void this.#reset(),
       onUndo: () => this.#travel('undo'),
       onRedo: () => this.#travel('redo'),
-      onSaveSession: (included) => void this.saveSession(included),
+      onCopyCode: () => this.ask(this.#copyCode(), text('sessions.codeFailed')),
+      onSaveData: () => this.ask(this.#saveData(), text('sessions.dataFailed')),
     };
+  }
+
+  /** Returns the lab's own part of a request for code. */
+  protected codeRequest(): Pick<CodeRequest, 'frame'> {
+    return {};
+  }
+
+  /** Copies code that repeats the run and the edits of its surface; without a clipboard, saves it as a file. */
+  async #copyCode(): Promise<void> {
+    const { saving, status, finish } = this.ui;
+    const request = { stem: saving.stem, edits: finish?.log ?? [], ...this.codeRequest() };
+    const { code, needs, name, note = '' } = await this.client.request('code', request);
+    try {
+      await navigator.clipboard.writeText(code);
+      status.say(`${text(COPIED[needs], { name })} ${note}`.trim());
+    } catch {
+      saving.bytes('mjs', new TextEncoder().encode(code), 'text/javascript');
+    }
+  }
+
+  async #saveData(): Promise<void> {
+    const { extension, bytes } = await this.client.request('data', undefined);
+    this.ui.saving.bytes(extension, bytes, 'application/octet-stream');
   }
 
   protected beginRuns(own: Shortcut[] = [], toggleText?: string): void {
     this.begin(labShortcuts(this.runEvents(), own, toggleText));
+    const { finish, status } = this.ui;
+    if (finish) finish.onEdited = (edited) => status.say(edited ? describeEdited(edited) : this.describe());
   }
 
   /** Takes the events that the workers of all labs send; returns whether this was one of them. */

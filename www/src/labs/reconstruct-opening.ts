@@ -10,7 +10,7 @@ import type {
   SavedSurface,
   Setup,
 } from '../reconstruct/protocol';
-import { isRecord } from '../session/recognise';
+import { isLog, isRecord } from '../session/recognise';
 import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
@@ -152,7 +152,8 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 /** Returns the saved model in the content of a session; throws an Error if it is damaged. */
 function savedIn({ state, model }: Record<string, unknown>): SavedSurface {
   const setup = isRecord(model) && model.setup;
-  if (!(state instanceof Uint8Array) || !isRecord(setup) || !isRecord(setup.params) || !isRecord(setup.edits))
+  const hasState = state instanceof Uint8Array && isRecord(model) && isLog(model.log);
+  if (!hasState || !isRecord(setup) || !isRecord(setup.params) || !isRecord(setup.edits))
     throw new Error(text('sessions.badIndex'));
   return { ...(model as object), state } as SavedSurface;
 }

@@ -1,8 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
-import type { NamedBytes, OpenedScene, SceneSource } from '../sculpt/protocol';
-import { isRecord } from '../session/recognise';
+import type { NamedBytes, OpenedScene, PoseLog, SceneSource } from '../sculpt/protocol';
+import { isLog, isRecord } from '../session/recognise';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
@@ -76,9 +76,11 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
       const { unpackMoments } = await import('../session/moments');
       const moments: SculptMoments = unpackMoments(session.content, isSculptMoment);
       const { saved } = moments.now;
-      const params = isRecord(session.content.params) ? session.content.params : {};
+      const log = isLog(session.content.log) ? (session.content.log as PoseLog | undefined) : undefined;
+      // The state fits a model of the parameters that its own was built with, not of those in force.
+      const params = log?.setup.params ?? (isRecord(session.content.params) ? session.content.params : {});
       const setup = { start: saved.start, params, pose: undefined };
-      return { ...(await this.#client.request('open', { source: meshes, setup, saved })), moments };
+      return { ...(await this.#client.request('open', { source: meshes, setup, saved, log })), moments };
     }
     if (meshes.detail && !meshes.base) this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };

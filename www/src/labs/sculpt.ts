@@ -142,10 +142,13 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
-    const moments = await this.paused(() => this.#settings.moments());
+    const [moments, log] = await this.paused(async () => [
+      await this.#settings.moments(),
+      await this.client.request('log', undefined),
+    ]);
     if (!moments) return undefined;
     const view = { camera: this.ui.view.pose, options: this.ui.options.value };
-    return { ...(await import('../session/moments')).packMoments(moments), params: this.#settings.params, view };
+    return { ...(await import('../session/moments')).packMoments(moments), params: this.#settings.params, log, view };
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {

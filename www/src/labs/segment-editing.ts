@@ -22,6 +22,13 @@ interface Moment {
   active: number;
 }
 
+/** The list of labels, which of them the tools paint, and those that are hidden. */
+export interface LabelList {
+  labels: readonly Label[];
+  active: number;
+  hidden: readonly number[];
+}
+
 /** Interface to the lab, as editing needs it. */
 export interface EditedLab {
   /** Called when the list of labels, or the active one, has changed. */
@@ -57,6 +64,8 @@ export class SegmentEditing {
   /** Whether the worker has yet to smooth surfaces. */
   #isRough = false;
   #isFollowing = false;
+  /** Settles when the worker has followed the changes so far. */
+  #followed: Promise<void> = Promise.resolve();
   /** Number of the label map at the worker; replies about a previous one are discarded. */
   #id = 0;
   #mask: Uint8Array | undefined;
@@ -96,6 +105,11 @@ export class SegmentEditing {
     if (mask) for (const fill of fills) fill();
   }
 
+  /** Settles when the worker has followed the changes so far. */
+  get followed(): Promise<void> {
+    return this.#followed;
+  }
+
   /** Whether the worker has yet to follow changes. */
   get isBusy(): boolean {
     return this.#isRough || this.#unsent !== undefined;
@@ -116,6 +130,20 @@ export class SegmentEditing {
     this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, known.get(value)));
     this.#active = this.#labels[0]?.value ?? 1;
     this.#hidden.clear();
+    this.#lab.onLabels();
+  }
+
+  /** Takes over the label map of a session, with its list of labels, and clears the undo history. */
+  resume(
+    grid: Pick<VolumeView, 'dims' | 'spacing'>,
+    opened: OpenedLabels,
+    { labels, active, hidden }: LabelList,
+  ): void {
+    this.#start(grid, opened);
+    this.#labels = labels;
+    this.#active = active;
+    this.#hidden.clear();
+    for (const value of hidden) this.#hidden.add(value);
     this.#lab.onLabels();
   }
 
@@ -304,7 +332,7 @@ export class SegmentEditing {
     this.#isFollowing = true;
     this.#lab.onBusy();
     const id = this.#id;
-    this.#followChanges(id).catch((error) => {
+    this.#followed = this.#followChanges(id).catch((error) => {
       if (id !== this.#id) return;
       this.#isFollowing = false;
       this.#isRough = false;

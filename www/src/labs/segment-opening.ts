@@ -1,13 +1,14 @@
 import { exampleUrl } from '../examples';
 import type { SegmentClient } from '../segment/client';
 import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from '../segment/examples';
-import type { ImageSource, LabelArray, OpenedImage, ParamSpec } from '../segment/protocol';
+import type { ImageSource, LabelArray, NamedBytes, OpenedImage, ParamSpec } from '../segment/protocol';
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedSegment } from './segment-link';
 import type { SegmentParts } from './segment-parts';
+import { sessionOf } from './segment-session';
 
 export type SegmentSource = Source<SegmentExample, LinkedSegment, ImageSource>;
 
@@ -54,11 +55,20 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
     return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
   }
 
+  override filesOf({ files }: ImageSource): NamedBytes[] {
+    return files;
+  }
+
   protected override onEngineReady(specs: ParamSpec[]): void {
     this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
   }
 
-  protected load({ name, linked }: SegmentSource, source: ImageSource, reopening: boolean): Promise<OpenedImage> {
+  protected async load(origin: SegmentSource, source: ImageSource, reopening: boolean): Promise<OpenedImage> {
+    const { name, linked, session } = origin;
+    if (session && !reopening) {
+      const { params, voxels: labels, state } = sessionOf(session.content);
+      return this.#client.request('open', { name, source, params, labels, state });
+    }
     const labels = reopening ? this.#lab.labels() : undefined;
     return this.#client.request('open', { name, source, params: { ...linked?.params }, labels });
   }

@@ -56,6 +56,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
       viewLabel: text('segment.viewLabel'),
       drop: text('segment.drop'),
       data: segmentData(choosers, events.onExample),
+      sessionHelp: text('segment.sessionHelp'),
     });
     this.view = new SegmentView(this.canvas, this.#slices, INITIAL_VIEW, events);
     this.options = new OptionControls(SEGMENT_OPTIONS, INITIAL_VIEW, (options) => {

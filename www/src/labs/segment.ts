@@ -10,13 +10,15 @@ import type {
   VolumeView,
   WorkerEvent,
 } from '../segment/protocol';
+import { restoreView } from '../session/recognise';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import type { LabelMeasures } from '../ui/label-measures';
-import { type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
+import { isToolSettings, type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
 import type { Shortcut } from '../ui/shortcuts';
 import type { Overlays } from '../view/label-overlay';
+import type { SegmentView, SegmentViewOptions } from '../view/segmentation';
 import { LabShell } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -26,6 +28,7 @@ import { SegmentOpening, type SegmentSource } from './segment-opening';
 import { factsOf, MAP_FACT } from './segment-page';
 import { type PartEvents, SegmentParts, type SurfaceFormat } from './segment-parts';
 import { saveMap, saveSurfaces } from './segment-saving';
+import { sessionOf } from './segment-session';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
@@ -152,7 +155,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
-  #adopt(opened: OpenedImage, { name, example, linked }: SegmentSource, reopening: boolean): void {
+  #adopt(opened: OpenedImage, { name, example, linked, session }: SegmentSource, reopening: boolean): void {
     const { volume, voxels, params } = opened;
     this.states.ready = true;
     this.#volume = volume;
@@ -164,6 +167,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
     if (reopening) this.#editing.readopt(volume, opened);
+    else if (session) this.#resume(opened, session.content);
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
       this.ui.tools.set({ range: example?.range ?? [...volume.window] });
@@ -171,6 +175,27 @@ export class SegmentLab extends LabShell<SegmentExample> {
     }
     this.#applyTool(this.ui.tools.value);
     this.#showAll(opened);
+  }
+
+  /** Continues a session: its list of labels, tools and view. */
+  #resume(opened: OpenedImage, content: Record<string, unknown>): void {
+    this.#editing.resume(opened.volume, opened, sessionOf(content));
+    if (isToolSettings(content.tools)) this.ui.tools.set(content.tools);
+    this.ui.data.setFact(MAP_FACT, text('segment.sessionMap'));
+    restoreView(content.view, (shown) => {
+      this.ui.options.set(shown.options as Partial<SegmentViewOptions>);
+      this.ui.view.pose = shown as unknown as SegmentView['pose'];
+    });
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown>> {
+    while (this.#editing.isBusy) await this.#editing.followed;
+    const { labels, active, hidden, voxels } = this.#editing;
+    const copy = voxels?.slice();
+    const state = await this.client.request('save', undefined);
+    const view = { ...this.ui.view.pose, options: this.ui.options.value };
+    const list = { labels, active, hidden: [...hidden] };
+    return { voxels: copy, state, ...list, params: this.#params, tools: this.ui.tools.value, view };
   }
 
   /** Opens a label map of the open volume in place of the present one. */

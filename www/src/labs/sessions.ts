@@ -66,13 +66,18 @@ export class Sessions {
     try {
       ui.status.say(text('sessions.saving'));
       // A run that is paused and continued ends them.
-      const edits = ui.finish?.log ?? [];
+      const { log: edits = [], undone = [] } = ui.finish ?? {};
       const [{ describe, writeSession }, body, data] = await Promise.all([format(), content(), source.load()]);
       if (!body) throw new Error(text('sessions.notSaved'));
       const files = await describe(opening.filesOf(data), included || source.isMade === true);
       const example: string | undefined = source.example?.id;
       const from = { name: source.name, files, ...(example !== undefined && { example }) };
-      const bytes = await writeSession({ lab, hash: address(source), source: from, content: { ...body, edits } });
+      const bytes = await writeSession({
+        lab,
+        hash: address(source),
+        source: from,
+        content: { ...body, edits, undone },
+      });
       ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
     } catch (error) {
       states.fail(text('sessions.saveFailed'), error);
@@ -102,9 +107,9 @@ export class Sessions {
   async #restore(session: Session, files: File[]): Promise<void> {
     const { opening, ui, states } = this.#lab;
     await opening.session(session, files);
-    const { edits } = session.content;
-    if (opening.source?.session !== session || !Array.isArray(edits)) return;
-    await ui.finish?.repeat(edits).catch((error) => states.fail(text('sessions.editsFailed'), error));
+    const { edits, undone = [] } = session.content;
+    if (opening.source?.session !== session || !Array.isArray(edits) || !Array.isArray(undone)) return;
+    await ui.finish?.repeat(edits, undone).catch((error) => states.fail(text('sessions.editsFailed'), error));
   }
 
   /** Opens the session that waits for its data, if these are among `files`. */

@@ -1,6 +1,6 @@
 /** The Track lab's own part of a session. */
 import { type Moments, mapMoments, packMoments, unpackMoments } from '../session/moments';
-import { isRecord } from '../session/recognise';
+import { isLog, isRecord } from '../session/recognise';
 import type { TrackedFrame } from '../track/protocol';
 import type { TrackMoment } from './track-settings';
 
@@ -25,8 +25,12 @@ export function unpackTrack(content: Record<string, unknown>): Moments<TrackMome
     saved: TrackMoment['saved'];
     page: Omit<TrackMoment['page']['record'], 'frames'> & { frames: number[] };
   };
-  const isMoment = ({ setup, done }: Record<string, unknown>, { frames }: Record<string, unknown>) =>
-    isRecord(setup) && typeof done === 'boolean' && Array.isArray(frames) && frames.every((index) => all[index]);
+  const isMoment = ({ setup, done, log }: Record<string, unknown>, { frames }: Record<string, unknown>) =>
+    isRecord(setup) &&
+    isLog(log) &&
+    typeof done === 'boolean' &&
+    Array.isArray(frames) &&
+    frames.every((index) => all[index]);
   return mapMoments(unpackMoments<Flat>(content, isMoment), ({ saved, page: { frames, ...page } }) => ({
     saved,
     page: { record: { ...page, frames: frames.flatMap((index) => all[index] ?? []) } },

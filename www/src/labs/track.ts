@@ -137,6 +137,10 @@ export class TrackLab extends RunLab<TrackExample> {
     return { ...(await import('./track-session')).packTrack(moments), view };
   }
 
+  protected override codeRequest(): { frame: number } {
+    return { frame: this.#results.frame };
+  }
+
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
     this.#results.setImage(volume, this.#slices, this.#truth, keep);

@@ -25,7 +25,7 @@ export async function fetchLesson(address: string, language: string): Promise<Le
   if (opened) return JSON.parse(opened);
   const own = /^[\w-]+$/.test(address);
   const url = own ? new URL(`${address}/`, OWN) : new URL(address, document.baseURI);
-  if (/\.zip$/i.test(url.pathname)) return unpack(await (await fetchFile(url)).blob());
+  if (/\.zip$/i.test(url.pathname)) return unpacked(await (await fetchFile(url)).blob());
   const folder = url.href.replace(/(lesson\.json|\/)?$/, '/');
   const data = await fetchText(new URL('lesson.json', folder));
   const names = filesOf(data, language);
@@ -36,7 +36,7 @@ export async function fetchLesson(address: string, language: string): Promise<Le
 /** Reads the files of a lesson that were opened together: `lesson.json` and its texts, or a ZIP archive of them. */
 export async function readLessonFiles(files: File[]): Promise<LessonFiles> {
   const [first] = files;
-  if (files.length === 1 && first && /\.zip$/i.test(first.name)) return unpack(first);
+  if (files.length === 1 && first && /\.zip$/i.test(first.name)) return unpacked(first);
   const known = files.filter(({ name, size }) => isLessonFile(name) && size <= MOST_BYTES);
   return Object.fromEntries(await Promise.all(known.map(async (file) => [file.name, await file.text()])));
 }
@@ -50,21 +50,13 @@ export async function filesIn(data: DataTransfer | null): Promise<File[]> {
 
 const isLessonFile = (name: string) => /(^|\/)(lesson\.json|text\.[\w-]+\.md)$/.test(name);
 
-async function unpack(archive: Blob): Promise<LessonFiles> {
+async function unpacked(archive: Blob): Promise<LessonFiles> {
   if (archive.size > MOST_BYTES) throw new Error(text('lessons.archiveTooLarge'));
-  const { strFromU8, unzipSync } = await import('three/addons/libs/fflate.module.js');
-  let total = 0;
-  const entries = unzipSync(new Uint8Array(await archive.arrayBuffer()), {
-    filter: ({ name, originalSize }) => {
-      if (!isLessonFile(name)) return false;
-      total += originalSize;
-      if (!(total <= MOST_BYTES)) throw new Error(text('lessons.archiveTooLarge'));
-      return true;
-    },
-  });
-  return Object.fromEntries(
-    Object.entries(entries).map(([name, bytes]) => [name.replace(/^.*\//, ''), strFromU8(bytes)]),
-  );
+  const { unpack } = await import('../archive');
+  const bytes = new Uint8Array(await archive.arrayBuffer());
+  const entries = unpack(bytes, MOST_BYTES, text('lessons.archiveTooLarge'), isLessonFile);
+  const read = ([name, file]: [string, Uint8Array]) => [name.replace(/^.*\//, ''), new TextDecoder().decode(file)];
+  return Object.fromEntries(Object.entries(entries).map(read));
 }
 
 async function fetchText(url: URL): Promise<string> {

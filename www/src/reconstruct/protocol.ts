@@ -7,6 +7,7 @@
  */
 import type { Fitness } from 'vesicle';
 import type {
+  CodeRequests,
   Failure,
   FailureEvent,
   Measures,
@@ -19,6 +20,7 @@ import type {
   Surface,
   Vec3,
 } from '../protocol';
+import type { RunLog } from '../worker/run-log';
 import type { PointShape } from './clouds';
 
 export type { Failure, Fitness, MeshFormat, NamedBytes, ParamSpec, ParamValues, StepReport, Surface, Vec3 };
@@ -76,6 +78,8 @@ export interface SavedSurface {
   setup: Setup;
   /** Report of the last step; undefined before the first. */
   last: StepReport | undefined;
+  /** Log of the run up to this state; undefined if its beginning is not known. */
+  log?: RunLog<Setup> | undefined;
 }
 
 export interface Loaded extends Ready {
@@ -113,7 +117,7 @@ export interface Timing {
   milliseconds: number;
 }
 
-export interface Requests {
+export interface Requests extends CodeRequests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
    * Opens points and builds a model of them, or with `saved` restores one. On failure, the previous points and model stay in use. Indices of removed

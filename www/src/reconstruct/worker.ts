@@ -3,9 +3,12 @@
 import type { ImplicitSurface, StepReport } from 'vesicle';
 import type { Surface } from '../protocol';
 import { text } from '../texts';
+import { toCode } from '../worker/code';
 import { Refusal, toFailure } from '../worker/refusal';
+import { logged, RunRecorder } from '../worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work } from '../worker/serving';
 import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
+import { pointsFile, programOf } from './code';
 import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
   CameraView,
@@ -47,6 +50,9 @@ class Session {
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
+  /** File of the points; undefined if they were computed. */
+  #file: string | undefined;
+  readonly #log = new RunRecorder<Setup>();
   readonly #run = new Work();
   readonly #timing = new Work();
 
@@ -58,7 +64,15 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     setEdits: (edits) => this.#setEdits(edits),
-    save: () => ({ state: this.#current().save(), setup: this.#setup as Setup, last: this.#last }),
+    save: () => ({
+      ...{ state: this.#current().save(), setup: this.#setup as Setup },
+      ...{ last: this.#last, log: this.#log.log },
+    }),
+    code: ({ stem, edits }) => {
+      const data = { file: this.#file, cameras: this.#cameras };
+      return toCode(this.#log.log, (setup) => programOf(setup, data, stem), edits);
+    },
+    data: () => ({ extension: 'xyz', bytes: pointsFile(this.#file, this.#points().points) }),
     export: ({ format }) => this.#current().mesh.toBytes(format),
     volume: ({ size }) => this.#volume(size),
     quantity: (quantity) => this.#setQuantity(quantity),
@@ -77,9 +91,11 @@ class Session {
     const known = { ...setup, edits: { ...setup.edits, removed } };
     const model = buildModel(cloud, cameras, known, saved?.state);
     this.#cloud = cloud;
+    this.#file = 'file' in source ? source.file.name : undefined;
     this.#cameras = cameras;
     const ready = this.#adopt(model, known);
     this.#last = saved?.last;
+    if (saved) this.#log.resume(saved.log);
     return { ...ready, cloud };
   }
 
@@ -90,7 +106,8 @@ class Session {
 
   #adopt(model: ImplicitSurface, setup: Setup): Ready {
     this.#model?.free();
-    this.#model = model;
+    this.#model = logged(model, this.#log, ['step', 'setParams']);
+    this.#log.begin(setup);
     this.#setup = setup;
     this.#sent = '';
     this.#shown = true;
@@ -199,6 +216,7 @@ class Session {
   /** Replaces the point edits of the model; a run in progress continues with them. */
   #setEdits(edits: Edits): undefined {
     this.#current().setEdits(toPointEdits(edits));
+    this.#log.add('setEdits', edits);
     if (this.#setup) this.#setup = { ...this.#setup, edits };
     this.#startOver();
   }

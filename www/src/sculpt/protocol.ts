@@ -8,6 +8,7 @@
  */
 import type { ControlEllipsoid, MeshTexture } from 'vesicle';
 import type {
+  CodeRequests,
   Failure,
   FailureEvent,
   Measures,
@@ -20,6 +21,7 @@ import type {
   Surface,
   Vec3,
 } from '../protocol';
+import type { RunLog } from '../worker/run-log';
 import type { Film } from './film';
 import type { ComputedMesh } from './shapes';
 
@@ -118,7 +120,12 @@ export interface SavedPose {
   iteration: number;
   /** Frame of the film, from 0, at which the model was saved. */
   frame: number;
+  /** Key of the log up to this state, which the worker keeps: a log of many drags is long. */
+  log?: string;
 }
+
+/** Log of a model: what it was built from, and all calls since. */
+export type PoseLog = RunLog<{ start: Pose; params: ParamValues }>;
 
 /**
  * Facts that the page displays besides the measures of the mesh: about the detail and the map T, which takes the
@@ -143,10 +150,13 @@ export interface Facts {
   angleHigh: number;
 }
 
-export interface Requests {
+export interface Requests extends CodeRequests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /** Opens meshes and builds a model of them, or with `saved` restores one. On failure, the previous model stays in use. */
-  open: { body: { source: SceneSource; setup: Setup; saved?: SavedPose | undefined }; reply: OpenedScene };
+  open: {
+    body: { source: SceneSource; setup: Setup; saved?: SavedPose | undefined; log?: PoseLog | undefined };
+    reply: OpenedScene;
+  };
   /** Builds a new model of the same meshes. On failure, the previous model stays in use. */
   rebuild: { body: Setup; reply: Ready };
   /** Loads a film and goes to one of its frames, at most the last, without playing it; undefined removes the film. */
@@ -166,6 +176,8 @@ export interface Requests {
   originals: { body: undefined; reply: { base: Surface; detail: Surface | undefined } };
   /** Saves the present state of the model, also while it is running. */
   save: { body: undefined; reply: SavedPose };
+  /** Replies with the log of the present model, for a session; undefined if its beginning is not known. */
+  log: { body: undefined; reply: PoseLog | undefined };
   /** Restores a saved model of the same meshes. */
   restore: { body: SavedPose; reply: Ready };
   stages: { body: StageKind; reply: Stage[] };

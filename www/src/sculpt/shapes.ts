@@ -5,6 +5,8 @@ import { drawnMap } from './map';
 
 export type ComputedMesh = 'globe' | 'ball';
 
+/** Arguments of `Mesh.icosphere` for the ball. */
+export const BALL = [[0, 0, 0], 1, 0.08] as const satisfies Parameters<typeof Mesh.icosphere>;
 /** Number of meridians of the globe's mesh. */
 const MERIDIANS = 96;
 /** Number of circles of latitude of the globe's mesh, without the poles. */
@@ -18,7 +20,7 @@ export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
 
 /** Returns a computed mesh without its texture; tests use it where no texture can be drawn. */
 export async function plainMesh(shape: ComputedMesh): Promise<Mesh> {
-  return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : readMesh(globeAsObj());
+  return shape === 'ball' ? Mesh.icosphere([...BALL[0]], BALL[1], BALL[2]) : readMesh(globeAsObj());
 }
 
 /** Reads a mesh from the bytes of a file, with the image of its texture if that is a file of its own. */
@@ -32,7 +34,7 @@ export async function readMesh(bytes: Uint8Array, texture?: MeshTexture): Promis
  * Returns the globe, a ball of radius 1, as an OBJ file, with y up and texture coordinates by longitude and latitude: u
  * from west to east, v from the south. Only in a file can a vertex on the seam have two texture coordinates.
  */
-function globeAsObj(): Uint8Array {
+export function globeAsObj(): Uint8Array {
   const lines: string[] = [];
   const rings = CIRCLES + 1;
   for (let ring = 1; ring < rings; ring++) for (let m = 0; m < MERIDIANS; m++) lines.push(vertexLine(ring, m, rings));

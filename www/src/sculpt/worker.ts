@@ -2,9 +2,12 @@
 
 import type { StepReport } from 'vesicle';
 import { text } from '../texts';
+import { toCode } from '../worker/code';
 import { Refusal, toFailure } from '../worker/refusal';
+import { logged, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
+import { meshFile, type Origins, originsOf, programOf } from './code';
 import {
   buildModel,
   factsOf,
@@ -24,6 +27,7 @@ import type {
   OpenedScene,
   ParamValues,
   Pose,
+  PoseLog,
   PoseMessage,
   Ready,
   Requests,
@@ -36,12 +40,19 @@ import { recorded } from './recording';
 import { levelsOf, stagesOf } from './stages';
 import { TargetPath } from './target-path';
 
+/** Number of logs that are kept: more than undo has states. */
+const MOST_LOGS = 200;
+
 type Model = ReturnType<typeof buildModel>;
 const send = sender<WorkerEvent>();
 
 class Session {
   #scene: Scene = { detail: undefined, base: undefined };
+  #origins: Origins = {};
   #model: Model | undefined;
+  readonly #log = new RunRecorder<PoseLog['setup']>();
+  /** Logs of saved states. */
+  readonly #logs = new Map<string, PoseLog | undefined>();
   #preview = new Preview();
   #start: Pose = [];
   #view: FrameContents = { layout: 'result', quantity: undefined, textured: false };
@@ -77,6 +88,9 @@ class Session {
     show: (view) => this.#show(view),
     originals: () => this.#originals(),
     save: () => this.#save(),
+    log: () => this.#log.log,
+    code: ({ stem, edits }) => toCode(this.#log.log, (setup) => programOf(setup, this.#origins, stem), edits),
+    data: () => ({ extension: 'obj', bytes: meshFile(this.#origins) }),
     restore: (saved) => this.#restore(saved),
     stages: (kind) => stagesOf(kind),
     record: (body) => this.#record(body.frameSeconds),
@@ -105,16 +119,19 @@ class Session {
     else this.#begin();
   }
 
-  async #open({ source, setup, saved }: Requests['open']['body']): Promise<OpenedScene> {
+  async #open({ source, setup, saved, log }: Requests['open']['body']): Promise<OpenedScene> {
     await this.#run.stop();
     await this.#recording.stop();
     const scene = await sceneFrom(source);
     const began = performance.now();
     try {
       const { model, start } = saved ? restoredModel(scene, setup, saved) : firstModel(scene, setup);
-      const ready = this.#adopt(model, start, setup.pose);
+      const ready = this.#adopt(model, start, setup);
+      if (saved) this.#log.resume(log);
+      if (saved?.log) this.#logs.set(saved.log, log);
       freeScene(this.#scene);
       this.#scene = scene;
+      this.#origins = originsOf(source);
       const { bandCount: bands, mesh } = this.#current();
       const detail = scene.detail?.triangleCount;
       const { texture } = mesh;
@@ -128,12 +145,14 @@ class Session {
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#run.stop();
     const start = setup.start ?? this.#start;
-    return this.#adopt(buildModel(this.#scene, start, setup), start, setup.pose);
+    return this.#adopt(buildModel(this.#scene, start, setup), start, setup);
   }
 
-  #adopt(model: Model, start: Pose, pose: Pose | undefined): Ready {
+  #adopt(built: Model, start: Pose, { params, pose }: Setup): Ready {
     this.#model?.free();
+    const model = logged(built, this.#log, ['step', 'setParams', 'setEllipsoids']);
     this.#model = model;
+    this.#log.begin({ start, params });
     this.#start = start;
     this.#preview = new Preview();
     this.#dragging = false;
@@ -310,26 +329,36 @@ class Session {
     const { film } = this.#path;
     if (!film) throw new Refusal('invalid-argument', text('sculpt.noFilm'));
     const before = model.save();
+    const { log } = this.#log;
     const tell = (progress: number) => send({ event: 'recorded', progress });
     return this.#recording
       .begin((signal) => recorded(model, film, frameSeconds, signal, tell))
-      .finally(() => model.restore(before));
+      .finally(() => {
+        model.restore(before);
+        this.#log.resume(log);
+      });
   }
 
   #save(): SavedPose {
     this.#preview.end(this.#current());
+    const log = crypto.randomUUID();
+    this.#logs.set(log, this.#log.log);
+    const [oldest = ''] = this.#logs.keys();
+    if (this.#logs.size > MOST_LOGS) this.#logs.delete(oldest);
     return {
       state: this.#current().save(),
       start: this.#start,
       iteration: this.#iteration,
       frame: this.#path.frame,
+      log,
     };
   }
 
-  async #restore({ state, frame, iteration }: SavedPose): Promise<Ready> {
+  async #restore({ state, frame, iteration, log = '' }: SavedPose): Promise<Ready> {
     await this.#run.stop();
     const model = this.#current();
     model.restore(state);
+    this.#log.resume(this.#logs.get(log));
     this.#preview = new Preview();
     this.#path.rewind(frame);
     this.#iteration = iteration;

@@ -76,10 +76,17 @@ export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
    * Opens a volume with its label map, or with an empty one; `labels` are voxels that replace those of the file, after a
-   * failure of the engine. On failure, what was open before stays.
+   * failure of the engine or of a session, which also has the `state` of the surfaces. On failure, what was open before
+   * stays.
    */
   open: {
-    body: { name: string; source: ImageSource; params: ParamValues; labels: LabelArray | undefined };
+    body: {
+      name: string;
+      source: ImageSource;
+      params: ParamValues;
+      labels: LabelArray | undefined;
+      state?: Uint8Array | undefined;
+    };
     reply: OpenedImage;
   };
   /** Replaces the label map of the open volume by that of a file, which must have the grid of the volume. */
@@ -94,6 +101,8 @@ export interface Requests {
    * is open.
    */
   step: { body: { map: number }; reply: StepUpdate };
+  /** Replies with the state of the surfaces, for a session. */
+  save: { body: undefined; reply: Uint8Array };
   /** Changes parameters of the surfaces, which the next steps adopt; replies with all parameters. */
   setParams: { body: ParamValues; reply: ParamValues };
   /** Replies with one byte for each voxel: not 0 if its intensity is from `low` to `high`, both included. */

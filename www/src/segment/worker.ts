@@ -38,12 +38,18 @@ class LiveMap {
   /** Version of each label's surface when it was last sent. */
   readonly #sent = new Map<number, number>();
 
-  constructor({ volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>, voxels: LabelArray, params: ParamValues) {
+  constructor(
+    { volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>,
+    voxels: LabelArray,
+    params: ParamValues,
+    state?: Uint8Array,
+  ) {
     this.voxels = voxels;
     this.map = mapLike(volume, voxels, unit);
     this.#voxelVolume = Math.abs(determinant(volume.affine));
     try {
       this.surfaces = new LabelSurfaces({ volume: this.map, ...params });
+      if (state) this.surfaces.restore(state);
     } catch (error) {
       this.map.free();
       throw error;
@@ -113,6 +119,7 @@ class Session {
     openLabels: ({ files }) => this.#openLabels(files),
     edit: ({ map, block }) => this.#step(map, block),
     step: ({ map }) => this.#step(map),
+    save: () => this.#current().surfaces.save(),
     setParams: (params) => {
       const { surfaces } = this.#current();
       surfaces.setParams(params);
@@ -127,11 +134,11 @@ class Session {
     exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
   };
 
-  async #openImage({ name, source, params, labels }: Requests['open']['body']): Promise<OpenedImage> {
+  async #openImage({ name, source, params, labels, state }: Requests['open']['body']): Promise<OpenedImage> {
     const began = performance.now();
     const opened = await openImage(source);
     try {
-      const live = new LiveMap(opened, labels ?? opened.map.voxels, params);
+      const live = new LiveMap(opened, labels ?? opened.map.voxels, params, state);
       this.#adopt(live);
       this.#open?.volume.free();
       this.#open = opened;

@@ -5,7 +5,10 @@
 
 export type Parts = Record<string, Uint8Array>;
 
-const ARRAYS = { Uint8Array, Uint32Array, Float32Array, Float64Array };
+const ARRAYS = {
+  ...{ Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array },
+  ...{ Float32Array, Float64Array },
+};
 
 /** Value in JSON that stands for a typed array, whose bytes are a part, or for a number that JSON does not have. */
 type Stand = { $part: string; type: keyof typeof ARRAYS } | { $number: string };

@@ -2,7 +2,8 @@
  * Sessions as files: a ZIP with `session.json` and binary parts; `docs/sessions.md` describes the format. Nothing of a file
  * is believed before it is checked, since it may come from anywhere.
  */
-import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
+import { strFromU8, strToU8, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
+import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
 import { LAB_IDS } from '../labs/address';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
@@ -13,8 +14,7 @@ const FORMAT = 'vesicle-session';
 /** Version of the format that is written; older ones are read. */
 const VERSION = 1;
 
-/** Limits of what is unpacked: parts, and bytes of all together. A session without its data is far below. */
-const MOST_PARTS = 1000;
+/** Largest number of bytes that are unpacked. A session without its data is far below. */
 const MOST_BYTES = 2 ** 30;
 
 /** Description of a file of the data that a session was made with; `content` if the session includes it. */
@@ -72,7 +72,7 @@ export async function writeSession({ lab, hash, source, content }: Session): Pro
 
 /** Reads a session. Throws an Error whose message says what is wrong with the file. */
 export async function readSession(bytes: Uint8Array): Promise<Session> {
-  const { [INDEX]: packed, ...parts } = unpack(bytes);
+  const { [INDEX]: packed, ...parts } = partsOf(bytes);
   if (!packed) throw new Error(text('sessions.noIndex'));
   const { version, parts: sums, ...body } = indexOf(strFromU8(packed));
   if (typeof version === 'number' && version > VERSION)
@@ -101,23 +101,15 @@ function decoded(body: unknown, find: (part: string) => Uint8Array): Record<stri
   }
 }
 
-function unpack(bytes: Uint8Array): Parts {
-  let [count, total] = [0, 0];
-  const filter = ({ size, originalSize }: { size: number; originalSize: number }) => {
-    count += 1;
-    total += Math.max(size, originalSize);
-    if (count > MOST_PARTS || !(total <= MOST_BYTES)) throw new Error(TOO_LARGE);
-    return true;
-  };
+function partsOf(bytes: Uint8Array): Parts {
   try {
-    return unzipSync(bytes, { filter });
+    return unpack(bytes, MOST_BYTES, TOO_LARGE);
   } catch (error) {
-    if (error instanceof Error && error.message === TOO_LARGE) throw error;
-    throw new Error(text('sessions.notZip'));
+    throw error instanceof ArchiveTooLarge ? error : new Error(text('sessions.notZip'));
   }
 }
 
-const TOO_LARGE = text('sessions.tooLarge', { parts: MOST_PARTS, gigabytes: MOST_BYTES / 2 ** 30 });
+const TOO_LARGE = text('sessions.tooLarge', { parts: MOST_FILES, gigabytes: MOST_BYTES / 2 ** 30 });
 
 function indexOf(json: string): { version?: unknown; parts?: Record<string, string> } {
   let index: unknown;

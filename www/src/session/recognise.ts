@@ -16,6 +16,11 @@ export function isRecord(value: unknown): value is Record<string, unknown> {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
 
+/** Tests whether a value may be the log of a run, or that of a run whose beginning is not known. */
+export function isLog(value: unknown): boolean {
+  return value === undefined || (isRecord(value) && isRecord(value.setup) && Array.isArray(value.calls));
+}
+
 /** Passes the view of a session to `show`. A damaged one is left out: nothing else depends on it. */
 export function restoreView(view: unknown, show: (view: Record<string, unknown>) => void): void {
   if (!isRecord(view)) return;

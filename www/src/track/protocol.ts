@@ -6,6 +6,7 @@
  */
 import type { FrameStatistics } from 'vesicle';
 import type {
+  CodeRequests,
   Failure,
   FailureEvent,
   Measures,
@@ -19,6 +20,7 @@ import type {
   Vec3,
   VolumeView,
 } from '../protocol';
+import type { RunLog } from '../worker/run-log';
 import type { CineSpec } from './cine';
 
 export type {
@@ -122,6 +124,8 @@ export interface SavedTrack {
   setup: Setup;
   iteration: number;
   done: boolean;
+  /** Log of the run up to this state; undefined if its beginning is not known. */
+  log?: RunLog<Setup> | undefined;
 }
 
 /**
@@ -168,7 +172,7 @@ export interface ComparedTrack {
   selfIntersections: number;
 }
 
-export interface Requests {
+export interface Requests extends CodeRequests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
   /**
    * Opens an image and builds a tracker of it, or with `saved` restores a run of it. On failure, the previous image and

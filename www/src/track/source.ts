@@ -74,9 +74,17 @@ export function prepare(image: Volume, preparation: Preparation, onStage: (what:
  * Returns the binning factors along the three voxel axes, 1 across slices. Slices lie across the axis with the largest
  * spacing, or the last of several such axes.
  */
-function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
+export function factorsOf({ spacing }: Pick<Volume, 'spacing'>, binning: number): [number, number, number] {
   const across = spacing.lastIndexOf(Math.max(...spacing));
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
+}
+
+/** Returns the options of a tracker, without the edge threshold τ. */
+export function trackerOptions({ affine, dims }: Pick<Volume, 'affine' | 'dims'>, { box, at, params }: Setup) {
+  const { threshold: _, ...others } = params;
+  const region = box && voxelsOf(box, invert(affine), dims);
+  const voxels = region && { min: region.low, max: region.high };
+  return { component: at ?? ('largest' as const), params: others, ...(voxels && { voxels }) };
 }
 
 /**
@@ -85,14 +93,11 @@ function factorsOf({ spacing }: Volume, binning: number): [number, number, numbe
  */
 export function buildTracker(
   volume: Volume,
-  { box, at, params }: Setup,
+  setup: Setup,
   state?: Uint8Array,
 ): { tracker: SurfaceTracker; suggested: number } {
-  const { threshold, ...others } = params;
-  const region = box && voxelsOf(box, invert(volume.affine), volume.dims);
-  const voxels = region && { min: region.low, max: region.high };
-  const options = { volume, component: at ?? ('largest' as const), params: others, ...(voxels && { voxels }) };
-  const tracker = new SurfaceTracker(options);
+  const { threshold } = setup.params;
+  const tracker = new SurfaceTracker({ volume, ...trackerOptions(volume, setup) });
   try {
     const suggested = tracker.params.threshold;
     if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });

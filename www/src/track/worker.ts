@@ -2,11 +2,14 @@
 
 import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
 import { text } from '../texts';
+import { toCode } from '../worker/code';
 import { Refusal, toFailure } from '../worker/refusal';
+import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
 import { viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
+import { programOf } from './code';
 import { trackForComparison } from './comparing';
 import { trackedFrame } from './frames';
 import { interpolateSlice } from './interpolate-slice';
@@ -36,6 +39,8 @@ const send = sender<WorkerEvent>();
 /** A 4D image as opened, and as prepared for tracking. */
 interface LoadedImage {
   name: string;
+  /** Files of the image; none if it was computed. */
+  files: { name: string }[];
   original: Volume;
   spec: CineSpec | undefined;
   preparedVolume: Volume;
@@ -55,7 +60,8 @@ class Session {
    * State of the tracker saved when the boundary of all frames was found, before the first surface, to return to after
    * a change of parameters; undefined until then.
    */
-  #boundaryState: { state: Uint8Array; iteration: number } | undefined;
+  #boundaryState: { state: Uint8Array; iteration: number; log: RunLog<Setup> | undefined } | undefined;
+  readonly #log = new RunRecorder<Setup>();
   readonly #run = new Work();
   readonly #comparison = new Work();
 
@@ -76,6 +82,8 @@ class Session {
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => this.#comparison.stop(),
+    code: (body) => this.#code(body),
+    data: () => ({ extension: 'nii', bytes: this.#image().original.toNifti() }),
   };
 
   async #open({ name, source, setup, saved }: Requests['open']['body']): Promise<OpenedImage> {
@@ -91,7 +99,8 @@ class Session {
       const ready = this.#adopt(made, setup, saved);
       const { dims, spacing } = original;
       this.#freeImage();
-      this.#loaded = { name, original, spec, preparedVolume: made, preparation: setup.preparation };
+      const files = 'files' in source ? source.files.map((file) => ({ name: file.name })) : [];
+      this.#loaded = { name, files, original, spec, preparedVolume: made, preparation: setup.preparation };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
       return withTransfer({ ...ready, volume, dims, spacing, truth, openingMs: took }, [volume.voxels]);
@@ -128,7 +137,9 @@ class Session {
   #adopt(volume: Volume, setup: Setup, saved?: SavedTrack): Omit<Ready, 'volume'> {
     const { tracker, suggested } = buildTracker(volume, setup, saved?.state);
     this.#tracker?.free();
-    this.#tracker = tracker;
+    this.#tracker = logged(tracker, this.#log, ['step', 'setParams']);
+    this.#log.begin(setup);
+    if (saved) this.#log.resume(saved.log);
     this.#setup = setup;
     this.#suggested = suggested;
     this.#boundaryState = undefined;
@@ -193,7 +204,7 @@ class Session {
     this.#done = report.done;
     const { length } = tracker.statistics;
     if (length === 0 && report.iteration === tracker.frames)
-      this.#boundaryState = { state: tracker.save(), iteration: report.iteration };
+      this.#boundaryState = { state: tracker.save(), iteration: report.iteration, log: this.#log.log };
     const index = length > this.#sent ? length - 1 : undefined;
     this.#sent = length;
     const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
@@ -247,6 +258,7 @@ class Session {
     }
     const tracker = this.#current();
     tracker.restore(this.#boundaryState.state);
+    this.#log.resume(this.#boundaryState.log);
     tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !BOUNDARY_PARAMS.includes(name))));
     this.#setProgress(this.#boundaryState.iteration, false);
   }
@@ -264,19 +276,28 @@ class Session {
 
   #save(): SavedTrack {
     const setup = this.#setup as Setup;
-    return { state: this.#current().save(), setup, iteration: this.#iteration, done: this.#done };
+    const log = this.#log.log;
+    return { state: this.#current().save(), setup, iteration: this.#iteration, done: this.#done, log };
   }
 
-  async #restore({ state, setup, iteration, done }: SavedTrack): Promise<Ready> {
+  async #restore({ state, setup, iteration, done, log }: SavedTrack): Promise<Ready> {
     await this.#pause();
     const places = ({ preparation, box, at }: Setup) => ({ preparation, box, at });
     const fits = this.#setup && same(places(this.#setup), places(setup));
     if (!fits) this.#build(setup);
     this.#current().restore(state);
+    this.#log.resume(log);
     this.#setup = setup;
     this.#boundaryState = undefined;
     this.#setProgress(iteration, done);
     return { ...this.#ready(), volume: undefined };
+  }
+
+  /** Returns code that repeats the run, for the surface of a frame, or the newest one if that has none yet. */
+  #code({ stem, edits, frame = 0 }: Requests['code']['body']): Requests['code']['reply'] {
+    const isTracked = frame < this.#current().statistics.length;
+    const program = (setup: Setup) => programOf(setup, this.#image(), isTracked ? frame : undefined, stem);
+    return toCode(this.#log.log, program, edits);
   }
 
   #export(frame: number, format: Requests['export']['body']['format']): Uint8Array {

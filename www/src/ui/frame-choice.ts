@@ -8,7 +8,6 @@ export class FrameChoice {
   readonly element: HTMLElement;
   readonly #slider: HTMLInputElement;
   readonly #output = h('output', { 'aria-live': 'off' });
-  #frame = 0;
   #frames = 1;
 
   /** `onFrame` is called with the index of the frame that the user chooses. */
@@ -28,14 +27,8 @@ export class FrameChoice {
     );
   }
 
-  /** Index of the open frame; undefined if the volume has no others. */
-  get frame(): number | undefined {
-    return this.#frames > 1 ? this.#frame : undefined;
-  }
-
   /** Shows the open frame of a volume of `frames` frames. */
   show(frame: number, frames: number): void {
-    this.#frame = frame;
     this.#frames = frames;
     this.element.hidden = frames < 2;
     this.#slider.max = String(frames - 1);

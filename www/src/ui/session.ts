@@ -5,10 +5,13 @@ import { h, uniqueId, wideButton } from './dom';
 export interface SessionEvents {
   /** Saves a session; `included`: with the data that it was made from. */
   onSaveSession: (included: boolean) => void;
-  /** Copies the run as code; without it, the lab has none. */
-  onCopyCode?: () => void;
-  /** Saves the volume as a file that the code reads; without it, the lab has none. */
-  onSaveVolume?: () => void;
+}
+
+/** The wishes about code that repeats the run, in labs whose model runs. */
+export interface CodeEvents {
+  onCopyCode: () => void;
+  /** Saves the data as a file that the code reads. */
+  onSaveData: () => void;
 }
 
 /** Controls that save the session, and copy the run as code. */
@@ -16,19 +19,22 @@ export class SessionControls {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[] = [];
 
-  constructor({ onSaveSession, onCopyCode, onSaveVolume }: SessionEvents) {
+  /** `help` describes a session of the lab. */
+  constructor({ onSaveSession }: SessionEvents, help: string) {
     const included = h('input', { type: 'checkbox', 'data-session': 'included' });
     this.element = h(
       'div',
       { class: 'session' },
-      ...this.#action('session', text('sessions.save'), text('sessions.saveHelp'), () =>
-        onSaveSession(included.checked),
-      ),
+      ...this.#action('session', text('sessions.save'), help, () => onSaveSession(included.checked)),
       h('label', { class: 'check' }, included, text('sessions.include')),
-      ...(onCopyCode ? this.#action('code', text('sessions.copyCode'), text('sessions.copyCodeHelp'), onCopyCode) : []),
-      ...(onSaveVolume
-        ? this.#action('volume', text('sessions.saveVolume'), text('sessions.saveVolumeHelp'), onSaveVolume)
-        : []),
+    );
+  }
+
+  /** Adds the controls for code. */
+  addCode({ onCopyCode, onSaveData }: CodeEvents): void {
+    this.element.append(
+      ...this.#action('code', text('sessions.copyCode'), text('sessions.copyCodeHelp'), onCopyCode),
+      ...this.#action('data', text('sessions.saveData'), text('sessions.saveDataHelp'), onSaveData),
     );
   }
 

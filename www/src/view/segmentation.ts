@@ -9,7 +9,7 @@ import { LabelOutlines } from './label-outlines';
 import { LabelPicture, type Overlays } from './label-overlay';
 import { type Grip, SlicePanel } from './panel';
 import { SurfaceObject } from './surface';
-import { Viewport } from './viewport';
+import { type CameraPose, Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
 
 export interface SegmentViewOptions {
@@ -137,6 +137,16 @@ export class SegmentView {
   setBrush(brush: { radius: number; disc: boolean } | undefined): void {
     this.#brush = brush;
     this.#redraw();
+  }
+
+  /** Camera and crosshair, for a session. */
+  get pose(): { camera: CameraPose; crosshair: Vec3 } {
+    return { camera: this.#viewport.pose, crosshair: this.crosshair };
+  }
+
+  set pose({ camera, crosshair }) {
+    this.goToVoxel(crosshair);
+    this.#viewport.pose = camera;
   }
 
   /** Index of the voxel in which the three slices intersect. */

@@ -1,16 +1,10 @@
 /** The log of a run: all that has made the present model, in order, with which the run can be repeated. */
-import type { ParamValues } from '../protocol';
 
-/** Calls of a model's methods that change it, and what they are given. */
-interface Calls {
-  /** Number of iterations, one after another. */
-  step: number;
-  setParams: ParamValues;
-  setAttractors: readonly object[];
-  seed: undefined;
+/** A call of a model's method that changed it, and what it was given. */
+export interface Call {
+  call: string;
+  given: unknown;
 }
-
-type Call = { [K in keyof Calls]: { call: K; given: Calls[K] } }[keyof Calls];
 
 /** Log of a run as plain data; `setup` is what the model was built from, with every value that was chosen for it. */
 export interface RunLog<Setup> {
@@ -18,43 +12,81 @@ export interface RunLog<Setup> {
   calls: readonly Call[];
 }
 
+/** Largest number of calls in a log; code with more of them is of no use. */
+const MOST_CALLS = 20_000;
+
 /** Records the calls that change a model. Logs it has returned do not change. */
 export class RunRecorder<Setup> {
-  #log: RunLog<Setup> | undefined;
+  readonly #replaced: readonly string[];
+  #setup: Setup | undefined;
+  #calls: Call[] = [];
 
-  /** The log of the present model; undefined if there is none. */
+  /** Of consecutive calls of the methods `replaced`, the model depends on the last values only, and no others are kept. */
+  constructor(replaced: readonly string[] = []) {
+    this.#replaced = replaced;
+  }
+
+  /** The log of the present model; undefined if there is none, or if its beginning is not known. */
   get log(): RunLog<Setup> | undefined {
-    return this.#log;
+    return this.#setup && { setup: this.#setup, calls: [...this.#calls] };
   }
 
   /** Starts the log of a new model. */
   begin(setup: Setup): void {
-    this.#log = { setup, calls: [] };
+    this.resume({ setup, calls: [] });
   }
 
-  /** Continues the log of a run that was restored. */
-  resume(log: RunLog<Setup>): void {
-    this.#log = log;
+  /** Continues the log of a run that was restored; undefined if it has none. */
+  resume(log: RunLog<Setup> | undefined): void {
+    this.#setup = log?.setup;
+    this.#calls = [...(log?.calls ?? [])];
   }
 
-  /**
-   * Adds a call that was made. Steps are counted, and of settings changed again before the next step only the last values
-   * are kept, since the model depends on no others.
-   */
-  add<K extends keyof Calls>(call: K, given: Calls[K]): void {
-    if (!this.#log) return;
-    const { setup, calls } = this.#log;
-    const last = calls.at(-1);
-    const added = { call, given } as Call;
-    const merged = last && merge(last, added);
-    this.#log = { setup, calls: merged ? [...calls.slice(0, -1), merged] : [...calls, added] };
+  /** Adds a call that was made. Steps are counted. */
+  add(call: string, given: unknown): void {
+    if (this.#setup === undefined) return;
+    const last = this.#calls.at(-1);
+    const merged = last?.call === call ? this.#merged(last, given) : undefined;
+    if (merged) this.#calls.pop();
+    this.#calls.push(merged ?? { call, given });
+    if (this.#calls.length > MOST_CALLS) this.resume(undefined);
+  }
+
+  /** Returns one call that does the same as two, undefined if there is none. */
+  #merged({ call, given }: Call, next: unknown): Call | undefined {
+    if (call === 'step') return { call, given: Number(given) + Number(next) };
+    if (!this.#replaced.includes(call)) return undefined;
+    return { call, given: Array.isArray(next) ? next : { ...(given as object), ...(next as object) } };
   }
 }
 
-/** Returns one call that does the same as two, undefined if there is none. */
-function merge(one: Call, next: Call): Call | undefined {
-  if (one.call === 'step' && next.call === 'step') return { call: 'step', given: one.given + next.given };
-  if (one.call === 'setParams' && next.call === 'setParams')
-    return { call: 'setParams', given: { ...one.given, ...next.given } };
-  return one.call === 'setAttractors' && next.call === 'setAttractors' ? next : undefined;
+/**
+ * Returns a model that adds to a log its calls of `methods`, when they have succeeded, and the steps of its runs.
+ */
+export function logged<Model extends object>(
+  model: Model,
+  log: Pick<RunRecorder<unknown>, 'add'>,
+  methods: readonly (keyof Model & string)[],
+): Model {
+  type Method = (...given: unknown[]) => unknown;
+  const get = (_: Model, name: keyof Model) => {
+    const value = model[name];
+    if (typeof value !== 'function') return value;
+    const method: Method = value.bind(model);
+    if (name === 'run')
+      return (options: { onStep?: (report: unknown) => void }) => {
+        const onStep = (report: unknown) => {
+          log.add('step', 1);
+          options.onStep?.(report);
+        };
+        return method({ ...options, onStep });
+      };
+    if (!methods.includes(name as never)) return method;
+    return (...given: unknown[]) => {
+      const result = method(...given);
+      log.add(String(name), given[0]);
+      return result;
+    };
+  };
+  return new Proxy(model, { get } as ProxyHandler<Model>);
 }

@@ -1,0 +1,39 @@
+/** Code of the Reconstruct lab's runs. */
+import { text } from '../texts';
+import { bytesOf, callsOf, chosen, type Program } from '../worker/code';
+import { literal } from '../worker/literal';
+import { Refusal } from '../worker/refusal';
+import { toPointEdits } from './model';
+import type { CameraView, Edits, Setup } from './protocol';
+
+/** Returns how code makes the model of a set-up, with points from `file` or, if they were computed, from one that is saved. */
+export function programOf(
+  { params, edits, maxPoints, keepComponents }: Setup,
+  { file, cameras }: { file: string | undefined; cameras: readonly CameraView[] },
+  stem: string,
+): Program {
+  const options = {
+    ...(cameras.length > 0 && { cameras: cameras.map(({ image: _, ...camera }) => camera) }),
+    ...(maxPoints !== undefined && { maxPoints }),
+    ...(keepComponents !== undefined && { keepComponents }),
+    params: chosen('implicit', params),
+  };
+  const setEdits = (edits: Edits) => `model.setEdits(${literal(toPointEdits(edits))});`;
+  return {
+    ...(file === undefined ? bytesOf([`${stem}.xyz`], ['bytes'], 'saved') : bytesOf([file], ['bytes'])),
+    names: ['ImplicitSurface', 'parsePoints'],
+    begin: [
+      `const model = new ImplicitSurface({ ...parsePoints(bytes), ${literal(options).slice(2)});`,
+      ...(Object.values(edits).some(({ length }) => length > 0) ? [setEdits(edits)] : []),
+    ],
+    calls: { ...callsOf('step', 'setParams'), setEdits },
+    note: cameras.some(({ image }) => image) ? text('sessions.noPictures') : undefined,
+  };
+}
+
+/** Returns computed points as text, three coordinates a line; refuses if they are of a file, which the code reads. */
+export function pointsFile(file: string | undefined, points: Float32Array): Uint8Array {
+  if (file !== undefined) throw new Refusal('invalid-argument', text('sessions.noDataNeeded'));
+  const lines = Array.from({ length: points.length / 3 }, (_, i) => points.subarray(3 * i, 3 * i + 3).join(' '));
+  return new TextEncoder().encode(`${lines.join('\n')}\n`);
+}

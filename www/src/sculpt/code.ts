@@ -1,0 +1,55 @@
+/** Code of the Sculpt lab's runs. */
+import { text } from '../texts';
+import { bytesOf, callsOf, chosen, type Program } from '../worker/code';
+import { literal } from '../worker/literal';
+import { Refusal } from '../worker/refusal';
+import type { MeshSource, PoseLog, SceneSource } from './protocol';
+import { BALL, type ComputedMesh, globeAsObj } from './shapes';
+
+/** Where the meshes of a model are from; a file may have the picture of its texture in another one, of the type `texture`. */
+export type Origins = {
+  [Mesh in keyof SceneSource]: { file: string; texture: string | undefined } | { shape: ComputedMesh };
+};
+
+/** Returns where meshes are from, without their bytes. */
+export function originsOf(source: SceneSource): Origins {
+  const origin = (one: MeshSource) =>
+    'file' in one ? { file: one.file.name, texture: one.texture?.type } : { shape: one.shape };
+  return Object.fromEntries(Object.entries(source).map(([mesh, one]) => [mesh, origin(one)]));
+}
+
+/** Returns how code makes the model of a set-up. */
+export function programOf({ start, params }: PoseLog['setup'], origins: Origins, stem: string): Program {
+  const meshes = Object.entries(origins);
+  /** Files and the parameters for their bytes. */
+  const inputs: [file: string, parameter: string][] = [];
+  let given = '';
+  for (const [mesh, origin] of meshes) {
+    const texture = 'file' in origin ? origin.texture : undefined;
+    if (!isBall(origin)) inputs.push(['file' in origin ? origin.file : `${stem}.obj`, mesh]);
+    if (texture) inputs.push([text('sculpt.textureFile', { type: texture.slice('image/'.length) }), 'picture']);
+    const options = texture ? `, { texture: { type: ${literal(texture)}, bytes: picture } }` : '';
+    const made = isBall(origin) ? `icosphere(${BALL.map(literal).join(', ')})` : `parse(${mesh}${options})`;
+    given += `${mesh}: Mesh.${made}, `;
+  }
+  const [files, parameters] = [inputs.map(([file]) => file), inputs.map(([, parameter]) => parameter)];
+  const needs = meshes.some(([, origin]) => isGlobe(origin)) ? 'saved' : 'files';
+  const options = literal({ ellipsoids: start, params: chosen('multires', params) }).slice(2);
+  return {
+    ...(inputs.length > 0 && bytesOf(files, parameters, needs)),
+    names: ['MultiresolutionModel', ...(meshes.length > 0 ? ['Mesh'] : [])],
+    begin: [`const model = new MultiresolutionModel({ ${given}${options});`],
+    calls: callsOf('step', 'setParams', 'setEllipsoids'),
+    // Its map is drawn by the app.
+    note: needs === 'saved' ? text('sessions.noPictures') : undefined,
+  };
+}
+
+const isBall = (origin: object) => 'shape' in origin && origin.shape === 'ball';
+const isGlobe = (origin: object) => 'shape' in origin && !isBall(origin);
+
+/** Returns the mesh that code reads if it is a computed one, as a file. */
+export function meshFile(origins: Origins): Uint8Array {
+  if (Object.values(origins).some(isGlobe)) return globeAsObj();
+  throw new Refusal('invalid-argument', text('sessions.noDataNeeded'));
+}
