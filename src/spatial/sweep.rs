@@ -65,8 +65,8 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// Returns the approximate median radius of the balls, the unit of the bounds of the size classes; at least the smallest positive
-/// normal number, and 1 if there are no balls.
+/// Returns the approximate median radius of the balls, the unit of the bounds of the size classes; at least the smallest
+/// positive normal number, and 1 if there are no balls.
 fn median_radius(balls: &[VertexBall]) -> f32 {
     let step = balls.len() / MEDIAN_SAMPLE + 1;
     let middle = median(balls.iter().step_by(step).map(|ball| ball.radius)).unwrap_or(1.0);
