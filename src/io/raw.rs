@@ -80,8 +80,8 @@ pub(super) fn payload(name: FieldName, bytes: &[u8], needed: usize) -> Result<&[
     Ok(payload)
 }
 
-/// Decodes the voxels in `bytes`, whose length is a multiple of the size of a number. 64-bit integers become `f64`.
-/// `big` means big-endian.
+/// Decodes the voxels in `bytes`, whose length is a multiple of the size of a number. 64-bit integers become 32-bit ones
+/// if all of them fit, so that they may be labels, else `f64`. `big` means big-endian.
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
@@ -114,15 +114,26 @@ pub(super) fn decode(
         }
         Scalar::U64 => {
             let read = if big { u64::from_be_bytes } else { u64::from_le_bytes };
+            if all(bytes, |b| u32::try_from(read(b)).is_ok()) {
+                return Ok(Voxels::U32(numbers(name, bytes, |b| read(b) as u32)?));
+            }
             check_exact(name, bytes, read)?;
             Voxels::F64(numbers(name, bytes, |b| read(b) as f64)?)
         }
         Scalar::I64 => {
             let read = if big { i64::from_be_bytes } else { i64::from_le_bytes };
+            if all(bytes, |b| i32::try_from(read(b)).is_ok()) {
+                return Ok(Voxels::I32(numbers(name, bytes, |b| read(b) as i32)?));
+            }
             check_exact(name, bytes, |b| read(b).unsigned_abs())?;
             Voxels::F64(numbers(name, bytes, |b| read(b) as f64)?)
         }
     })
+}
+
+/// Returns whether all 64-bit numbers in `bytes` fit.
+fn all(bytes: &[u8], fits: impl Fn([u8; 8]) -> bool) -> bool {
+    bytes.as_chunks().0.iter().all(|&b| fits(b))
 }
 
 /// Decodes all numbers in `bytes`, each of `N` bytes, with `read`.
@@ -247,5 +258,32 @@ pub(super) fn volume_error(format: &'static str, error: VolumeError) -> FormatEr
             FormatError::invalid(format, parameter, problem)
         }
         VolumeError::TooLarge { bytes } => FormatError::too_large(format, "voxels", bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    const NAME: FieldName = FieldName { format: "test", field: "data" };
+
+    #[test]
+    fn integers_of_64_bits_become_shorter_ones_if_all_fit() {
+        let decoded = |values: [i64; 2], scalar, big| {
+            let bytes = values.map(|value| if big { value.to_be_bytes() } else { value.to_le_bytes() });
+            decode(NAME, bytes.as_flattened(), scalar, big)
+        };
+        let (least, most) = (i64::from(i32::MIN), i64::from(u32::MAX));
+        for big in [false, true] {
+            let signed = |values| decoded(values, Scalar::I64, big).unwrap();
+            let unsigned = |values| decoded(values, Scalar::U64, big).unwrap();
+            assert_eq!(signed([least, 7]), Voxels::I32(vec![i32::MIN, 7]));
+            assert_eq!(signed([least - 1, 7]), Voxels::F64(vec![-2_147_483_649.0, 7.0]));
+            assert_eq!(unsigned([most, 7]), Voxels::U32(vec![u32::MAX, 7]));
+            assert_eq!(unsigned([most + 1, 7]), Voxels::F64(vec![4_294_967_296.0, 7.0]));
+            assert!(decoded([(1 << 53) + 1, 0], Scalar::I64, big).is_err());
+        }
     }
 }

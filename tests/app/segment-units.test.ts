@@ -1,6 +1,7 @@
 /** Parts of the Segment lab that need no browser. */
 import { describe, expect, test } from 'vitest';
 import { randomNumbers } from '../../bench/random.mjs';
+import { SegmentEditing } from '../../www/src/labs/segment-editing';
 import { fromHash, INITIAL_VIEW, linkOf, toHash } from '../../www/src/labs/segment-link';
 import { UndoStack } from '../../www/src/labs/undo';
 import { flood, floodBox, sweep } from '../../www/src/segment/brush';
@@ -10,6 +11,7 @@ import { labelHead, labelTooth } from '../../www/src/segment/labelling';
 import { freeValue, newLabel, rgbOf } from '../../www/src/segment/labels';
 import type { LabelArray, Vec3 } from '../../www/src/segment/protocol';
 import { boxOf, grown, union } from '../../www/src/segment/region';
+import type { ToolSettings } from '../../www/src/ui/segment-tools';
 
 const DIMS: Vec3 = [9, 7, 5];
 const COUNT = DIMS[0] * DIMS[1] * DIMS[2];
@@ -224,4 +226,58 @@ test('links contain what differs from the defaults, and are parsed again', () =>
     '#segment',
   );
   expect(fromHash('#track?example=x')).toBeUndefined();
+});
+
+describe('fill', () => {
+  const settings: ToolSettings = {
+    ...{ tool: 'fill', radius: 0, shape: 'ball', range: [1, 2], extent: 'box', reach: 50, inRange: true, protect: false },
+  };
+
+  /** Editing of a map of which the voxels with x = 0 have the label 3; `said` are the reasons of fills that reached nothing. */
+  function opened() {
+    const said: string[] = [];
+    const nothing = () => undefined;
+    const lab = { onLabels: nothing, onVoxels: nothing, onUpdate: nothing, onBusy: nothing, onUndo: nothing };
+    const client = { request: async () => ({ surfaces: [], milliseconds: 0, done: true }) };
+    const editing = new SegmentEditing(client as never, {
+      ...{ ...lab, onNothing: (reason) => said.push(reason) },
+      onError: (_, error) => {
+        throw error;
+      },
+    });
+    const voxels = Uint8Array.from({ length: COUNT }, (_, index) => (placeOf(index)[0] === 0 ? 3 : 0));
+    const map = { map: 1, voxels, surfaces: [], known: [], labelFile: undefined, milliseconds: 0 };
+    editing.adopt({ dims: DIMS, spacing: [1, 1, 1] }, map, ['One']);
+    const filled = () => [...voxels].filter((label) => label === 1).length;
+    return { editing, filled, said };
+  }
+
+  test('waits until it is known which voxels are in the range of intensities', () => {
+    const { editing, filled, said } = opened();
+    editing.apply([4, 3, 2], 2, settings);
+    editing.apply([8, 3, 2], 2, settings);
+    expect(filled()).toBe(0);
+    editing.mask = Uint8Array.from({ length: COUNT }, (_, index) => Number(placeOf(index)[0] % 4 === 0));
+    expect(filled()).toBe(2 * DIMS[1] * DIMS[2]);
+    // Fills that another range or another map makes pointless are not made.
+    editing.mask = undefined;
+    editing.apply([0, 3, 2], 2, settings);
+    editing.mask = undefined;
+    editing.mask = new Uint8Array(COUNT).fill(1);
+    expect(filled()).toBe(2 * DIMS[1] * DIMS[2]);
+    expect(said).toEqual([]);
+  });
+
+  test('keeps other labels if told to, and says so', () => {
+    for (const extent of ['slice', 'box'] as const) {
+      const { editing, filled, said } = opened();
+      const kept: ToolSettings = { ...settings, extent, inRange: false, protect: true };
+      editing.apply([0, 3, 2], 2, kept);
+      expect([filled(), said.length]).toEqual([0, 1]);
+      editing.apply([4, 3, 2], 2, kept);
+      expect([filled(), said.length]).toEqual([(DIMS[0] - 1) * DIMS[1] * (extent === 'slice' ? 1 : DIMS[2]), 1]);
+      editing.apply([0, 3, 2], 2, { ...kept, protect: false });
+      expect(filled()).toBeGreaterThan((DIMS[0] - 1) * DIMS[1] * (extent === 'slice' ? 1 : DIMS[2]));
+    }
+  });
 });

@@ -166,13 +166,6 @@ struct Vertex {
     triangles: SmallVec<[u32; 8]>,
 }
 
-/// A triangle of a label's surface.
-struct Triangle {
-    piece: Piece,
-    bounds: Bounds,
-    is_removed: bool,
-}
-
 /// The merge of one cell into another, in the order of costs.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
@@ -190,7 +183,9 @@ struct Tile<'a> {
     area: CellBox,
     nodes: Vec<Node>,
     vertices: Vec<Vertex>,
-    triangles: Vec<Triangle>,
+    triangles: Vec<Piece>,
+    /// Box of each triangle; empty if it has been removed.
+    bounds: Vec<Bounds>,
     queue: BinaryHeap<Reverse<Candidate>>,
 }
 
@@ -204,8 +199,8 @@ impl<'a> Tile<'a> {
         targets: Option<&[u32]>,
         index: &mut [u32],
     ) -> Self {
-        let (nodes, vertices, triangles, queue) = Default::default();
-        let mut tile = Self { nets, area, nodes, vertices, triangles, queue };
+        let (nodes, vertices, triangles, bounds, queue) = Default::default();
+        let mut tile = Self { nets, area, nodes, vertices, triangles, bounds, queue };
         let mut others = BTreeMap::new();
         for slot in nets.cells.within(around) {
             for crossing in nets.crossings(slot) {
@@ -327,16 +322,13 @@ impl<'a> Tile<'a> {
                 node.may_merge &= may_change;
             }
         }
-        self.triangles.push(self.triangle(corners));
+        let piece = self.piece(corners);
+        self.bounds.push(Bounds::from_points(&piece.points));
+        self.triangles.push(piece);
     }
 
-    fn triangle(&self, corners: [u32; 3]) -> Triangle {
-        let points = corners.map(|corner| self.vertices[corner as usize].position);
-        Triangle {
-            piece: Piece::new(corners, points),
-            bounds: Bounds::from_points(&points),
-            is_removed: false,
-        }
+    fn piece(&self, corners: [u32; 3]) -> Piece {
+        Piece::new(corners, corners.map(|corner| self.vertices[corner as usize].position))
     }
 
     /// Merges cells in the order of their costs, as far as edges are shorter than `edge`.
@@ -375,7 +367,7 @@ impl<'a> Tile<'a> {
         let mut found = Vec::new();
         for &vertex in &self.nodes[node as usize].vertices {
             let around = self.vertices[vertex as usize].triangles.iter();
-            let corners = around.flat_map(|&triangle| self.triangles[triangle as usize].piece.corners);
+            let corners = around.flat_map(|&triangle| self.triangles[triangle as usize].corners);
             found.extend(corners.map(|corner| self.vertices[corner as usize].node));
         }
         found.retain(|&other| other != node && other != NONE);
@@ -392,7 +384,7 @@ impl<'a> Tile<'a> {
             return;
         }
         let around = pair[0].vertices.iter().flat_map(|&vertex| &self.vertices[vertex as usize].triangles);
-        let heights = around.map(|&triangle| self.triangles[triangle as usize].piece.normal.dot(step));
+        let heights = around.map(|&triangle| self.triangles[triangle as usize].normal.dot(step));
         let height = heights.fold(0.0, |most: f32, height| most.max(height.abs()));
         let cost = (squared + FLATNESS * height * height).to_bits();
         let stamp = pair[0].stamp + pair[1].stamp;
@@ -406,8 +398,9 @@ impl<'a> Tile<'a> {
         if pairs.iter().any(|pair| self.passes_voxel_centre(pair)) || self.intersects(&fresh, &pairs) {
             return false;
         }
-        for (triangle, replacement) in fresh {
-            self.triangles[triangle as usize] = replacement;
+        for (triangle, piece) in fresh {
+            self.bounds[triangle as usize] = Bounds::from_points(&piece.points);
+            self.triangles[triangle as usize] = piece;
         }
         pairs.iter().for_each(|&[removed, kept]| self.collapse(removed, kept));
         self.nodes[from as usize].target = to;
@@ -447,7 +440,7 @@ impl<'a> Tile<'a> {
     fn ring(&self, vertex: u32) -> SmallVec<[u32; 16]> {
         let mut ring = SmallVec::new();
         for &triangle in &self.vertices[vertex as usize].triangles {
-            for corner in self.triangles[triangle as usize].piece.corners {
+            for corner in self.triangles[triangle as usize].corners {
                 if corner != vertex && !ring.contains(&corner) {
                     ring.push(corner);
                 }
@@ -457,21 +450,20 @@ impl<'a> Tile<'a> {
     }
 
     /// Returns the triangles that change, and what each becomes; `None` if one would be folded, or too long.
-    fn replacements(&self, pairs: &[[u32; 2]], longest: f32) -> Option<Vec<(u32, Triangle)>> {
+    fn replacements(&self, pairs: &[[u32; 2]], longest: f32) -> Option<Vec<(u32, Piece)>> {
         let mut fresh = Vec::new();
         for &[removed, kept] in pairs {
             for &index in &self.vertices[removed as usize].triangles {
-                let old = &self.triangles[index as usize].piece;
+                let old = &self.triangles[index as usize];
                 if old.corners.contains(&kept) {
                     continue;
                 }
-                let new = self.triangle(old.corners.map(|v| if v == removed { kept } else { v }));
-                let [a, b, c] = new.piece.points;
-                let squared = [a, b, c].map(|p| p.distance_squared(self.vertices[kept as usize].position));
-                let is_long = squared.iter().any(|&squared| squared > longest * longest);
-                if is_long
-                    || new.piece.normal.dot(old.normal) < LEAST_COSINE
-                    || collinear(self.facet(&new.piece).points)
+                let new = self.piece(old.corners.map(|v| if v == removed { kept } else { v }));
+                let centre = self.vertices[kept as usize].position;
+                let is_long = |p: &Vec3| p.distance_squared(centre) > longest * longest;
+                if new.points.iter().any(is_long)
+                    || new.normal.dot(old.normal) < LEAST_COSINE
+                    || collinear(self.facet(&new).points)
                 {
                     return None;
                 }
@@ -486,32 +478,31 @@ impl<'a> Tile<'a> {
     fn passes_voxel_centre(&self, &[removed, kept]: &[u32; 2]) -> bool {
         let position = |vertex: u32| self.vertices[vertex as usize].position;
         self.vertices[removed as usize].triangles.iter().any(|&triangle| {
-            let corners = self.triangles[triangle as usize].piece.corners;
+            let corners = self.triangles[triangle as usize].corners;
             let [a, b, c] = corners.map(position);
             !corners.contains(&kept) && contains_voxel_centre([a, b, c, position(kept)])
         })
     }
 
     /// Returns whether new triangles intersect each other, or any that stays.
-    fn intersects(&self, fresh: &[(u32, Triangle)], pairs: &[[u32; 2]]) -> bool {
-        let meet = |s: &Triangle, t: &Triangle| {
-            s.bounds.overlaps(&t.bounds)
-                && !surely_apart(&s.piece, &t.piece)
-                && facets_intersect(&self.facet(&s.piece), &self.facet(&t.piece))
+    fn intersects(&self, fresh: &[(u32, Piece)], pairs: &[[u32; 2]]) -> bool {
+        let meet = |s: &Piece, t: &Piece| {
+            !surely_apart(s, t) && facets_intersect(&self.facet(s), &self.facet(t))
         };
-        let each_other = fresh
-            .iter()
-            .enumerate()
-            .any(|(i, (_, s))| fresh[..i].iter().any(|(_, t)| meet(s, t)));
-        let around = fresh.iter().fold(Bounds::EMPTY, |all, (_, triangle)| all.union(&triangle.bounds));
-        let stays = |triangle: &&Triangle| {
-            let corners = triangle.piece.corners;
-            !triangle.is_removed
-                && triangle.bounds.overlaps(&around)
-                && !pairs.iter().any(|[removed, _]| corners.contains(removed))
+        let boxes: Vec<Bounds> = fresh.iter().map(|(_, piece)| Bounds::from_points(&piece.points)).collect();
+        let around = boxes.iter().fold(Bounds::EMPTY, |all, one| all.union(one));
+        let near = |bounds: &Bounds| {
+            let near = fresh.iter().zip(&boxes).filter(|(_, other)| other.overlaps(bounds));
+            near.map(|((_, piece), _)| piece).collect::<SmallVec<[&Piece; 8]>>()
         };
-        each_other
-            || self.triangles.iter().filter(stays).any(|other| fresh.iter().any(|(_, s)| meet(s, other)))
+        let stays = |piece: &Piece| !pairs.iter().any(|[removed, _]| piece.corners.contains(removed));
+        let with_others = self.bounds.iter().zip(&self.triangles).any(|(bounds, other)| {
+            bounds.overlaps(&around)
+                && stays(other)
+                && near(bounds).into_iter().any(|piece| meet(piece, other))
+        });
+        with_others
+            || fresh.iter().enumerate().any(|(i, (_, s))| fresh[..i].iter().any(|(_, t)| meet(s, t)))
     }
 
     fn facet(&self, piece: &Piece) -> Facet {
@@ -522,13 +513,13 @@ impl<'a> Tile<'a> {
     /// Hands the triangles of a removed vertex over to the kept one; both share two, which vanish.
     fn collapse(&mut self, removed: u32, kept: u32) {
         for triangle in std::mem::take(&mut self.vertices[removed as usize].triangles) {
-            let found = &mut self.triangles[triangle as usize];
-            if !found.piece.corners.contains(&removed) {
+            let corners = self.triangles[triangle as usize].corners;
+            if !corners.contains(&removed) {
                 self.vertices[kept as usize].triangles.push(triangle);
                 continue;
             }
-            found.is_removed = true;
-            for corner in found.piece.corners {
+            self.bounds[triangle as usize] = Bounds::EMPTY;
+            for corner in corners {
                 self.vertices[corner as usize].triangles.retain(|&mut other| other != triangle);
             }
         }

@@ -92,7 +92,8 @@ impl LabelGrid {
     /// Returns the same label map with other numbers, which stand for `values` from 1 on; `None` if these are not
     /// different, or a label with voxels is not among them.
     pub fn renumbered(&self, values: &[f64]) -> Option<Self> {
-        let by_rank: BTreeMap<u64, u16> = values.iter().map(|&value| rank_f64(value)).zip(1..).collect();
+        let ranks = values.iter().map(|&value| rank_f64(value));
+        let by_rank: BTreeMap<u64, u16> = ranks.zip(1..=u16::MAX).collect();
         if values.len() > MOST_LABELS || by_rank.len() < values.len() {
             return None;
         }

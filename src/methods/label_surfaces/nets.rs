@@ -124,8 +124,8 @@ impl Nets {
             }
         }
         let Self { cells, of_labels, .. } = self;
-        for (slots, number) in
-            of_labels.iter_mut().zip(1..).filter(|&(_, number)| changed[usize::from(number)])
+        for (number, slots) in
+            (1..=u16::MAX).zip(of_labels).filter(|&(number, _)| changed[usize::from(number)])
         {
             slots.retain(|&slot| cells.get(slot).corners.contains(&number));
             sort_distinct(slots);

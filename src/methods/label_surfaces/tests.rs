@@ -1,6 +1,7 @@
 use super::*;
 use crate::math::{DAffine3, DVec3, Random, Vec3};
 use crate::mesh::{measure, report};
+use crate::spatial::TriangleTree;
 use crate::volume::{VolumeInit, Voxels, voxels_inside};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -255,6 +256,18 @@ fn versions_increase_only_for_surfaces_that_change() {
     assert_eq!((surfaces.versions(), versions(&surfaces)), before);
 }
 
+/// Asserts that the surfaces are coarsened as they would be from the beginning.
+fn assert_coarse_anew(surfaces: &LabelSurfaces, what: &str) {
+    let mut anew = surfaces.nets.clone();
+    anew.coarse = super::coarsen::Coarsening::default();
+    anew.coarsen(surfaces.params.edge, &anew.everywhere(), &mut anew.no_labels());
+    let slots = surfaces.nets.cells.within(&anew.everywhere());
+    let target = |nets: &Nets, slot: u32| nets.cells.get(nets.coarse.target(slot)).at;
+    for slot in slots {
+        assert_eq!(target(&surfaces.nets, slot), target(&anew, slot), "{what}, slot {slot}");
+    }
+}
+
 /// Paints strokes, and compares the surfaces after each with those of the label map as it is then.
 fn fuzz_strokes(seed: u64, strokes: usize) {
     let mut random = Random::new(seed);
@@ -262,13 +275,15 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
     let labels = 1 + random.below(5);
     let mut volume = noise(dims, if random.below(2) == 0 { 0 } else { labels }, seed);
     let mut brush = Brush { random, labels };
-    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    let params = LabelParams { edge: [1.0, 1.5, 2.0, 4.0][seed as usize % 4], ..LabelParams::default() };
+    let mut surfaces = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
     let mut copies = Copies::of(&surfaces);
     for stroke in 0..strokes {
         let what = format!("seed {seed}, stroke {stroke}");
         let region = brush.paint(&mut volume);
         surfaces.refresh(&volume, region).unwrap();
         check(&surfaces, &what);
+        assert_coarse_anew(&surfaces, &what);
         copies.update(&surfaces, &what);
         // Some strokes follow before the surfaces are settled.
         if brush.random.below(3) > 0 {
@@ -276,7 +291,7 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
             check(&surfaces, &what);
             copies.update(&surfaces, &what);
         }
-        let anew = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+        let anew = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
         assert_eq!(
             (surfaces.labels(), surfaces.counts, surfaces.components),
             (anew.labels(), anew.counts, anew.components),
@@ -421,7 +436,12 @@ fn too_many_labels_are_refused_and_change_nothing() {
     let refused = LabelSurfaces::new(&many, None, LabelParams::default()).err().unwrap().to_string();
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     let some = (0..65_535).map(|i| f64::from(i + 1)).collect();
-    assert!(LabelGrid::new(&many, Some(some)).is_ok());
+    let mut most =
+        LabelSurfaces::new(&many, Some(some), LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
+    assert_eq!((most.labels().len(), most.components), (65_535, 65_535));
+    most.refresh(&many, Region { min: [0; 3], dims }).unwrap();
+    most.restore(&most.save()).unwrap();
+    assert_eq!(most.mesh(65_535.0).unwrap().components().len(), 1);
 
     let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
     let before = surfaces.save();
@@ -429,6 +449,90 @@ fn too_many_labels_are_refused_and_change_nothing() {
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     assert!(surfaces.save() == before);
     assert_eq!((surfaces.labels(), surfaces.nets.grid.number(9.0)), (vec![7.0], None));
+}
+
+/// Returns the mean edge length of a mesh.
+fn mean_edge(mesh: &TriangleMesh) -> f64 {
+    let sum: f64 = mesh.corners().map(|[a, b, c]| f64::from(a.distance(b) + b.distance(c) + c.distance(a))).sum();
+    sum / (3.0 * mesh.triangles.len() as f64)
+}
+
+/// Returns the largest distance to surfaces of other labels, of vertices and triangle centres that are where labels touch:
+/// a triangle is if its corners are near the surface of one other label.
+fn largest_gap(surfaces: &LabelSurfaces) -> f64 {
+    let all: Vec<_> = surfaces.labels().iter().map(|&label| surfaces.mesh(label).unwrap()).collect();
+    let trees: Vec<_> = all.iter().map(|mesh| TriangleTree::new(mesh).unwrap()).collect();
+    let distance = |tree: &TriangleTree, p: Vec3| tree.closest(p).map_or(f64::INFINITY, |found| found.distance);
+    let (mut largest, mut touching) = (0.0_f64, 0);
+    for (i, mesh) in all.iter().enumerate() {
+        for tree in trees.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, tree)| tree) {
+            for corners in mesh.corners() {
+                if corners.iter().all(|&p| distance(tree, p) < 0.03) {
+                    largest = largest.max(distance(tree, corners.iter().sum::<Vec3>() / 3.0));
+                    touching += 1;
+                }
+            }
+        }
+    }
+    assert!(touching > 100, "{touching}");
+    largest
+}
+
+#[test]
+fn longer_edges_keep_voxels_gaps_and_topology() {
+    let volume = balls(44, 4, 9);
+    let mut surfaces = settled(&volume);
+    let (fine, before) = (surfaces.surface(), surfaces.versions());
+    let mut triangles = fine.triangles.len();
+    for edge in [1.5, 2.0, 3.0] {
+        let what = format!("edge {edge}");
+        surfaces.set_params(LabelParams { edge, ..LabelParams::default() }).unwrap();
+        assert!(surfaces.step().unwrap().done, "nothing is smoothed again");
+        check(&surfaces, &what);
+        assert_voxels_are_inside(&surfaces, &volume);
+        let mesh = surfaces.surface();
+        let mean = mean_edge(&mesh);
+        assert!((0.8 * edge..1.1 * edge).contains(&mean), "{what}: {mean}");
+        assert!(f64::from(mesh.triangles.len() as u32) < 0.7 * f64::from(triangles as u32), "{what}");
+        triangles = mesh.triangles.len();
+        let gap = largest_gap(&surfaces);
+        assert!(gap < 0.05, "{what}: {gap}");
+        for label in volume.labels(0).unwrap().iter().filter(|label| label.voxels >= 500) {
+            let error = measure(&surfaces.mesh(label.value).unwrap()).volume / label.voxels as f64 - 1.0;
+            assert!(error.abs() < 0.01 * edge, "{what}, label {}: {error}", label.value);
+        }
+    }
+    assert!(surfaces.versions()[0] > before[0]);
+    surfaces.set_params(LabelParams::default()).unwrap();
+    assert!(surfaces.surface() == fine);
+}
+
+#[test]
+fn coarse_surfaces_follow_strokes_as_if_made_anew() {
+    let mut volume = balls(44, 4, 9);
+    let params = LabelParams { edge: 1.5, ..LabelParams::default() };
+    let mut surfaces = LabelSurfaces::new(&volume, None, params).unwrap();
+    settle(&mut surfaces);
+    let mut copies = Copies::of(&surfaces);
+    let mut random = Random::new(7);
+    for stroke in 0..6 {
+        let what = format!("stroke {stroke}");
+        let min = [0; 3].map(|_| 8 + random.below(22) as usize);
+        let region = Region { min, dims: [5, 6, 4] };
+        volume.write(region, &Voxels::U8(vec![random.below(10) as u8; 120]), 0).unwrap();
+        surfaces.refresh(&volume, region).unwrap();
+        for what in [format!("{what}, refreshed"), what] {
+            check(&surfaces, &what);
+            assert_coarse_anew(&surfaces, &what);
+            copies.update(&surfaces, &what);
+            settle(&mut surfaces);
+        }
+    }
+    assert_voxels_are_inside(&surfaces, &volume);
+    let state = surfaces.save();
+    let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    other.restore(&state).unwrap();
+    assert!(other.surface() == surfaces.surface());
 }
 
 #[test]

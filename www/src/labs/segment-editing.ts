@@ -32,8 +32,8 @@ export interface EditedLab {
   onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
-  /** Called when a fill has reached no voxel, since the one pressed is not in the range of intensities. */
-  onNothing: () => void;
+  /** Called when a fill has reached no voxel, with the reason. */
+  onNothing: (reason: string) => void;
   onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
   onError: (title: string, error: unknown) => void;
 }
@@ -59,8 +59,9 @@ export class SegmentEditing {
   #isFollowing = false;
   /** Number of the label map at the worker; replies about a previous one are discarded. */
   #id = 0;
-  /** Not 0 for the voxels that the threshold brush paints, as far as they are known. */
-  mask: Uint8Array | undefined;
+  #mask: Uint8Array | undefined;
+  /** Fills that have yet to be made, as it is not known yet which voxels are in their range of intensities. */
+  #pendingFills: (() => void)[] = [];
 
   constructor(client: SegmentClient, lab: EditedLab) {
     this.#client = client;
@@ -81,6 +82,18 @@ export class SegmentEditing {
 
   get voxels(): LabelArray | undefined {
     return this.#map?.voxels;
+  }
+
+  /** Not 0 for the voxels in the range of intensities, as far as they are known; fills that wait for it are then made. */
+  get mask(): Uint8Array | undefined {
+    return this.#mask;
+  }
+
+  set mask(mask: Uint8Array | undefined) {
+    const fills = this.#pendingFills;
+    this.#mask = mask;
+    this.#pendingFills = [];
+    if (mask) for (const fill of fills) fill();
   }
 
   /** Whether the worker has yet to follow changes. */
@@ -129,7 +142,7 @@ export class SegmentEditing {
     // Nobody wants to paint what cannot be seen.
     if (settings.tool !== 'eraser' && this.#hidden.has(this.#active)) this.setVisible(this.#active, true);
     if (settings.tool === 'fill') {
-      if (!this.#fill(at, axis, settings)) this.#lab.onNothing();
+      this.#fill(at, axis, settings);
       return { move: () => undefined, drop: () => undefined };
     }
     let last = at;
@@ -231,13 +244,20 @@ export class SegmentEditing {
     if (box && changed) this.#changed(box);
   }
 
-  /** Fills a region around a position in voxels; returns false if the voxel there is not in the range of intensities. */
-  #fill(at: Vec3, axis: Axis, settings: ToolSettings): boolean {
+  /** Fills a region around a position in voxels, when it is known which voxels are in the range of intensities. */
+  #fill(at: Vec3, axis: Axis, settings: ToolSettings): void {
     const map = this.#map;
-    const mask = usesRange(settings) ? this.mask : undefined;
-    // Until the worker has said which voxels are in the range, none is.
-    if (!map || (usesRange(settings) && !mask)) return true;
+    const mask = usesRange(settings) ? this.#mask : undefined;
+    if (!map) return;
+    if (usesRange(settings) && !mask) {
+      this.#pendingFills.push(() => this.#fill(at, axis, settings));
+      return;
+    }
     const seed = at.map((x, one) => Math.min((map.dims[one] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3;
+    if (settings.protect && map.at(seed) !== 0) {
+      this.#lab.onNothing(text('segment.fillKept'));
+      return;
+    }
     const visit = (index: number) => map.set(index, this.#active);
     const reachable = grown({ min: seed, dims: [1, 1, 1] }, settings.reach, map.dims);
     const box =
@@ -245,8 +265,8 @@ export class SegmentEditing {
         ? flood(map.voxels, map, axis, seed, visit)
         : floodBox(map.voxels, map, { box: reachable, ...(mask && { mask }) }, seed, visit);
     if (box) this.#changed(box);
+    else this.#lab.onNothing(text('segment.nothingFilled'));
     this.#endStroke(text('segment.fillStroke'));
-    return box !== undefined;
   }
 
   #endStroke(name: string): void {

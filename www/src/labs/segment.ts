@@ -77,10 +77,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
       onVoxels: () => ui.view.showLabels(),
       onUpdate: (update, smooth) => this.#take(update, smooth),
       onBusy: () => states.setModelState('running'),
-      onNothing: () => {
+      onNothing: (reason) => {
         this.#isUnfilled = true;
         this.#released = undefined;
-        ui.status.say(text('segment.nothingFilled'));
+        ui.status.say(reason);
       },
       onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
       onError: (title, error) => states.fail(title, error),

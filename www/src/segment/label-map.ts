@@ -37,6 +37,11 @@ export class LabelMap {
     this.voxels = voxels;
   }
 
+  /** Returns the label of a voxel of the grid. */
+  at([x, y, z]: Vec3): number | undefined {
+    return this.voxels[(z * this.dims[1] + y) * this.dims[0] + x];
+  }
+
   /** Sets the label of a voxel, as part of the present stroke; returns whether it has changed. */
   set(index: number, value: number): boolean {
     const before = this.voxels[index];
