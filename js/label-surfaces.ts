@@ -10,6 +10,13 @@ import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 export interface LabelParams {
   /** Number of smoothing iterations; 0 leaves the faces of the voxels. */
   smoothing?: number;
+  /**
+   * Edge length wanted of the triangles, in voxels, from 1, which leaves a vertex in each cell between voxels. With longer
+   * edges the surfaces of all labels lose the same vertices: the centre of each voxel stays on its side of every surface,
+   * so edges stay short where that needs them, and labels that touch stay as near each other. {@link LabelSurfaces.refresh}
+   * coarsens what has changed again.
+   */
+  edge?: number;
 }
 
 /** Constructor options of {@link LabelSurfaces}. */
@@ -23,7 +30,7 @@ export interface LabelOptions extends LabelParams {
   labels?: number[];
 }
 
-const OPTIONS = ['volume', 'labels', 'smoothing'];
+const OPTIONS = ['volume', 'labels', 'smoothing', 'edge'];
 
 /**
  * Surfaces of a label map: one closed surface for each label, none of which intersects itself or another, and which
@@ -49,12 +56,12 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
    *   does not have, too many labels; `too-large`.
    */
   constructor(given: LabelOptions) {
-    const { volume, labels, smoothing } = checkProperties('options', given, OPTIONS) as LabelOptions;
+    const { volume, labels, ...params } = checkProperties('options', given, OPTIONS) as LabelOptions;
     const image = volumeHandle('volume', volume);
     const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
     this.#volume = volume;
     this.#handle = new Handle('LabelSurfaces', () =>
-      image.use((raw) => new RawLabelSurfaces(raw, wanted, smoothing === undefined ? {} : { smoothing })),
+      image.use((raw) => new RawLabelSurfaces(raw, wanted, params)),
     );
   }
 
@@ -129,7 +136,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   }
 
   /**
-   * Changes any subset of the parameters; all surfaces are smoothed again, from where they are.
+   * Changes any subset of the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out of
    *   range. Nothing has changed then.

@@ -7,6 +7,7 @@
  */
 import { invalid } from '../check.js';
 import type { VolumeInit, VoxelArray } from '../data.js';
+import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { affineOf, MeshReader, polygons, voxels } from './source.js';
@@ -66,11 +67,9 @@ export interface CornerstoneGeometry {
 }
 
 /** Options of {@link CornerstoneSurfaces}. */
-export interface CornerstoneSurfacesOptions {
+export interface CornerstoneSurfacesOptions extends LabelParams {
   /** Segments that get a surface; all others count as background. Default all, including those that are added later. */
   segments?: number[];
-  /** Number of smoothing iterations, as in `LabelSurfaces`. */
-  smoothing?: number;
 }
 
 /**
@@ -94,11 +93,11 @@ export class CornerstoneSurfaces {
    *   segments that it does not have; `too-large`.
    */
   constructor(classes: LabelClasses, volume: CornerstoneVolume, options: CornerstoneSurfacesOptions = {}) {
-    const { segments, smoothing } = options;
+    const { segments, ...params } = options;
     this.#volume = volume;
     this.#map = new LabelMap(classes, volumeFromCornerstone(volume), {
       ...(segments && { labels: segments }),
-      ...(smoothing !== undefined && { smoothing }),
+      ...params,
     });
     this.#map.settle();
     this.#read();

@@ -1,7 +1,7 @@
 // Shared by the adapters: surfaces of a host's label map, which follow the voxels that the host changes.
 import { invalid } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
-import type { LabelSurfaces } from '../label-surfaces.js';
+import type { LabelOptions, LabelSurfaces } from '../label-surfaces.js';
 import type { StepReport } from '../stepper.js';
 import type { Volume } from '../volume.js';
 
@@ -39,7 +39,7 @@ export class LabelMap {
   #report: StepReport | undefined;
 
   /** Copies the voxels of `init`. Throws what `Volume` and `LabelSurfaces` throw. */
-  constructor(classes: LabelClasses, init: VolumeInit, options: { labels?: number[]; smoothing?: number } = {}) {
+  constructor(classes: LabelClasses, init: VolumeInit, options: Omit<LabelOptions, 'volume'> = {}) {
     checkClasses(classes);
     this.#volume = new classes.Volume(init);
     try {

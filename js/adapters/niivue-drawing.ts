@@ -1,17 +1,16 @@
 // Follows the drawing layer of NiiVue: a surface for each pen value.
 import { invalid } from '../check.js';
 import type { Vec3, VolumeInit } from '../data.js';
+import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { type Niivue, NiivueSurface, type NVMeshClass } from './niivue-surface.js';
 import { affineOf } from './source.js';
 
 /** Options of {@link followDrawing}. */
-export interface DrawingOptions extends LabelClasses {
+export interface DrawingOptions extends LabelClasses, LabelParams {
   /** The class `NVMesh` of NiiVue; required by NiiVue 0.69, not used by 1.0. */
   NVMesh?: NVMeshClass;
-  /** Number of smoothing iterations, as in `LabelSurfaces`. */
-  smoothing?: number;
   /** Width of the outlines in slices, as in {@link NiivueSurface}. */
   outline?: number;
   /** Called each time that the surfaces have changed, with the pen values that have one. */
@@ -150,8 +149,9 @@ class DrawingFollower implements FollowedDrawing {
       return this.#map.labels;
     }
     await this.#clear();
-    const { smoothing } = this.#options;
-    const labels = new LabelMap(this.#options, init, smoothing === undefined ? {} : { smoothing });
+    const { smoothing, edge } = this.#options;
+    const params = { ...(smoothing !== undefined && { smoothing }), ...(edge !== undefined && { edge }) };
+    const labels = new LabelMap(this.#options, init, params);
     this.#map = { labels, grid };
     return labels;
   }

@@ -1,6 +1,7 @@
 // Label maps of vtk.js: their surfaces, which follow them, and new ones from volumes.
 import { choice, invalid } from '../check.js';
 import type { Space, VoxelArray } from '../data.js';
+import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
 import type { Volume } from '../volume.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
@@ -8,11 +9,9 @@ import { type VtkImage, volumeFromVtk } from './vtk-image.js';
 import { type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
 
 /** Options of {@link VtkLabelSurfaces}. */
-export interface VtkLabelSurfacesOptions {
+export interface VtkLabelSurfacesOptions extends LabelParams {
   /** Labels that get a surface; all others count as background. Default all, including those that are added later. */
   labels?: number[];
-  /** Number of smoothing iterations, as in `LabelSurfaces`. */
-  smoothing?: number;
 }
 
 /**

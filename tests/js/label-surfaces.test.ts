@@ -94,7 +94,7 @@ test('a saved state continues with the same bits', () => {
   surfaces.step();
   using other = new LabelSurfaces({ volume, labels: [1, 300] });
   other.restore(surfaces.save());
-  expect(other.params).toEqual({ smoothing: 45 });
+  expect(other.params).toEqual({ smoothing: 45, edge: 1 });
   for (const each of [surfaces, other]) each.step(9);
   for (const label of [1, 300]) expect(other.mesh(label).arrays()).toEqual(surfaces.mesh(label).arrays());
   expect(failure(() => other.restore(surfaces.save().slice(1))).code).toBe('bad-file');
@@ -118,6 +118,8 @@ test('bad input is named, and nothing changes', () => {
     [() => surfaces.refresh({ min: [0, 0, 0.5], dims: [1, 1, 1] }), 'region.min'],
     [() => surfaces.refresh({ min: [0, 0, 0] } as never), 'region.dims'],
     [() => surfaces.setParams({ smoothing: 1000 }), 'smoothing'],
+    [() => surfaces.setParams({ edge: 0.5 }), 'edge'],
+    [() => new LabelSurfaces({ volume, edge: '2' as never }), 'edge'],
     [() => surfaces.step(0), 'iterations'],
   ];
   for (const [work, name] of bad) {
@@ -129,6 +131,36 @@ test('bad input is named, and nothing changes', () => {
   expect(failure(() => surfaces.refresh({ min: [0, 0, 0], dims: [1, 1, 1] })).code).toBe('freed');
 });
 
-test('its parameter is described', () => {
-  expect(paramSpecs('labels').map(({ name, default: value }) => [name, value])).toEqual([['smoothing', 20]]);
+test('its parameters are described', () => {
+  expect(paramSpecs('labels').map(({ name, default: value }) => [name, value])).toEqual([
+    ['smoothing', 20],
+    ['edge', 1],
+  ]);
+});
+
+test('longer edges give fewer triangles, and the same voxels, also after a change', () => {
+  const [side, radius] = [24, 9];
+  const volume = ball(side, radius);
+  const voxels = volume.intensities();
+  const labels = Uint8Array.from(voxels, (value, i) => (value > 0 ? 1 + Number(i % side < side / 2) : 0));
+  const map = new Volume({ data: labels, dims: [side, side, side] });
+  using fine = new LabelSurfaces({ volume: map });
+  using coarse = new LabelSurfaces({ volume: map, edge: 2 });
+  const region = { min: [9, 9, 9] as Vec3, dims: [4, 4, 4] as Vec3 };
+  for (const data of [undefined, new Uint8Array(64)]) {
+    if (data) map.write({ ...region, data });
+    for (const surfaces of [fine, coarse]) {
+      if (data) surfaces.refresh(region);
+      surfaces.step(10);
+    }
+    for (const { value, voxels } of map.labels()) {
+      const [mesh, other] = [coarse.mesh(value), fine.mesh(value)];
+      expect(mesh.triangleCount).toBeLessThan(0.5 * other.triangleCount);
+      expect(mesh.check()).toMatchObject({ closed: true, selfIntersections: 0 });
+      const mask = mesh.toVolume(map, { kind: 'mask' });
+      expect([mask.dice(map.label(value), { label: 1 }), mask.labels()]).toEqual([1, [{ value: 1, voxels }]]);
+    }
+  }
+  coarse.setParams({ edge: 1 });
+  expect(coarse.mesh(1).arrays()).toEqual(fine.mesh(1).arrays());
 });

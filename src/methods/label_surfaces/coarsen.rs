@@ -60,6 +60,12 @@ impl Coarsening {
         self.targets.get(slot as usize).copied().unwrap_or(slot)
     }
 
+    /// Returns the vertex that remains where `vertex` was. Cells are merged only into those with one vertex of each label.
+    #[inline]
+    pub fn follow(&self, vertex: NetVertex) -> NetVertex {
+        follow(&self.targets, vertex)
+    }
+
     /// Returns the number of vertices that the label that `number` stands for has lost; each took two triangles with it.
     pub fn merged(&self, number: u16) -> usize {
         self.merged.get(usize::from(number) - 1).copied().unwrap_or(0)
@@ -91,7 +97,7 @@ impl Coarsening {
                     }
                     // Triangles reach from one tile of the first pass to the next only as far as they are not changed.
                     let around = area.grown(if pass == 0 { 1 } else { side / 2 }, nets.grid.dims());
-                    let targets = (pass > 0).then_some(&self.passes[0][..]);
+                    let targets = if pass == 0 { &[] } else { &self.passes[0][..] };
                     let mut tile = Tile::new(nets, area, &around, targets, &mut index);
                     tile.run(edge as f32);
                     for node in tile.nodes.iter().filter(|node| node.target != NONE) {
@@ -136,6 +142,17 @@ impl Nets {
         }
         coarse.finish(self, reconnected);
         self.coarse = coarse;
+    }
+}
+
+/// Returns the vertex in whose place `vertex` is after merges of cells, of which `targets` are the results, by slot.
+fn follow(targets: &[u32], vertex: NetVertex) -> NetVertex {
+    match vertex {
+        NetVertex::Cell { slot, .. } => match targets.get(slot as usize) {
+            Some(&target) if target != slot => NetVertex::Cell { slot: target, on: 0 },
+            _ => vertex,
+        },
+        _ => vertex,
     }
 }
 
@@ -196,7 +213,7 @@ impl<'a> Tile<'a> {
         nets: &'a Nets,
         area: CellBox,
         around: &CellBox,
-        targets: Option<&[u32]>,
+        targets: &[u32],
         index: &mut [u32],
     ) -> Self {
         let (nodes, vertices, triangles, bounds, queue) = Default::default();
@@ -215,7 +232,7 @@ impl<'a> Tile<'a> {
     fn add_polygons(
         &mut self,
         crossing: &Crossing,
-        targets: Option<&[u32]>,
+        targets: &[u32],
         index: &mut [u32],
         others: &mut BTreeMap<(u16, NetVertex), u32>,
     ) {
@@ -226,7 +243,7 @@ impl<'a> Tile<'a> {
                 continue;
             }
             for triangle in self.nets.patch(crossing, far).triangles() {
-                let corners = triangle.map(|vertex| follow(vertex, targets));
+                let corners = triangle.map(|vertex| follow(targets, vertex));
                 let [a, b, c] = corners;
                 if a == b || b == c || c == a || !self.may_reach(&corners) {
                     continue;
@@ -523,16 +540,6 @@ impl<'a> Tile<'a> {
                 self.vertices[corner as usize].triangles.retain(|&mut other| other != triangle);
             }
         }
-    }
-}
-
-/// Returns a vertex as the pass before has left it. Cells are merged only into those with one vertex of each label.
-fn follow(vertex: NetVertex, targets: Option<&[u32]>) -> NetVertex {
-    match (vertex, targets) {
-        (NetVertex::Cell { slot, .. }, Some(targets)) if targets[slot as usize] != slot => {
-            NetVertex::Cell { slot: targets[slot as usize], on: 0 }
-        }
-        (same, _) => same,
     }
 }
 

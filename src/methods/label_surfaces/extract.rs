@@ -62,16 +62,12 @@ impl<'a> Extraction<'a> {
             }
         }
         for &slot in slots {
-            // Merged cells have one vertex of each label, and so have those that they are merged into.
-            let target = nets.coarse.target(slot);
-            self.first[(slot - start) as usize] = self.first[(target - start) as usize];
-        }
-        for &slot in slots {
             for crossing in nets.crossings(slot) {
                 let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
                 let mut on_edge = None;
                 for triangle in nets.patch(&crossing, far == 1).triangles() {
-                    let mut corners = triangle.map(|vertex| self.index(number, vertex, &mut on_edge));
+                    let index = |vertex| self.index(number, nets.coarse.follow(vertex), &mut on_edge);
+                    let mut corners = triangle.map(index);
                     if reflected {
                         corners.swap(1, 2);
                     }
