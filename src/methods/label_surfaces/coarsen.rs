@@ -1,9 +1,10 @@
 //! Coarsening: surfaces with longer edges than those between the cells.
 //!
 //! Cells are merged: all vertices in a cell move to those of the same labels in a neighbouring one, which is a collapse
-//! of one edge in the surface of each label. Vertices that remain do not move, and two labels that touch keep the same
-//! triangles, so that the gap between them stays. A merge is rejected if it would change the topology of a surface,
-//! fold or intersect one (exactly, between labels, too), or bring a voxel centre to the other side of one.
+//! of one edge in the surface of each label. Two labels that touch keep the same triangles, so that the gap between them
+//! stays. What a merge takes from the volume of a label is given back by a shift of the vertices that remain, within
+//! their cell. A merge is rejected if it would change the topology of a surface, fold or intersect one (exactly, between
+//! labels, too), or bring a voxel centre to the other side of one.
 //!
 //! Cells are merged within tiles, of which none depends on another: a cell only if all triangles around it are in its
 //! tile. A second pass, whose tiles begin in the middle of those of the first, merges cells at the ends of these. So
@@ -14,6 +15,7 @@ use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
 use super::nets::{Crossing, NetVertex, Nets};
 use super::untangle::{Piece, surely_apart};
+use super::zone::{pair, within_reach};
 use crate::math::order::sort_distinct;
 use crate::math::predicates::collinear;
 use crate::math::{Bounds, DVec3, Vec3};
@@ -33,6 +35,9 @@ const LONGEST: f32 = 1.5;
 const FLATNESS: f32 = 20.0;
 /// The cosine of the largest angle by which a merge may turn a triangle.
 const LEAST_COSINE: f32 = 0.3;
+/// Least and largest displacement at once of vertices that gives back volume, in voxels.
+const LEAST_SHIFT: f32 = 0.003;
+const MOST_SHIFT: f32 = 0.25;
 /// Largest number of triangles around a vertex.
 const MOST_TRIANGLES: usize = 16;
 /// Number of times that all pairs of cells in a tile are tried: a merge may be possible after others.
@@ -42,13 +47,57 @@ const FLAT: f64 = 1e-4;
 /// Stands for a vertex that is not in a cell, or a cell that is not in the tile.
 const NONE: u32 = u32::MAX;
 
+/// What has become of each cell, by slot.
+#[derive(Clone, Debug, Default)]
+struct Merges {
+    /// Slot of the cell that it is merged into; its own if it remains.
+    targets: Vec<u32>,
+    /// Displacement of its vertices if it remains, in voxels.
+    shifts: Vec<Vec3>,
+}
+
+impl Merges {
+    #[inline]
+    fn target(&self, slot: u32) -> u32 {
+        self.targets.get(slot as usize).copied().unwrap_or(slot)
+    }
+
+    #[inline]
+    fn shift(&self, slot: u32) -> Vec3 {
+        self.shifts.get(slot as usize).copied().unwrap_or_default()
+    }
+
+    fn set(&mut self, slot: u32, target: u32, shift: Vec3) {
+        (self.targets[slot as usize], self.shifts[slot as usize]) = (target, shift);
+    }
+
+    /// Makes room for as many slots as there are; cells in new ones are not merged.
+    fn resize(&mut self, slots: usize) {
+        self.targets.extend(self.targets.len() as u32..slots as u32);
+        self.shifts.resize(slots, Vec3::ZERO);
+    }
+
+    /// Returns the vertex in whose place `vertex` is. Cells are merged only into those with one vertex of each label.
+    #[inline]
+    fn follow(&self, vertex: NetVertex) -> NetVertex {
+        match vertex {
+            NetVertex::Cell { slot, .. } if self.target(slot) != slot => {
+                NetVertex::Cell { slot: self.target(slot), on: 0 }
+            }
+            _ => vertex,
+        }
+    }
+}
+
 /// Which cells are merged.
 #[derive(Clone, Debug, Default)]
 pub struct Coarsening {
-    /// For each pass, the slot of the cell that the cell in each slot is merged into; its own if it remains.
-    passes: [Vec<u32>; 2],
+    /// What each pass has done.
+    passes: [Merges; 2],
     /// Both passes, one after the other.
-    targets: Vec<u32>,
+    result: Merges,
+    /// Box of the cells that have changed since their tiles were coarsened, in which none is merged at present.
+    pub pending: Option<CellBox>,
     /// Number of merged cells in which each label is; that of number 1 comes first.
     merged: Vec<usize>,
 }
@@ -57,13 +106,19 @@ impl Coarsening {
     /// Returns the slot of the cell that the one in a slot is merged into; its own if it remains.
     #[inline]
     pub fn target(&self, slot: u32) -> u32 {
-        self.targets.get(slot as usize).copied().unwrap_or(slot)
+        self.result.target(slot)
     }
 
-    /// Returns the vertex that remains where `vertex` was. Cells are merged only into those with one vertex of each label.
+    /// Returns the displacement of the vertices in a cell that remains, in voxels.
+    #[inline]
+    pub fn shift(&self, slot: u32) -> Vec3 {
+        self.result.shift(slot)
+    }
+
+    /// Returns the vertex that remains where `vertex` was.
     #[inline]
     pub fn follow(&self, vertex: NetVertex) -> NetVertex {
-        follow(&self.targets, vertex)
+        self.result.follow(vertex)
     }
 
     /// Returns the number of vertices that the label that `number` stands for has lost; each took two triangles with it.
@@ -71,15 +126,9 @@ impl Coarsening {
         self.merged.get(usize::from(number) - 1).copied().unwrap_or(0)
     }
 
-    /// Makes room for as many slots as there are; cells in new ones are not merged.
-    fn resize(&mut self, slots: usize) {
-        for pass in &mut self.passes {
-            pass.extend(pass.len() as u32..slots as u32);
-        }
-    }
-
-    /// Coarsens the tiles of a pass that overlap a box; returns the box of all of them.
-    fn run_pass(&mut self, pass: usize, nets: &Nets, edge: f64, area: &CellBox) -> CellBox {
+    /// Coarsens the tiles of a pass that overlap a box, or restores them if they are to be coarsened later; returns the box
+    /// of all of them.
+    fn run_pass(&mut self, pass: usize, nets: &Nets, edge: f64, area: &CellBox, later: bool) -> CellBox {
         let side = 2 * (TILE * edge / 2.0).ceil() as u32;
         let before = side / 2 * pass as u32;
         let mut index = vec![NONE; nets.cells.slots().len()];
@@ -93,15 +142,19 @@ impl Coarsening {
                 for x in first[0]..=last[0] {
                     let area = tile([x, y, z]);
                     for slot in nets.cells.within(&area) {
-                        self.passes[pass][slot as usize] = slot;
+                        self.passes[pass].set(slot, slot, Vec3::ZERO);
+                    }
+                    if later {
+                        continue;
                     }
                     // Triangles reach from one tile of the first pass to the next only as far as they are not changed.
                     let around = area.grown(if pass == 0 { 1 } else { side / 2 }, nets.grid.dims());
-                    let targets = if pass == 0 { &[] } else { &self.passes[0][..] };
-                    let mut tile = Tile::new(nets, area, &around, targets, &mut index);
+                    let before = if pass == 0 { &Merges::default() } else { &self.passes[0] };
+                    let mut tile = Tile::new(nets, area, &around, before, &mut index);
                     tile.run(edge as f32);
-                    for node in tile.nodes.iter().filter(|node| node.target != NONE) {
-                        self.passes[pass][node.slot as usize] = tile.remaining(node).slot;
+                    let nodes = std::mem::take(&mut tile.nodes);
+                    for node in nodes.iter().filter(|node| area.contains(node.at)) {
+                        self.passes[pass].set(node.slot, remaining(&nodes, node).slot, node.shift);
                     }
                 }
             }
@@ -113,14 +166,17 @@ impl Coarsening {
     fn finish(&mut self, nets: &Nets, reconnected: &mut [bool]) {
         self.merged.clear();
         self.merged.resize(nets.grid.values().len(), 0);
-        let before = std::mem::take(&mut self.targets);
-        for (slot, &target) in (0..).zip(&self.passes[0]) {
-            let target = self.passes[1][target as usize];
-            self.targets.push(target);
+        let before = std::mem::take(&mut self.result);
+        let [first, second] = &self.passes;
+        for slot in 0..first.targets.len() as u32 {
+            let target = second.target(first.target(slot));
+            let shift = first.shift(slot) + second.shift(slot);
+            self.result.targets.push(target);
+            self.result.shifts.push(shift);
             if target != slot {
                 nets.cells.get(slot).numbers().for_each(|number| self.merged[usize::from(number) - 1] += 1);
             }
-            if before.get(slot as usize).copied().unwrap_or(slot) != target {
+            if (before.target(slot), before.shift(slot)) != (target, shift) {
                 nets.flag_labels_in([slot], reconnected);
             }
         }
@@ -128,41 +184,40 @@ impl Coarsening {
 }
 
 impl Nets {
-    /// Coarsens the surfaces around a box of cells that have changed, to edges of about `edge` voxels. Sets the flag, by
-    /// number, of each label whose triangles have changed by that.
-    pub fn coarsen(&mut self, edge: f64, area: &CellBox, reconnected: &mut [bool]) {
+    /// Coarsens the surfaces around a box of cells that have changed, and where that was put off before, to edges of about
+    /// `edge` voxels; or puts that off until `later`, with no cells merged there. Sets the flag, by number, of each label
+    /// whose triangles have changed by that.
+    pub fn coarsen(&mut self, edge: f64, area: &CellBox, later: bool, reconnected: &mut [bool]) {
         let mut coarse = std::mem::take(&mut self.coarse);
         if edge > 1.0 {
-            coarse.resize(self.cells.slots().len());
-            let first = coarse.run_pass(0, self, edge, &area.grown(1, self.grid.dims()));
-            coarse.run_pass(1, self, edge, &first);
+            let area = coarse.pending.map_or(*area, |pending| pending.union(area));
+            coarse.pending = later.then_some(area);
+            coarse.passes.iter_mut().for_each(|pass| pass.resize(self.cells.slots().len()));
+            let first = coarse.run_pass(0, self, edge, &area.grown(1, self.grid.dims()), later);
+            coarse.run_pass(1, self, edge, &first, later);
+            coarse.finish(self, reconnected);
+            self.coarse = coarse;
         } else {
             coarse.passes = Default::default();
-            coarse.resize(coarse.targets.len());
+            coarse.passes[0].resize(coarse.result.targets.len());
+            coarse.finish(self, reconnected);
         }
-        coarse.finish(self, reconnected);
-        self.coarse = coarse;
-    }
-}
-
-/// Returns the vertex in whose place `vertex` is after merges of cells, of which `targets` are the results, by slot.
-fn follow(targets: &[u32], vertex: NetVertex) -> NetVertex {
-    match vertex {
-        NetVertex::Cell { slot, .. } => match targets.get(slot as usize) {
-            Some(&target) if target != slot => NetVertex::Cell { slot: target, on: 0 },
-            _ => vertex,
-        },
-        _ => vertex,
     }
 }
 
 /// A cell of a tile.
 struct Node {
     slot: u32,
+    /// Index of the cell along x, y and z.
+    at: [u32; 3],
     /// Position of the cell's vertices but for the gap, relative to the tile.
     position: Vec3,
-    /// Whether the cell may be merged into another one.
+    /// Displacement in this pass.
+    shift: Vec3,
+    /// Whether the cell may be merged into another one, or its vertices may move.
     may_merge: bool,
+    /// Whether just two labels meet in the cell, one of which may be the background.
+    is_pair: bool,
     /// Its vertices, as indices into those of the tile.
     vertices: SmallVec<[u32; 4]>,
     /// The cell that it is merged into; [`NONE`] if it remains.
@@ -197,6 +252,8 @@ struct Candidate {
 /// The surfaces in a box of cells.
 struct Tile<'a> {
     nets: &'a Nets,
+    /// What was done before.
+    before: &'a Merges,
     area: CellBox,
     nodes: Vec<Node>,
     vertices: Vec<Vertex>,
@@ -207,21 +264,21 @@ struct Tile<'a> {
 }
 
 impl<'a> Tile<'a> {
-    /// Collects what is in and around the tile `area`, from the polygons that begin at the cells of `around`; `targets`
-    /// are the results of the pass before. `index` has [`NONE`] for each slot, and has so again afterwards.
+    /// Collects what is in and around the tile `area`, from the polygons that begin at the cells of `around`, after the
+    /// merges `before`. `index` has [`NONE`] for each slot, and has so again afterwards.
     fn new(
         nets: &'a Nets,
         area: CellBox,
         around: &CellBox,
-        targets: &[u32],
+        before: &'a Merges,
         index: &mut [u32],
     ) -> Self {
         let (nodes, vertices, triangles, bounds, queue) = Default::default();
-        let mut tile = Self { nets, area, nodes, vertices, triangles, bounds, queue };
+        let mut tile = Self { nets, before, area, nodes, vertices, triangles, bounds, queue };
         let mut others = BTreeMap::new();
         for slot in nets.cells.within(around) {
             for crossing in nets.crossings(slot) {
-                tile.add_polygons(&crossing, targets, index, &mut others);
+                tile.add_polygons(&crossing, index, &mut others);
             }
         }
         tile.nodes.iter().for_each(|node| index[node.slot as usize] = NONE);
@@ -232,10 +289,12 @@ impl<'a> Tile<'a> {
     fn add_polygons(
         &mut self,
         crossing: &Crossing,
-        targets: &[u32],
         index: &mut [u32],
         others: &mut BTreeMap<(u16, NetVertex), u32>,
     ) {
+        if !self.may_reach(crossing) {
+            return;
+        }
         let is_divided = self.nets.has_face_vertices(crossing);
         for far in [false, true] {
             let number = crossing.ends[usize::from(far)];
@@ -243,9 +302,9 @@ impl<'a> Tile<'a> {
                 continue;
             }
             for triangle in self.nets.patch(crossing, far).triangles() {
-                let corners = triangle.map(|vertex| follow(targets, vertex));
+                let corners = triangle.map(|vertex| self.before.follow(vertex));
                 let [a, b, c] = corners;
-                if a == b || b == c || c == a || !self.may_reach(&corners) {
+                if a == b || b == c || c == a {
                     continue;
                 }
                 let indices = corners.map(|vertex| self.index_of(number, vertex, index, others));
@@ -261,15 +320,16 @@ impl<'a> Tile<'a> {
         self.nets.cells.get(slot).at
     }
 
-    /// Returns whether a triangle may be partly in the tile.
-    fn may_reach(&self, corners: &[NetVertex; 3]) -> bool {
-        let cells = corners.map(|vertex| self.cell_of(vertex));
-        // Vertices on faces and edges are at the low end of their cell.
-        (0..3).all(|axis| {
-            let range = self.area.low[axis]..=self.area.high[axis] + 1;
-            cells.iter().any(|cell| cell[axis] >= *range.start())
-                && cells.iter().any(|cell| cell[axis] <= *range.end())
-        })
+    /// Returns whether the polygons around an edge are more than lines, and may be partly in the tile.
+    fn may_reach(&self, crossing: &Crossing) -> bool {
+        let slots = crossing.slots.map(|slot| self.before.target(slot));
+        let different = (0..4).filter(|&i| !slots[..i].contains(&slots[i])).count();
+        let cells = slots.map(|slot| self.nets.cells.get(slot).at);
+        different > 2
+            && (0..3).all(|axis| {
+                cells.iter().any(|cell| cell[axis] >= self.area.low[axis])
+                    && cells.iter().any(|cell| cell[axis] <= self.area.high[axis])
+            })
     }
 
     fn index_of(
@@ -311,7 +371,10 @@ impl<'a> Tile<'a> {
         let steps = [0, 1, 2].map(|axis| cell.at[axis] as f32 - self.area.low[axis] as f32);
         self.nodes.push(Node {
             slot,
-            position: Vec3::from(steps) + cell.offset,
+            at: cell.at,
+            position: Vec3::from(steps) + cell.offset + self.before.shift(slot),
+            shift: Vec3::ZERO,
+            is_pair: pair(cell).is_some(),
             may_merge: self.area.contains(cell.at) && cell.numbers().all(is_once),
             vertices: SmallVec::new(),
             target: NONE,
@@ -320,12 +383,13 @@ impl<'a> Tile<'a> {
     }
 
     fn add_vertex(&mut self, number: u16, vertex: NetVertex, on: u8, node: u32) -> u32 {
+        let shift = if let NetVertex::Cell { slot, .. } = vertex { self.before.shift(slot) } else { Vec3::ZERO };
         self.vertices.push(Vertex {
             number,
             on,
             node,
-            position: self.nets.position(number, vertex, self.area.low),
-            world: self.nets.world_position(number, vertex),
+            position: self.nets.position(number, vertex, self.area.low) + shift,
+            world: self.nets.shifted_position(number, vertex, shift),
             triangles: SmallVec::new(),
         });
         self.vertices.len() as u32 - 1
@@ -371,14 +435,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Returns the cell that remains where one was merged.
-    fn remaining<'b>(&'b self, mut node: &'b Node) -> &'b Node {
-        while node.target != NONE {
-            node = &self.nodes[node.target as usize];
-        }
-        node
-    }
-
     /// Returns the cells that share an edge with one, in ascending order.
     fn neighbours(&self, node: u32) -> Vec<u32> {
         let mut found = Vec::new();
@@ -411,22 +467,90 @@ impl<'a> Tile<'a> {
     /// Merges a cell into another if that is possible; returns whether it was.
     fn merge(&mut self, from: u32, to: u32, edge: f32) -> bool {
         let Some(pairs) = self.pairs(from, to) else { return false };
-        let Some(fresh) = self.replacements(&pairs, LONGEST * edge) else { return false };
-        if pairs.iter().any(|pair| self.passes_voxel_centre(pair)) || self.intersects(&fresh, &pairs) {
+        if pairs.iter().any(|pair| self.passes_voxel_centre(pair)) {
             return false;
         }
+        let shift = self.shift_for_volume(&pairs, to);
+        let is_done = shift != Vec3::ZERO && self.merge_shifted(&pairs, to, shift, edge)
+            || self.merge_shifted(&pairs, to, Vec3::ZERO, edge);
+        if is_done {
+            pairs.iter().for_each(|&[removed, kept]| self.collapse(removed, kept));
+            self.nodes[from as usize].target = to;
+            self.nodes[to as usize].stamp += 1;
+            for other in self.neighbours(to) {
+                self.enqueue(to, other, edge);
+                self.enqueue(other, to, edge);
+            }
+        }
+        is_done
+    }
+
+    /// Replaces the triangles that change if the first of each pair of vertices moves to the second, and that by `shift`;
+    /// returns false, with nothing changed, if that is not possible.
+    fn merge_shifted(&mut self, pairs: &[[u32; 2]], to: u32, shift: Vec3, edge: f32) -> bool {
+        let is_shifted = shift != Vec3::ZERO;
+        let before = self.nodes[to as usize].shift;
+        if is_shifted {
+            self.displace(to, before + shift);
+        }
+        let fresh = self.replacements(pairs, shift, LONGEST * edge);
+        let Some(fresh) = fresh.filter(|fresh| !self.intersects(fresh, pairs, is_shifted)) else {
+            if is_shifted {
+                self.displace(to, before);
+            }
+            return false;
+        };
         for (triangle, piece) in fresh {
             self.bounds[triangle as usize] = Bounds::from_points(&piece.points);
             self.triangles[triangle as usize] = piece;
         }
-        pairs.iter().for_each(|&[removed, kept]| self.collapse(removed, kept));
-        self.nodes[from as usize].target = to;
-        self.nodes[to as usize].stamp += 1;
-        for other in self.neighbours(to) {
-            self.enqueue(to, other, edge);
-            self.enqueue(other, to, edge);
-        }
         true
+    }
+
+    /// Moves all vertices of a cell to where a displacement in this pass brings them.
+    fn displace(&mut self, node: u32, shift: Vec3) {
+        let Node { slot, vertices, position, shift: present, .. } = &mut self.nodes[node as usize];
+        let sum = self.before.shift(*slot) + shift;
+        *position += shift - *present;
+        *present = shift;
+        for &vertex in &*vertices {
+            let Vertex { number, on, position, world, .. } = &mut self.vertices[vertex as usize];
+            let vertex = NetVertex::Cell { slot: *slot, on: *on };
+            *position = self.nets.position(*number, vertex, self.area.low) + sum;
+            *world = self.nets.shifted_position(*number, vertex, sum);
+        }
+    }
+
+    /// Returns the displacement of a cell that gives back what the merge of another one into it takes from the volumes of
+    /// labels; zero if these are more than two.
+    fn shift_for_volume(&self, pairs: &[[u32; 2]], to: u32) -> Vec3 {
+        let node = &self.nodes[to as usize];
+        let [removed, kept] = pairs[0];
+        if !node.may_merge || !node.is_pair || pairs.len() != node.vertices.len() {
+            return Vec3::ZERO;
+        }
+        let [from, end] = [removed, kept].map(|vertex| self.vertices[vertex as usize].position);
+        let double_area = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
+        let (mut gain, mut area) = (0.0, Vec3::ZERO);
+        for &triangle in &self.vertices[removed as usize].triangles {
+            let Piece { corners, points, .. } = &self.triangles[triangle as usize];
+            gain += double_area(*points).dot(end - from);
+            area += double_area([0, 1, 2].map(|i| if corners[i] == removed { end } else { points[i] }));
+        }
+        for &triangle in &self.vertices[kept as usize].triangles {
+            let Piece { corners, points, .. } = &self.triangles[triangle as usize];
+            if !corners.contains(&removed) {
+                area += double_area(*points);
+            }
+        }
+        let squared = area.length_squared();
+        if squared == 0.0 {
+            return Vec3::ZERO;
+        }
+        let shift = (area * (-gain / squared)).clamp_length_max(MOST_SHIFT);
+        let centre = Vec3::from([0, 1, 2].map(|axis| node.at[axis] as f32 - self.area.low[axis] as f32));
+        let shift = within_reach(node.position + shift - centre) + centre - node.position;
+        if shift.length() > LEAST_SHIFT { shift } else { Vec3::ZERO }
     }
 
     /// Returns each vertex of a cell with that of the same label in another one, if each has just one, and an edge is
@@ -466,20 +590,30 @@ impl<'a> Tile<'a> {
         ring
     }
 
-    /// Returns the triangles that change, and what each becomes; `None` if one would be folded, or too long.
-    fn replacements(&self, pairs: &[[u32; 2]], longest: f32) -> Option<Vec<(u32, Piece)>> {
+    /// Returns the triangles that change, and what each becomes; `None` if one would be folded, too long, or on the other
+    /// side of a voxel centre by the shift of the vertices that remain.
+    fn replacements(
+        &self,
+        pairs: &[[u32; 2]],
+        shift: Vec3,
+        longest: f32,
+    ) -> Option<Vec<(u32, Piece)>> {
+        let is_shifted = shift != Vec3::ZERO;
         let mut fresh = Vec::new();
         for &[removed, kept] in pairs {
-            for &index in &self.vertices[removed as usize].triangles {
+            let moved = &self.vertices[removed as usize].triangles;
+            let own: &[u32] = if is_shifted { &self.vertices[kept as usize].triangles } else { &[] };
+            for &index in moved.iter().chain(own) {
                 let old = &self.triangles[index as usize];
-                if old.corners.contains(&kept) {
+                if old.corners.contains(&kept) && old.corners.contains(&removed) {
                     continue;
                 }
                 let new = self.piece(old.corners.map(|v| if v == removed { kept } else { v }));
                 let centre = self.vertices[kept as usize].position;
                 let is_long = |p: &Vec3| p.distance_squared(centre) > longest * longest;
-                if new.points.iter().any(is_long)
+                if new.points.iter().any(is_long) && old.corners.contains(&removed)
                     || new.normal.dot(old.normal) < LEAST_COSINE
+                    || is_shifted && contains_voxel_centre([new.points[0], new.points[1], new.points[2], centre - shift])
                     || collinear(self.facet(&new).points)
                 {
                     return None;
@@ -502,7 +636,7 @@ impl<'a> Tile<'a> {
     }
 
     /// Returns whether new triangles intersect each other, or any that stays.
-    fn intersects(&self, fresh: &[(u32, Piece)], pairs: &[[u32; 2]]) -> bool {
+    fn intersects(&self, fresh: &[(u32, Piece)], pairs: &[[u32; 2]], is_shifted: bool) -> bool {
         let meet = |s: &Piece, t: &Piece| {
             !surely_apart(s, t) && facets_intersect(&self.facet(s), &self.facet(t))
         };
@@ -512,7 +646,10 @@ impl<'a> Tile<'a> {
             let near = fresh.iter().zip(&boxes).filter(|(_, other)| other.overlaps(bounds));
             near.map(|((_, piece), _)| piece).collect::<SmallVec<[&Piece; 8]>>()
         };
-        let stays = |piece: &Piece| !pairs.iter().any(|[removed, _]| piece.corners.contains(removed));
+        let changes = |&[removed, kept]: &[u32; 2], corners: &[u32; 3]| {
+            corners.contains(&removed) || is_shifted && corners.contains(&kept)
+        };
+        let stays = |piece: &Piece| !pairs.iter().any(|pair| changes(pair, &piece.corners));
         let with_others = self.bounds.iter().zip(&self.triangles).any(|(bounds, other)| {
             bounds.overlaps(&around)
                 && stays(other)
@@ -541,6 +678,14 @@ impl<'a> Tile<'a> {
             }
         }
     }
+}
+
+/// Returns the cell that remains where one was merged.
+fn remaining<'a>(nodes: &'a [Node], mut node: &'a Node) -> &'a Node {
+    while node.target != NONE {
+        node = &nodes[node.target as usize];
+    }
+    node
 }
 
 /// Returns whether the centre of a voxel is in a tetrahedron, or about on its surface. Positions are relative to the

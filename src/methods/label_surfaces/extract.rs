@@ -58,7 +58,8 @@ impl<'a> Extraction<'a> {
             let count = cube_loops()[nets.cells.get(slot).case(number)].count;
             self.first[(slot - start) as usize] = self.mesh.positions.len() as u32;
             for on in 0..count {
-                self.mesh.positions.push(nets.world_position(number, NetVertex::Cell { slot, on }));
+                let vertex = NetVertex::Cell { slot, on };
+                self.mesh.positions.push(nets.shifted_position(number, vertex, nets.coarse.shift(slot)));
             }
         }
         for &slot in slots {

@@ -116,8 +116,8 @@ impl LabelSurfaces {
         };
         surfaces.recount();
         surfaces.nets.untangle(everywhere);
-        surfaces.coarsen(everywhere, &[]);
         surfaces.wake(everywhere);
+        surfaces.coarsen(everywhere, &[], &mut []);
         Ok(surfaces)
     }
 
@@ -194,26 +194,23 @@ impl LabelSurfaces {
         }
         self.count(&touched, Counts::add);
         let untangled = if updated.is_ok() { self.nets.untangle(touched) } else { Vec::new() };
-        let mut reconnected = self.coarsen(touched, &untangled);
-        for (label, is_changed) in reconnected.iter_mut().zip(updated?) {
-            *label |= is_changed;
-        }
+        let area = changed.grown(HALO, dims);
+        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
+        let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
+        self.coarsen(touched, &untangled, &mut reconnected);
+        updated?;
         self.nets.flag_labels_in(untangled, &mut reconnected);
         self.versions.record(&[], &reconnected);
         self.components = self.nets.components();
-        let area = changed.grown(HALO, dims);
-        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         Ok(())
     }
 
-    /// Coarsens the surfaces around a box, and cells in slots, that have changed; returns a flag for each label, by number,
-    /// whether that has changed its triangles.
-    fn coarsen(&mut self, area: CellBox, slots: &[u32]) -> Vec<bool> {
-        let mut reconnected = self.nets.no_labels();
+    /// Coarsens the surfaces around a box, and cells in slots, that have changed, or prepares that while surfaces are yet to
+    /// be smoothed; sets the flag, by number, of each label whose triangles have changed by that.
+    fn coarsen(&mut self, area: CellBox, slots: &[u32], reconnected: &mut [bool]) {
         let cells = slots.iter().map(|&slot| self.nets.cells.get(slot).at);
         let area = cells.fold(area, |area, at| area.union(&CellBox { low: at, high: at }));
-        self.nets.coarsen(self.params.edge, &area, &mut reconnected);
-        reconnected
+        self.nets.coarsen(self.params.edge, &area, self.zone.is_some(), reconnected);
     }
 
     /// Counts again from the beginning, when labels may have other numbers.
@@ -247,12 +244,13 @@ impl LabelSurfaces {
     pub fn set_params(&mut self, params: LabelParams) -> Result<(), MethodError> {
         params.check_ranges()?;
         let before = std::mem::replace(&mut self.params, params);
-        if self.params.edge != before.edge {
-            let reconnected = self.coarsen(self.nets.everywhere(), &[]);
-            self.versions.record(&[], &reconnected);
-        }
         if self.params.smoothing != before.smoothing {
             self.wake(self.nets.everywhere());
+        }
+        if self.params.edge != before.edge {
+            let mut reconnected = self.nets.no_labels();
+            self.coarsen(self.nets.everywhere(), &[], &mut reconnected);
+            self.versions.record(&[], &reconnected);
         }
         Ok(())
     }
@@ -288,19 +286,22 @@ impl LabelSurfaces {
                 (0..balances).for_each(|_| zone.balance());
                 zone.write(&mut surfaces.nets);
             });
+            let area = zone.area.grown(1, self.nets.grid.dims());
+            let mut untangled = Vec::new();
+            let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
             self.timed("intersections", &mut times, |surfaces| {
-                let area = zone.area.grown(1, surfaces.nets.grid.dims());
-                let untangled = surfaces.nets.untangle(area);
+                untangled = surfaces.nets.untangle(area);
                 zone.read(&surfaces.nets);
-                let mut moved = surfaces.nets.no_labels();
-                let mut reconnected = surfaces.coarsen(area, &untangled);
                 surfaces.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
                 zone.flag_reconnected(&diagonals, &mut reconnected);
                 // Diagonals around these are not known, as far as they are outside the zone.
-                surfaces.nets.flag_labels_in(untangled, &mut reconnected);
-                surfaces.versions.record(&moved, &reconnected);
+                surfaces.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
             });
             self.zone = (!is_last).then_some(zone);
+            self.timed("coarsening", &mut times, |surfaces| {
+                surfaces.coarsen(area, &untangled, &mut reconnected);
+            });
+            self.versions.record(&moved, &reconnected);
         }
         Ok(self.report(times))
     }

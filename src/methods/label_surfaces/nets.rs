@@ -154,8 +154,10 @@ impl Nets {
 
     /// Sets the flag, by number, of each label that is in the cell in one of the given slots.
     pub fn flag_labels_in(&self, slots: impl IntoIterator<Item = u32>, flags: &mut [bool]) {
-        for slot in slots {
-            self.cells.get(slot).corners.iter().for_each(|&number| flags[usize::from(number)] = true);
+        for number in slots.into_iter().flat_map(|slot| self.cells.get(slot).corners) {
+            if let Some(flag) = flags.get_mut(usize::from(number)) {
+                *flag = true;
+            }
         }
     }
 
@@ -301,6 +303,11 @@ impl Nets {
 
     /// Returns the position of a vertex of a label in world space.
     pub fn world_position(&self, number: u16, vertex: NetVertex) -> Vec3 {
+        self.shifted_position(number, vertex, Vec3::ZERO)
+    }
+
+    /// Returns the position in world space of a vertex of a label that is displaced by `shift` in index space.
+    pub fn shifted_position(&self, number: u16, vertex: NetVertex, shift: Vec3) -> Vec3 {
         let slot = match vertex {
             NetVertex::Cell { slot, .. } | NetVertex::Face { slot, .. } | NetVertex::Edge { slot, .. } => {
                 slot
@@ -308,7 +315,7 @@ impl Nets {
         };
         let at = self.cells.get(slot).at;
         let centre = DVec3::from(at.map(|n| f64::from(n) - 0.5));
-        let local = self.position(number, vertex, at).as_dvec3();
+        let local = (self.position(number, vertex, at) + shift).as_dvec3();
         self.to_world.transform_point3(centre + local).as_vec3()
     }
 

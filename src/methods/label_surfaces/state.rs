@@ -24,6 +24,8 @@ struct State {
     free: Vec<u32>,
     /// First and last cell of the box that is being smoothed.
     area: Option<[[u32; 3]; 2]>,
+    /// First and last cell of the box that is to be coarsened then.
+    pending: Option<[[u32; 3]; 2]>,
     iterations: u32,
     steps: u32,
     residual: f64,
@@ -41,6 +43,7 @@ impl LabelSurfaces {
                 labels: self.nets.grid.values().to_vec(),
                 cells: cells.map(|cell| cell.is_live().then_some((cell.at, cell.offset))).collect(),
                 free: self.nets.cells.free().to_vec(),
+                pending: self.nets.coarse.pending.map(|area| [area.low, area.high]),
                 area: self.zone.as_ref().map(|zone| [zone.area.low, zone.area.high]),
                 iterations: self.iterations,
                 steps: self.steps,
@@ -64,7 +67,7 @@ impl LabelSurfaces {
         }
         let last = self.nets.everywhere().high;
         let is_box = |[low, high]: &[[u32; 3]; 2]| (0..3).all(|i| low[i] <= high[i] && high[i] <= last[i]);
-        if !state.area.iter().all(is_box) || state.iterations > state.params.smoothing {
+        if !state.area.iter().chain(&state.pending).all(is_box) || state.iterations > state.params.smoothing {
             return bad("progress", "inconsistent");
         }
         let Some(grid) = self.nets.grid.renumbered(&state.labels) else {
@@ -74,10 +77,13 @@ impl LabelSurfaces {
         self.nets.restore(grid, cells);
         self.recount();
         self.params = state.params;
-        self.coarsen(self.nets.everywhere(), &[]);
         self.zone = None;
+        self.coarsen(self.nets.everywhere(), &[], &mut []);
         if let Some([low, high]) = state.area {
             self.wake(CellBox { low, high });
+        }
+        if let Some([low, high]) = state.pending {
+            self.coarsen(CellBox { low, high }, &[], &mut []);
         }
         (self.iterations, self.steps, self.residual) = (state.iterations, state.steps, state.residual);
         self.versions.record_all(self.nets.grid.values().len());

@@ -174,7 +174,7 @@ fn beyond(at: [u32; 3], face: usize) -> [u32; 3] {
 }
 
 /// Returns the two labels that meet in a cell, the lower number first, if there are not more.
-fn pair(cell: &Cell) -> Option<[u16; 2]> {
+pub fn pair(cell: &Cell) -> Option<[u16; 2]> {
     let first = cell.corners[0];
     let second = cell.corners.iter().copied().find(|&other| other != first)?;
     let only = cell.corners.iter().all(|&other| other == first || other == second);
