@@ -60,9 +60,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     const image = volumeHandle('volume', volume);
     const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
     this.#volume = volume;
-    this.#handle = new Handle('LabelSurfaces', () =>
-      image.use((raw) => new RawLabelSurfaces(raw, wanted, params)),
-    );
+    this.#handle = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params)));
   }
 
   /** The labels that have voxels and a surface, in ascending order. */

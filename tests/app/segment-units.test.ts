@@ -211,11 +211,11 @@ test('the head: bone, without specks', () => {
 
 test('links contain what differs from the defaults, and are parsed again', () => {
   const [, head] = SEGMENT_EXAMPLES;
-  const defaults = { smoothing: 20 };
+  const defaults = { smoothing: 20, edge: 1 };
   const settings = {
     example: head,
     file: '',
-    params: { smoothing: 5 },
+    params: { smoothing: 5, edge: 1 },
     defaults,
     view: { ...INITIAL_VIEW, opacity: 0.8 },
   };
@@ -230,7 +230,16 @@ test('links contain what differs from the defaults, and are parsed again', () =>
 
 describe('fill', () => {
   const settings: ToolSettings = {
-    ...{ tool: 'fill', radius: 0, shape: 'ball', range: [1, 2], extent: 'box', reach: 50, inRange: true, protect: false },
+    ...{
+      tool: 'fill',
+      radius: 0,
+      shape: 'ball',
+      range: [1, 2],
+      extent: 'box',
+      reach: 50,
+      inRange: true,
+      protect: false,
+    },
   };
 
   /** Editing of a map of which the voxels with x = 0 have the label 3; `said` are the reasons of fills that reached nothing. */

@@ -44,10 +44,12 @@ const MOST_TRIANGLES: usize = 16;
 const ROUNDS: u32 = 3;
 /// Six times the volume of a tetrahedron below which it counts as flat, in voxels.
 const FLAT: f64 = 1e-4;
+/// Number of triangles whose boxes have a common box, which is tested first.
+const GROUP: usize = 16;
 /// Stands for a vertex that is not in a cell, or a cell that is not in the tile.
 const NONE: u32 = u32::MAX;
 
-/// What has become of each cell, by slot.
+/// The merges of cells, by slot.
 #[derive(Clone, Debug, Default)]
 struct Merges {
     /// Slot of the cell that it is merged into; its own if it remains.
@@ -92,7 +94,7 @@ impl Merges {
 /// Which cells are merged.
 #[derive(Clone, Debug, Default)]
 pub struct Coarsening {
-    /// What each pass has done.
+    /// The merges of each pass.
     passes: [Merges; 2],
     /// Both passes, one after the other.
     result: Merges,
@@ -252,7 +254,7 @@ struct Candidate {
 /// The surfaces in a box of cells.
 struct Tile<'a> {
     nets: &'a Nets,
-    /// What was done before.
+    /// The merges of the pass before.
     before: &'a Merges,
     area: CellBox,
     nodes: Vec<Node>,
@@ -260,21 +262,17 @@ struct Tile<'a> {
     triangles: Vec<Piece>,
     /// Box of each triangle; empty if it has been removed.
     bounds: Vec<Bounds>,
+    /// A box around those of each [`GROUP`] triangles.
+    groups: Vec<Bounds>,
     queue: BinaryHeap<Reverse<Candidate>>,
 }
 
 impl<'a> Tile<'a> {
     /// Collects what is in and around the tile `area`, from the polygons that begin at the cells of `around`, after the
     /// merges `before`. `index` has [`NONE`] for each slot, and has so again afterwards.
-    fn new(
-        nets: &'a Nets,
-        area: CellBox,
-        around: &CellBox,
-        before: &'a Merges,
-        index: &mut [u32],
-    ) -> Self {
-        let (nodes, vertices, triangles, bounds, queue) = Default::default();
-        let mut tile = Self { nets, before, area, nodes, vertices, triangles, bounds, queue };
+    fn new(nets: &'a Nets, area: CellBox, around: &CellBox, before: &'a Merges, index: &mut [u32]) -> Self {
+        let (nodes, vertices, triangles, bounds, groups, queue) = Default::default();
+        let mut tile = Self { nets, before, area, nodes, vertices, triangles, bounds, groups, queue };
         let mut others = BTreeMap::new();
         for slot in nets.cells.within(around) {
             for crossing in nets.crossings(slot) {
@@ -282,6 +280,8 @@ impl<'a> Tile<'a> {
             }
         }
         tile.nodes.iter().for_each(|node| index[node.slot as usize] = NONE);
+        let union = |group: &[Bounds]| group.iter().fold(Bounds::EMPTY, |all, one| all.union(one));
+        tile.groups = tile.bounds.chunks(GROUP).map(union).collect();
         tile
     }
 
@@ -383,7 +383,8 @@ impl<'a> Tile<'a> {
     }
 
     fn add_vertex(&mut self, number: u16, vertex: NetVertex, on: u8, node: u32) -> u32 {
-        let shift = if let NetVertex::Cell { slot, .. } = vertex { self.before.shift(slot) } else { Vec3::ZERO };
+        let shift =
+            if let NetVertex::Cell { slot, .. } = vertex { self.before.shift(slot) } else { Vec3::ZERO };
         self.vertices.push(Vertex {
             number,
             on,
@@ -501,8 +502,9 @@ impl<'a> Tile<'a> {
             return false;
         };
         for (triangle, piece) in fresh {
-            self.bounds[triangle as usize] = Bounds::from_points(&piece.points);
-            self.triangles[triangle as usize] = piece;
+            let (i, bounds) = (triangle as usize, Bounds::from_points(&piece.points));
+            self.groups[i / GROUP] = self.groups[i / GROUP].union(&bounds);
+            (self.bounds[i], self.triangles[i]) = (bounds, piece);
         }
         true
     }
@@ -592,12 +594,7 @@ impl<'a> Tile<'a> {
 
     /// Returns the triangles that change, and what each becomes; `None` if one would be folded, too long, or on the other
     /// side of a voxel centre by the shift of the vertices that remain.
-    fn replacements(
-        &self,
-        pairs: &[[u32; 2]],
-        shift: Vec3,
-        longest: f32,
-    ) -> Option<Vec<(u32, Piece)>> {
+    fn replacements(&self, pairs: &[[u32; 2]], shift: Vec3, longest: f32) -> Option<Vec<(u32, Piece)>> {
         let is_shifted = shift != Vec3::ZERO;
         let mut fresh = Vec::new();
         for &[removed, kept] in pairs {
@@ -613,7 +610,13 @@ impl<'a> Tile<'a> {
                 let is_long = |p: &Vec3| p.distance_squared(centre) > longest * longest;
                 if new.points.iter().any(is_long) && old.corners.contains(&removed)
                     || new.normal.dot(old.normal) < LEAST_COSINE
-                    || is_shifted && contains_voxel_centre([new.points[0], new.points[1], new.points[2], centre - shift])
+                    || is_shifted
+                        && contains_voxel_centre([
+                            new.points[0],
+                            new.points[1],
+                            new.points[2],
+                            centre - shift,
+                        ])
                     || collinear(self.facet(&new).points)
                 {
                     return None;
@@ -637,9 +640,8 @@ impl<'a> Tile<'a> {
 
     /// Returns whether new triangles intersect each other, or any that stays.
     fn intersects(&self, fresh: &[(u32, Piece)], pairs: &[[u32; 2]], is_shifted: bool) -> bool {
-        let meet = |s: &Piece, t: &Piece| {
-            !surely_apart(s, t) && facets_intersect(&self.facet(s), &self.facet(t))
-        };
+        let meet =
+            |s: &Piece, t: &Piece| !surely_apart(s, t) && facets_intersect(&self.facet(s), &self.facet(t));
         let boxes: Vec<Bounds> = fresh.iter().map(|(_, piece)| Bounds::from_points(&piece.points)).collect();
         let around = boxes.iter().fold(Bounds::EMPTY, |all, one| all.union(one));
         let near = |bounds: &Bounds| {
@@ -650,12 +652,15 @@ impl<'a> Tile<'a> {
             corners.contains(&removed) || is_shifted && corners.contains(&kept)
         };
         let stays = |piece: &Piece| !pairs.iter().any(|pair| changes(pair, &piece.corners));
-        let with_others = self.bounds.iter().zip(&self.triangles).any(|(bounds, other)| {
+        let meets_others = |(bounds, other): (&Bounds, &Piece)| {
             bounds.overlaps(&around)
                 && stays(other)
                 && near(bounds).into_iter().any(|piece| meet(piece, other))
-        });
-        with_others
+        };
+        let groups = self.groups.iter().zip(self.bounds.chunks(GROUP).zip(self.triangles.chunks(GROUP)));
+        groups
+            .filter(|(group, _)| group.overlaps(&around))
+            .any(|(_, (bounds, triangles))| bounds.iter().zip(triangles).any(meets_others))
             || fresh.iter().enumerate().any(|(i, (_, s))| fresh[..i].iter().any(|(_, t)| meet(s, t)))
     }
 

@@ -30,7 +30,11 @@ fn check(surfaces: &LabelSurfaces, what: &str) {
     let measures = measure(&all);
     let counts = LiveSurface::counts(surfaces);
     assert_eq!([all.positions.len(), all.triangles.len()], counts, "{what}");
-    assert_eq!((measures.components, measures.euler), (surfaces.components, surfaces.counts.euler()), "{what}");
+    assert_eq!(
+        (measures.components, measures.euler),
+        (surfaces.components, surfaces.counts.euler()),
+        "{what}"
+    );
 }
 
 fn settle(surfaces: &mut LabelSurfaces) {
@@ -347,7 +351,8 @@ fn only_surfaces_near_a_stroke_change() {
 #[test]
 fn a_saved_run_continues_with_the_same_bits() {
     let mut volume = balls(40, 5, 6);
-    let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25, ..LabelParams::default() }).unwrap();
+    let mut surfaces =
+        LabelSurfaces::new(&volume, None, LabelParams { smoothing: 25, ..LabelParams::default() }).unwrap();
     let mut brush = Brush { random: Random::new(1), labels: 6 };
     for _ in 0..4 {
         surfaces.step().unwrap();
@@ -401,7 +406,8 @@ fn bad_input_is_named_and_changes_nothing() {
         (Some(vec![1.0, 77.0]), 20, "labels: must be labels of the volume, got 77"),
         (None, 201, "smoothing: must be"),
     ] {
-        let found = refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing, ..LabelParams::default() }));
+        let found =
+            refusal(LabelSurfaces::new(&good, labels, LabelParams { smoothing, ..LabelParams::default() }));
         assert!(found.starts_with(start), "{found}");
     }
     let floats = Volume::new(VolumeInit::new(Voxels::F32(vec![1.0; 8]), [2, 2, 2, 1])).unwrap();
@@ -441,13 +447,15 @@ fn too_many_labels_are_refused_and_change_nothing() {
     assert!(refused.contains("at most 65535 labels"), "{refused}");
     let some = (0..65_535).map(|i| f64::from(i + 1)).collect();
     let mut most =
-        LabelSurfaces::new(&many, Some(some), LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
+        LabelSurfaces::new(&many, Some(some), LabelParams { smoothing: 0, ..LabelParams::default() })
+            .unwrap();
     assert_eq!((most.labels().len(), most.components), (65_535, 65_535));
     most.refresh(&many, Region { min: [0; 3], dims }).unwrap();
     most.restore(&most.save()).unwrap();
     assert_eq!(most.mesh(65_535.0).unwrap().components().len(), 1);
 
-    let mut surfaces = LabelSurfaces::new(&few, None, LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
+    let mut surfaces =
+        LabelSurfaces::new(&few, None, LabelParams { smoothing: 0, ..LabelParams::default() }).unwrap();
     let before = surfaces.save();
     let refused = surfaces.refresh(&many, Region { min: [0; 3], dims }).unwrap_err().to_string();
     assert!(refused.contains("at most 65535 labels"), "{refused}");
@@ -457,7 +465,8 @@ fn too_many_labels_are_refused_and_change_nothing() {
 
 /// Returns the mean edge length of a mesh.
 fn mean_edge(mesh: &TriangleMesh) -> f64 {
-    let sum: f64 = mesh.corners().map(|[a, b, c]| f64::from(a.distance(b) + b.distance(c) + c.distance(a))).sum();
+    let sum: f64 =
+        mesh.corners().map(|[a, b, c]| f64::from(a.distance(b) + b.distance(c) + c.distance(a))).sum();
     sum / (3.0 * mesh.triangles.len() as f64)
 }
 
@@ -465,8 +474,7 @@ fn mean_edge(mesh: &TriangleMesh) -> f64 {
 /// triangles come from polygons around edges of the grid between the two.
 fn largest_gap(surfaces: &LabelSurfaces) -> f64 {
     let nets = &surfaces.nets;
-    let trees: Vec<_> =
-        (1..=9).map(|number| TriangleTree::new(&nets.mesh(number)).unwrap()).collect();
+    let trees: Vec<_> = (1..=9).map(|number| TriangleTree::new(&nets.mesh(number)).unwrap()).collect();
     let mut largest = 0.0_f64;
     for slot in nets.cells.within(&nets.everywhere()) {
         for crossing in nets.crossings(slot).filter(|crossing| !crossing.ends.contains(&0)) {
@@ -511,7 +519,7 @@ fn longer_edges_keep_voxels_gaps_and_topology() {
         assert!(gap < 0.05, "{what}: {gap}");
         for label in volume.labels(0).unwrap().iter().filter(|label| label.voxels >= 500) {
             let error = measure(&surfaces.mesh(label.value).unwrap()).volume / label.voxels as f64 - 1.0;
-            assert!(error.abs() < 0.01 * edge, "{what}, label {}: {error}", label.value);
+            assert!(error.abs() < 0.015, "{what}, label {}: {error}", label.value);
         }
     }
     assert!(surfaces.versions()[0] > before[0]);
@@ -545,57 +553,4 @@ fn coarse_surfaces_follow_strokes_as_if_made_anew() {
     let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
     other.restore(&state).unwrap();
     assert!(other.surface() == surfaces.surface());
-}
-
-#[test]
-#[ignore]
-fn figures_of_edges() {
-    let ovule = std::fs::read("/work/shared/data/volumes/micro_ovule/ovule_label.nrrd").unwrap();
-    let ovule = crate::io::parse_volume(&ovule, None).unwrap();
-    for (name, volume) in [("9 balls", balls(96, 5, 9)), ("12 balls", balls(52, 2, 12)), ("ovule", ovule)] {
-        for edge in [1.0, 1.5, 2.0, 3.0, 5.0] {
-            let params = LabelParams { edge: 1.0, ..LabelParams::default() };
-            let mut surfaces = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
-            settle(&mut surfaces);
-            let start = std::time::Instant::now();
-            surfaces.set_params(LabelParams { edge, ..params }).unwrap();
-            let time = start.elapsed().as_secs_f64();
-            let all = surfaces.surface();
-            let worst = volume.labels(0).unwrap().iter().filter(|l| l.voxels >= 500).map(|label| {
-                measure(&surfaces.mesh(label.value).unwrap()).volume / (label.voxels as f64 * volume.affine().matrix3.determinant().abs()) - 1.0
-            }).fold(0.0_f64, |w, e| if e.abs() > w.abs() { e } else { w });
-            let start = std::time::Instant::now();
-            surfaces.nets.components();
-            let components = start.elapsed().as_secs_f64() * 1e3;
-            println!("{name} edge {edge}: {:?} mean {:.3} volume {worst:.4} {time:.2} s {:?} components {components:.2} ms labels {}", LiveSurface::counts(&surfaces), mean_edge(&all), report(&all).unwrap().self_intersections, surfaces.labels().len());
-        }
-    }
-    for edge in [1.0, 1.5, 2.0, 3.0] {
-        let mut volume = balls(96, 5, 9);
-        let mut surfaces = LabelSurfaces::new(&volume, None, LabelParams { edge, ..LabelParams::default() }).unwrap();
-        settle(&mut surfaces);
-        let mut random = Random::new(7);
-        let mut times = Vec::new();
-        for _ in 0..20 {
-            let mesh = surfaces.mesh(1.0 + f64::from(random.below(9))).unwrap();
-            let p = mesh.positions[random.below(mesh.positions.len() as u32) as usize];
-            let min = [0, 1, 2].map(|i| (p[i] as usize).clamp(6, 89) - 6);
-            let label = random.below(10) as u8;
-            let mut data = Vec::new();
-            for z in 0..13_usize { for y in 0..13_usize { for x in 0..13_usize {
-                let d = [x, y, z].map(|i| (i as f64 - 6.0).powi(2)).iter().sum::<f64>();
-                let old = volume.voxels().get(min[0] + x + 96 * (min[1] + y + 96 * (min[2] + z))).unwrap() as u8;
-                data.push(if d <= 36.0 { label } else { old });
-            }}}
-            let region = Region { min, dims: [13; 3] };
-            volume.write(region, &Voxels::U8(data), 0).unwrap();
-            let start = std::time::Instant::now();
-            surfaces.refresh(&volume, region).unwrap();
-            let refreshed = start.elapsed().as_secs_f64() * 1e3;
-            settle(&mut surfaces);
-            times.push((start.elapsed().as_secs_f64() * 1e3, refreshed));
-        }
-        times.sort_by(|a, b| a.0.total_cmp(&b.0));
-        println!("strokes at edge {edge}: median {:.1?} ms, least {:.1?}", times[10], times[0]);
-    }
 }
