@@ -259,7 +259,12 @@ impl Cells {
                 let start = width * y as usize + layer * z as usize;
                 let rows = [start, start + width, start + layer, start + width + layer]
                     .map(|start| &numbers[start + first..start + last + 2]);
-                self.update_row(grid, [area.low[0], y, z], rows, changed)?;
+                let row = CellBox { low: [area.low[0], y, z], high: [area.high[0], y, z] };
+                // Most rows of most label maps have nothing in them.
+                let is_uniform = rows.iter().all(|row| row.iter().all(|&number| number == rows[0][0]));
+                if !is_uniform || !self.within(&row).is_empty() {
+                    self.update_row(grid, row.low, rows, changed)?;
+                }
             }
         }
         Ok(())
