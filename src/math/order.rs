@@ -2,7 +2,7 @@
 //!
 //! The standard sort, instantiated for an element type, adds 5 to 30 kB to the WebAssembly module, several hundred in
 //! all. Elements of all types are therefore sorted as integers: as ranks of 64 bits, as pairs of such a rank and an
-//! index, or as indices; positions, as pairs of three integers and an index.
+//! index, or as indices.
 
 /// Returns the rank of a number for sorting: an integer whose order is that of `f32::total_cmp`.
 pub fn rank_f32(x: f32) -> u32 {
@@ -75,6 +75,13 @@ pub fn sort_by_rank<T: Copy>(items: &mut [T], rank: impl Fn(&T) -> u64) {
     }
 }
 
+/// Sorts items in ascending order of the three integers that `key` returns for each, by the first one first; items of
+/// equal keys keep their order. At most 2³² items.
+pub fn sort_by_triple<T: Copy>(items: &mut [T], key: impl Fn(&T) -> [u32; 3]) {
+    sort_by_rank(items, |item| key(item)[2].into());
+    sort_by_rank(items, |item| combined_rank(key(item)[0], key(item)[1]));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,5 +136,15 @@ mod tests {
         sort_by_rank(&mut items, |&(rank, _)| u64::from(rank));
         assert_eq!(items, expected);
         sort_by_rank(&mut items[..0], |_| 0);
+    }
+
+    #[test]
+    fn triples_are_sorted_by_the_first_number_then_the_second_then_the_third() {
+        let key = |i: u32| [i * 7 % 3, i * 5 % 4, i * 3 % 5];
+        let mut items: Vec<([u32; 3], u32)> = (0..200).map(|i| (key(i), i)).collect();
+        let mut expected = items.clone();
+        expected.sort_unstable();
+        sort_by_triple(&mut items, |&(key, _)| key);
+        assert_eq!(items, expected);
     }
 }

@@ -64,6 +64,7 @@ impl Mesh {
 
     /// Marks the vertices connected with `v` in `seen`, by slot, and appends them to `found` in breadth-first order, unless
     /// `v` is marked already.
+    #[inline(never)]
     fn flood(&self, v: VertexId, seen: &mut [bool], found: &mut Vec<VertexId>) {
         if std::mem::replace(&mut seen[v.index()], true) {
             return;
