@@ -131,7 +131,7 @@ mod tests {
         let mut displacements = vec![Vec3::X * 0.01; mesh.slots()];
         embedding.move_all(&mut mesh, &mut displacements);
         let v = mesh.vertices().next().unwrap();
-        for k in 0..50 {
+        for k in 0..10 {
             let up = Vec3::Z * if k % 2 == 0 { 0.01 } else { -0.01 };
             let edit = |mesh: &mut Mesh| {
                 mesh.set_position(v, mesh.position(v) + up);

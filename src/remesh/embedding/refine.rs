@@ -36,26 +36,3 @@ impl Embedding {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::Vec3;
-    #[cfg(target_arch = "wasm32")]
-    use wasm_bindgen_test::wasm_bindgen_test as test;
-
-    #[test]
-    fn a_mesh_that_cannot_be_refined_stays_as_it_was() {
-        let mut mesh = Mesh::icosphere(Vec3::ZERO, 2.0, 0.8).unwrap();
-        mesh.append(&Mesh::icosphere(Vec3::X * 2.0, 2.0, 0.7).unwrap()).unwrap();
-        let numbers = mesh.add_scalar();
-        mesh.scalar_mut(numbers).iter_mut().zip(0u8..).for_each(|(number, k)| *number = k.into());
-        let before = mesh.clone();
-        let mut embedding = Embedding::default();
-        embedding.sync_with_edge(&mesh, 1.0);
-        assert!(!embedding.refine(&mut mesh).unwrap());
-        assert!(mesh.versions() > before.versions());
-        mesh.set_versions(before.versions());
-        assert_eq!(mesh, before);
-    }
-}
