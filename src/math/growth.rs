@@ -12,7 +12,9 @@ pub fn make_room<T>(list: &mut Vec<T>, len: usize) {
     }
 }
 
-/// Sets the length of a list as [`resize`] does, but makes room for `room` items at once if there is too little.
+/// Sets the length of a list as [`resize`] does, but makes room for `room` items at once if there is too little. Never
+/// inlined, as its callers resize many lists each.
+#[inline(never)]
 pub fn resize_within<T: Clone>(list: &mut Vec<T>, len: usize, value: T, room: usize) {
     if len > list.capacity() {
         list.reserve_exact(room.max(len) - list.len());
@@ -20,7 +22,8 @@ pub fn resize_within<T: Clone>(list: &mut Vec<T>, len: usize, value: T, room: us
     list.resize(len, value);
 }
 
-/// Sets the length of a list as [`Vec::resize`] does, after [`make_room`].
+/// Sets the length of a list as [`Vec::resize`] does, after [`make_room`]. Never inlined, as [`resize_within`].
+#[inline(never)]
 pub fn resize<T: Clone>(list: &mut Vec<T>, len: usize, value: T) {
     make_room(list, len);
     list.resize(len, value);

@@ -75,11 +75,13 @@ pub fn sort_by_rank<T: Copy>(items: &mut [T], rank: impl Fn(&T) -> u64) {
     }
 }
 
-/// Sorts items in ascending order of the three integers that `key` returns for each, by the first one first; items of
-/// equal keys keep their order. At most 2³² items.
-pub fn sort_by_triple<T: Copy>(items: &mut [T], key: impl Fn(&T) -> [u32; 3]) {
-    sort_by_rank(items, |item| key(item)[2].into());
-    sort_by_rank(items, |item| combined_rank(key(item)[0], key(item)[1]));
+/// Sorts pairs of three numbers and an index in ascending order of the first number, then the second, then the third;
+/// pairs of equal numbers keep their order. At most 2³² pairs.
+pub fn sort_triples(pairs: &mut [([u32; 3], u32)]) {
+    let last_first: [fn([u32; 3]) -> u64; 2] = [|[_, _, z]| z.into(), |[x, y, _]| combined_rank(x, y)];
+    for rank in last_first {
+        sort_by_rank(pairs, |&(numbers, _)| rank(numbers));
+    }
 }
 
 #[cfg(test)]
@@ -144,7 +146,7 @@ mod tests {
         let mut items: Vec<([u32; 3], u32)> = (0..200).map(|i| (key(i), i)).collect();
         let mut expected = items.clone();
         expected.sort_unstable();
-        sort_by_triple(&mut items, |&(key, _)| key);
+        sort_triples(&mut items);
         assert_eq!(items, expected);
     }
 }

@@ -1,7 +1,7 @@
 //! Points sorted by position, to find equal ones.
 
 use super::Vec3;
-use super::order::sort_by_triple;
+use super::order::sort_triples;
 
 /// Points sorted by position, to find those that are equal to each other or to a given point; −0 equals 0.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ impl PositionIndex {
     /// Sorts `points`, at most 2³²; the results of queries are their indices.
     pub fn new(points: &[Vec3]) -> Self {
         let mut all: Vec<(Key, u32)> = points.iter().map(|&p| key(p)).zip(0..).collect();
-        sort_by_triple(&mut all, |&(key, _)| key);
+        sort_triples(&mut all);
         Self(all)
     }
 

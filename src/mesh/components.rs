@@ -1,7 +1,6 @@
 //! Connected components of a dynamic mesh.
 
 use super::{Mesh, VertexId};
-use std::collections::VecDeque;
 
 /// The largest `limit` for which [`Mesh::component_of`] searches the vertices found so far linearly, instead of marking
 /// them in an array over the whole mesh, which is slower for few vertices.
@@ -45,18 +44,24 @@ impl Mesh {
     /// Returns the number of connected components.
     pub fn component_count(&self) -> usize {
         let mut seen = vec![false; self.slots()];
-        let mut front = VecDeque::new();
+        let (mut front, mut next) = (Vec::new(), Vec::new());
         let mut count = 0;
         for v in self.vertices() {
             if std::mem::replace(&mut seen[v.index()], true) {
                 continue;
             }
             count += 1;
-            front.push_back(v);
+            front.push(v);
             // Unlike `flood`, this keeps only the vertices whose neighbours have not been visited.
-            while let Some(u) = front.pop_front() {
-                let new = |w: &&VertexId| !std::mem::replace(&mut seen[w.index()], true);
-                front.extend(self.ring(u).as_slice().iter().filter(new));
+            while !front.is_empty() {
+                for u in front.drain(..) {
+                    for &w in self.ring(u).as_slice() {
+                        if !std::mem::replace(&mut seen[w.index()], true) {
+                            next.push(w);
+                        }
+                    }
+                }
+                std::mem::swap(&mut front, &mut next);
             }
         }
         count
@@ -64,7 +69,6 @@ impl Mesh {
 
     /// Marks the vertices connected with `v` in `seen`, by slot, and appends them to `found` in breadth-first order, unless
     /// `v` is marked already.
-    #[inline(never)]
     fn flood(&self, v: VertexId, seen: &mut [bool], found: &mut Vec<VertexId>) {
         if std::mem::replace(&mut seen[v.index()], true) {
             return;

@@ -3,7 +3,7 @@
 use super::disjoint_sets::DisjointSets;
 use super::edge_table::sorted_half_edges;
 use super::{MeshError, Texture};
-use crate::math::order::sort_by_triple;
+use crate::math::order::sort_triples;
 use crate::math::{DAffine3, DVec3, Groups, Vec2, Vec3, triangle};
 use std::sync::Arc;
 
@@ -217,7 +217,7 @@ impl TriangleMesh {
         for ((&v, uv), at) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()).zip(0..) {
             corners.push(([v, uv.x.to_bits(), uv.y.to_bits()], at));
         }
-        sort_by_triple(&mut corners, |&(key, _)| key);
+        sort_triples(&mut corners);
         let (mut vertices, mut uvs) = (Vec::new(), Vec::new());
         let mut triangles = vec![[0; 3]; self.triangles.len()];
         for same in corners.chunk_by(|a, b| a.0 == b.0) {

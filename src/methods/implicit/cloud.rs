@@ -1,7 +1,7 @@
 //! Input points of an implicit surface: validation, scaling into the normalised box, in which their longest side is 2,
 //! removal of duplicates, and clustering against outliers (Dinh, Turk & Slabaugh, section VI-D).
 
-use crate::math::order::{sort_by_rank, sort_by_triple, sort_distinct};
+use crate::math::order::{sort_by_rank, sort_distinct, sort_triples};
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, PositionIndex, Vec3, symmetric};
 use crate::methods::MethodError;
 
@@ -276,7 +276,7 @@ pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
 fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     let cell_of = |p: &Vec3| (*p / cell).floor().to_array().map(|x| x as i32 as u32);
     let mut by_cell: Vec<([u32; 3], u32)> = points.iter().map(cell_of).zip(0..).collect();
-    sort_by_triple(&mut by_cell, |&(cell, _)| cell);
+    sort_triples(&mut by_cell);
     let occupied: Vec<&[([u32; 3], u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
     let find = |cell: [u32; 3]| occupied.binary_search_by_key(&cell, |points| points[0].0).ok();
     let mut seen = vec![false; occupied.len()];

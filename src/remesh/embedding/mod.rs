@@ -332,7 +332,9 @@ impl Embedding {
         }
     }
 
-    /// Discards the motion bounds and certificates of `v`, which an edit created, moved or gave other triangles.
+    /// Discards the motion bounds and certificates of `v`, which an edit created, moved or gave other triangles. Never
+    /// inlined, for the size of its callers.
+    #[inline(never)]
     fn forget(&mut self, v: VertexId) {
         if let Some(may_touch) = self.may_touch.get_mut(v.index()) {
             *may_touch = true;
