@@ -162,7 +162,7 @@ impl Embedding {
         self.entered = self.version;
     }
 
-    /// Frees nearly all of the memory, before a change of the whole mesh after which everything has to be computed anew.
+    /// Frees nearly all of the memory, before a change of the whole mesh after which everything has to be recomputed.
     pub fn free(&mut self) {
         self.grid = VertexGrid::default();
         self.motion_bounds = Vec::new();
