@@ -52,7 +52,7 @@ async function packageAt(folder) {
 
 /** Returns the crates that are compiled into the module; procedural macros are not in it. */
 export async function crates() {
-  const tree = ['tree', '--locked', '--package', 'vesicle', '--edges', 'normal,no-proc-macro'];
+  const tree = ['tree', '--locked', '--package', 'vesicle-bindings', '--edges', 'normal,no-proc-macro'];
   const shown = ['--target', 'wasm32-unknown-unknown', '--prefix', 'none', '--format', '{p}'];
   const listed = new Set((await output('cargo', [...tree, ...shown])).match(/^\S+ v\S+/gm));
   const { packages } = JSON.parse(await output('cargo', ['metadata', '--format-version', '1', ...WASM]));
