@@ -3,7 +3,7 @@
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
-import { dirname, join } from 'node:path';
+import { join } from 'node:path';
 import { makeElement } from './element.mjs';
 import { METHODS, makeEntries, PARTS } from './entries.mjs';
 import { makeInline } from './inline.mjs';
@@ -62,7 +62,7 @@ async function compile(module) {
   });
   // The next module of the directory replaces it.
   const compiled = at('target/modules', `${module.name.replace('/', '-')}.wasm`);
-  await mkdir(dirname(compiled), { recursive: true });
+  await mkdir(at('target/modules'), { recursive: true });
   await copyFile(at(target, 'wasm32-unknown-unknown/release/vesicle_bindings.wasm'), compiled);
   return compiled;
 }

@@ -299,12 +299,12 @@ describe('a volume without a label map', () => {
     const [intensities, middle] = [ball(), 15 * (1 + SIZE + SIZE ** 2)];
     await tool('fill');
     await app.page.selectOption('[data-tool-setting=extent]', 'box');
+    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
+    const before = await slice.screenshot();
     await app.page.check('[data-tool-setting=in-range]');
     await app.page.fill('[data-tool-setting=low]', '128');
     await app.page.fill('[data-tool-setting=high]', '300');
     await app.page.locator('[data-tool-setting=high]').blur();
-    const slice = app.page.locator('.slice canvas[aria-label^="Coronal"]');
-    const before = await slice.screenshot();
     await changes(app.page, before, () => slice.screenshot(), 0.02, 'the mask');
     await followed(() => app.page.keyboard.press('p'));
     const whole = await voxels();

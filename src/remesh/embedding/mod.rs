@@ -92,6 +92,8 @@ pub struct Embedding {
     is_edited: Vec<bool>,
     /// The pending collision checks of each vertex, by slot.
     pending: Vec<Checks>,
+    /// The vertices with pending collision checks.
+    dirty: Vec<VertexId>,
     /// The geometry version of the mesh for which grid, motion bounds and certificates are up to date.
     version: Option<u32>,
     /// The geometry version at which all vertices of the mesh were set in the grid; as long as the mesh has it, none
@@ -171,6 +173,7 @@ impl Embedding {
         self.certificates.begin(self.ordinary_edge);
         self.edited = Vec::new();
         self.is_edited = Vec::new();
+        self.ring_displacement = Vec::new();
         self.version = None;
     }
 

@@ -67,7 +67,6 @@ impl Embedding {
             }
             self.apply_motion(mesh, held.into_iter().map(|(v, _)| v).zip(before));
         }
-        self.ring_displacement = Vec::new();
         self.version = Some(mesh.geometry_version());
         shares.into_iter().collect()
     }

@@ -81,6 +81,8 @@ impl Embedding {
     /// positions.
     pub(super) fn apply_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
         resize(&mut self.ring_displacement, mesh.slots(), 0.0);
+        // Where few vertices move, nothing here takes time for all others.
+        let mut touched = Vec::new();
         for (v, from) in moved {
             // The displacement after rounding of the position.
             let to = mesh.position(v);
@@ -88,17 +90,16 @@ impl Embedding {
                 let displacement = higher(MIN_LENGTH, to.distance(from));
                 for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
                     let travelled = &mut self.ring_displacement[w.index()];
+                    if *travelled == 0.0 {
+                        touched.push(w);
+                    }
                     *travelled = higher(*travelled, displacement);
                 }
             }
         }
-        for i in 0..mesh.slots() {
-            let travelled = std::mem::take(&mut self.ring_displacement[i]);
-            if travelled == 0.0 {
-                continue;
-            }
-            let v = VertexId::from_index(i);
-            let bounds = &mut self.motion_bounds[i];
+        for v in touched {
+            let travelled = std::mem::take(&mut self.ring_displacement[v.index()]);
+            let bounds = &mut self.motion_bounds[v.index()];
             bounds.subtract(travelled);
             self.certificates.advance(v, travelled);
             let used_up = bounds.used_up();
@@ -120,6 +121,10 @@ impl Embedding {
     pub(super) fn mark_dirty(&mut self, v: VertexId, what: Checks) {
         // New pairs have to be tested, too.
         let what = if what.has(Check::Search) { what.with(Check::Nearby) } else { what };
-        self.pending[v.index()].0 |= what.0;
+        let pending = &mut self.pending[v.index()];
+        if pending.is_empty() && !what.is_empty() {
+            self.dirty.push(v);
+        }
+        pending.0 |= what.0;
     }
 }

@@ -33,7 +33,7 @@ impl Embedding {
     }
 
     fn check(&mut self, mesh: &Mesh, anew: bool) -> Vec<VertexId> {
-        let dirty = self.dirty_vertices();
+        let dirty = std::mem::take(&mut self.dirty);
         self.update_pairs(mesh, &dirty);
         for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
             if self.pending[v.index()].has(check) {
@@ -57,15 +57,6 @@ impl Embedding {
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
         sort_distinct(&mut intersecting);
         intersecting
-    }
-
-    /// Returns the vertices with pending collision checks, by ascending id.
-    fn dirty_vertices(&self) -> Vec<VertexId> {
-        let is_dirty = |checks: &Checks| !checks.is_empty();
-        let mut dirty = Vec::with_capacity(self.pending.iter().filter(|checks| is_dirty(checks)).count());
-        let pending = self.pending.iter().enumerate().filter(|(_, checks)| is_dirty(checks));
-        dirty.extend(pending.map(|(i, _)| VertexId::from_index(i)));
-        dirty
     }
 
     fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
