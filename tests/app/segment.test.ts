@@ -4,7 +4,7 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { labelTooth } from '../../www/src/segment/labelling';
-import { type App, anotherPage, drop, openApp, overflow, reach, unnamedControls } from './browser';
+import { type App, anotherPage, drop, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
 import { dicomSeries } from './pictures';
 import { changes } from './pixels';
 import { ball } from './volumes';
@@ -67,11 +67,17 @@ function ballFile(data: Uint8Array | Float32Array = ball(), spacing: [number, nu
   return file;
 }
 
+/** Makes a change that opens something, which may have the name of what was open before, and waits until it is open. */
+async function opened(change: () => Promise<unknown>): Promise<void> {
+  const states = await recordStates(app.page);
+  await change();
+  await expect.poll(async () => (await states()).join(' ')).toMatch(/^loading\b.* done$/);
+}
+
 /** Opens the ball with an empty label map. */
 async function openBall(): Promise<void> {
   if (!app.page.url().includes('#segment')) await openAt('#segment?example=ovule');
-  await drop(app.page, [{ name: 'ball.nii', bytes: ballFile() }]);
-  await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('ball.nii'));
+  await opened(() => drop(app.page, [{ name: 'ball.nii', bytes: ballFile() }]));
   await expect.poll(async () => (await measured()).labels).toEqual([{ name: 'Label 1', value: 1, voxels: 0 }]);
   await reach(app.page, 'done');
 }
@@ -576,9 +582,8 @@ describe('DICOM segmentations', () => {
   test.each(['binary.dcm', 'overlap.dcm', 'fractional.dcm'])(
     '%s opens with its series: its labels are at their voxels, with names and colours',
     async (file) => {
-      await openTogether(file);
-      await app.page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), file);
-      await reach(app.page, 'done');
+      await opened(() => openTogether(file));
+      expect(await text('.facts')).toContain(file);
       expect(await names()).toEqual(['Liver', 'Left kidney', 'Spleen']);
       const colors = await app.page.$$eval('[data-control=color]', (all) =>
         all.map((one) => (one as HTMLInputElement).value),
@@ -617,10 +622,8 @@ describe('DICOM segmentations', () => {
       ],
       space: 'RAS',
     });
-    await drop(app.page, [{ name: 'converted.nii', bytes: volume.toBytes('nifti') }]);
+    await opened(() => drop(app.page, [{ name: 'converted.nii', bytes: volume.toBytes('nifti') }]));
     volume.free();
-    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('converted.nii'));
-    await reach(app.page, 'done');
     await openMap('binary.dcm', await segmentation('binary.dcm'));
     await expect.poll(names).toEqual(['Liver', 'Left kidney', 'Spleen']);
     await reach(app.page, 'done');
@@ -630,9 +633,7 @@ describe('DICOM segmentations', () => {
   });
 
   test('is refused, and changes nothing, if it has another grid, extends beyond the volume, or is of a class that cannot be read', async () => {
-    await openTogether('binary.dcm');
-    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('binary.dcm'));
-    await reach(app.page, 'done');
+    await opened(() => openTogether('binary.dcm'));
     const refused: [Partial<typeof GRID>, string, RegExp][] = [
       [{ spacing: [1.2, 0.9, 2] }, 'binary.dcm', /not voxels of the volume/],
       [{ origin: [-12, 31.25, 7.75] }, 'binary.dcm', /not voxels of the volume/],
