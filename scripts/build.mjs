@@ -125,7 +125,7 @@ async function compareGlue() {
  * Passes of binaryen: all twice, since the first round leaves work for the second. The one between them lets constant
  * offsets be part of loads; nothing is stored below address 1,024, the far end of the stack.
  */
-const OPTIMISATION = ['-O3', '--low-memory-unused', '-O3'];
+const OPTIMISATION = ['-O2', '--low-memory-unused', '-O2'];
 
 async function optimise(module) {
   await must(tool('wasm-opt'), [...OPTIMISATION, module, '-o', `${module}.opt`]);

@@ -45,14 +45,15 @@ export function countCargo(output) {
   return counts;
 }
 
-const cargoTests =
-  (...args) =>
-  async () => {
-    const { code, output } = await run('cargo', ['test', '--locked', '-p', 'vesicle', '--no-fail-fast', ...args], {
-      echo,
-    });
-    return { output, ...atLeastOneFailed(code, countCargo(output)) };
-  };
+const cargoTests = (args, options) => async () => {
+  const { code, output } = await run('cargo', ['test', '--locked', '-p', 'vesicle', '--no-fail-fast', ...args], {
+    ...{ echo, ...options },
+  });
+  return { output, ...atLeastOneFailed(code, countCargo(output)) };
+};
+
+/** Examples in the documentation are small: most of the time is that of compiling the library for them. */
+const UNOPTIMISED = { env: { CARGO_PROFILE_DEV_OPT_LEVEL: '0', CARGO_PROFILE_DEV_DEBUG: '0' } };
 
 /** Returns a stage that runs the tests of a folder, or those of one project of its configuration. */
 const vitest = (folder, project) => async () => {
@@ -94,9 +95,10 @@ const GROUPS = [
         20,
       ],
       // Shows the tests' measurements in the log.
-      ['native', cargoTests('--', '--show-output'), 600],
+      ['native', cargoTests(['--lib', '--', '--show-output']), 600],
+      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], UNOPTIMISED), 60],
       // Has one thread only.
-      ['wasm', cargoTests('--lib', ...WASM), 700],
+      ['wasm', cargoTests(['--lib', ...WASM]), 700],
     ],
     [
       ['build', works(build), 700],
@@ -122,8 +124,12 @@ const LONG = [
   [
     [
       ['features', works(checkFeatures), 120],
-      ['slow', cargoTests(...['--release', '--lib', '--', '--ignored', '--show-output', ...SLOW]), 900],
-      ['slow wasm', cargoTests('--lib', ...WASM, '--', '--ignored'), 900],
+      [
+        'slow',
+        cargoTests(['--release', '--lib', '--', '--ignored', '--show-output', '--skip', 'write_seeds', ...SLOW]),
+        900,
+      ],
+      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--ignored']), 900],
     ],
   ],
 ];

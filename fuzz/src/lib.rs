@@ -1,4 +1,4 @@
-//! The fuzz targets: one plain function each, called with bytes by the fuzzer and by `tests/fuzz_corpus.rs`.
+//! The fuzz targets: one plain function each, called with bytes by the fuzzer and by `tests/core/fuzz_corpus.rs`.
 #![allow(dead_code, reason = "the fuzzer and the test each use a part of it")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a finding is a panic")]
 
@@ -14,7 +14,7 @@ pub mod states;
 pub mod steppers;
 pub mod volumes;
 
-/// A fuzz target: a function that the fuzzer and `tests/fuzz_corpus.rs` call with bytes, and its limits.
+/// A fuzz target: a function that the fuzzer and `tests/core/fuzz_corpus.rs` call with bytes, and its limits.
 pub struct Target {
     /// Name of the target, of its program and of its folder of seeds.
     pub name: &'static str,
@@ -22,7 +22,7 @@ pub struct Target {
     pub run: fn(&[u8]),
     /// Limit of the memory in use at any time, in bytes, whatever sizes the input claims.
     pub memory_limit: usize,
-    /// Number of mutated seeds on which `tests/fuzz_corpus.rs` runs the target, which takes a second or so.
+    /// Number of mutated seeds on which `tests/core/fuzz_corpus.rs` runs the target, which takes a second or so.
     pub mutations: usize,
 }
 

@@ -1,7 +1,7 @@
 //! Seed inputs for fuzzing: small files of every format, and random scenes.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
-use super::common::{Random, shapes};
+use super::super::common::{Random, shapes};
 use super::fuzz::states;
 use std::fs;
 use std::path::Path;

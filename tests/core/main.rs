@@ -18,6 +18,9 @@ mod decimate;
 mod deformable;
 mod deformable_fuzz;
 mod embedding;
+// Reads seeds from files.
+#[cfg(not(target_arch = "wasm32"))]
+mod fuzz_corpus;
 mod implicit;
 // Takes minutes in wasm.
 #[cfg(not(target_arch = "wasm32"))]

@@ -1,18 +1,14 @@
 //! The fuzz targets (`fuzz`, docs/fuzzing.md) without a fuzzer: each runs on its seeds and on thousands of mutations of
 //! them.
 //!
-//! `cargo test --test fuzz_corpus -- --ignored` rewrites the seeds from the files in `data` and from small scenes.
+//! `cargo test --lib write_seeds -- --ignored` rewrites the seeds from the files in `data` and from small scenes.
 
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "a test fails by panicking")]
-
-mod common;
-#[path = "../fuzz/src/lib.rs"]
+#[path = "../../fuzz/src/lib.rs"]
 mod fuzz;
-#[path = "common/fuzz_seeds.rs"]
+#[path = "../common/fuzz_seeds.rs"]
 mod fuzz_seeds;
 
-use common::Random;
+use super::common::Random;
 use fuzz::Target;
 use std::fs;
 use std::path::{Path, PathBuf};
