@@ -1,22 +1,18 @@
 /** Runs of the Reconstruct lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { apply } from '../../www/src/finish/code';
 import type { Edit } from '../../www/src/finish/protocol';
 import { uniform } from '../../www/src/random';
 import type { CameraView, CloudSource, Edits, ParamValues, Requests, Setup } from '../../www/src/reconstruct/protocol';
-import { type Programs, pickFrom, programsIn } from './run-code';
+import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
 const worker = await startWorker<Requests>(() => import('../../www/src/reconstruct/worker'));
 await worker.request('hello', undefined);
 
-let programs: Programs;
-beforeAll(async () => {
-  await init();
-  programs = await programsIn('reconstruct');
-});
-afterAll(() => programs.remove());
+await init();
+const programs = await programsIn('reconstruct');
 
 const NONE: Edits = { added: [], removed: [], outside: [] };
 const SETUP: Setup = { params: { cell: 0.12 }, maxPoints: 300, keepComponents: undefined, edits: NONE };

@@ -1,12 +1,12 @@
 /** Gestures in the Sculpt lab are repeated, to the same bits, by the code that its worker writes of them. */
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { expect, test } from 'vitest';
 import init from '../../pkg/index.js';
 import { uniform } from '../../www/src/random';
 import { ball, moved, turned, withLengths } from '../../www/src/sculpt/ellipsoids';
 import type { Film } from '../../www/src/sculpt/film';
 import type { FrameEvent, Pose, PoseMessage, Requests, SavedPose, SceneSource } from '../../www/src/sculpt/protocol';
 import { globeAsObj } from '../../www/src/sculpt/shapes';
-import { type Programs, pickFrom, programsIn } from './run-code';
+import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
 /** Called at each event of the worker; frames are drawn at once. */
@@ -25,12 +25,8 @@ const worker = await startWorker<Requests>(
 );
 await worker.request('hello', undefined);
 
-let programs: Programs;
-beforeAll(async () => {
-  await init();
-  programs = await programsIn('sculpt');
-});
-afterAll(() => programs.remove());
+await init();
+const programs = await programsIn('sculpt');
 
 /** Waits until something holds after an event of the worker. */
 const until = (holds: () => boolean) =>

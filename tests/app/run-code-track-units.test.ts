@@ -1,21 +1,17 @@
 /** Runs of the Track lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { uniform } from '../../www/src/random';
 import { cineVoxels } from '../../www/src/track/cine';
 import type { CineSpec, ImageSource, ParamValues, Requests, SavedTrack, Setup } from '../../www/src/track/protocol';
-import { type Programs, pickFrom, programsIn } from './run-code';
+import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
 const worker = await startWorker<Requests>(() => import('../../www/src/track/worker'));
 await worker.request('hello', undefined);
 
-let programs: Programs;
-beforeAll(async () => {
-  await init();
-  programs = await programsIn('track');
-});
-afterAll(() => programs.remove());
+await init();
+const programs = await programsIn('track');
 
 /** Voxel sizes that single precision rounds. */
 const CINE: CineSpec = { dims: [20, 20, 8], spacing: [3.3, 3.3, 8.1], frames: 4, noise: 4, size: 22, papillary: false };

@@ -1,7 +1,7 @@
 /** Runs of the Extract lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
@@ -10,7 +10,7 @@ import { bytesOf, callsOf, type Program, toCode } from '../../www/src/worker/cod
 import { programOf } from '../../www/src/worker/extract-code';
 import { literal } from '../../www/src/worker/literal';
 import { filesOf, serveImage, zipOf } from '../js/zarr-stores';
-import { type Programs, pickFrom, programsIn } from './run-code';
+import { pickFrom, programsIn } from './run-code';
 import { ball, ring } from './volumes';
 import { startWorker } from './worker-in-node';
 
@@ -39,12 +39,8 @@ async function secondFrame() {
   return { name: 'frames.nii', bytes, source, frame: 1 };
 }
 
-let programs: Programs;
-beforeAll(async () => {
-  await init();
-  programs = await programsIn('extract');
-});
-afterAll(() => programs.remove());
+await init();
+const programs = await programsIn('extract');
 
 const SETUP: Setup = { start: { kind: 'contour' }, levels: 1, edge: undefined, params: {}, attractors: [] };
 

@@ -2,15 +2,14 @@
 import { mkdir, mkdtemp, readFile, rm, symlink, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { expect } from 'vitest';
+import { afterAll, expect } from 'vitest';
 import { at, must } from '../../scripts/shell.mjs';
 import type { NamedBytes, RunCode } from '../../www/src/protocol';
 
-export type Programs = Awaited<ReturnType<typeof programsIn>>;
-
-/** Returns a folder of programs, in which the package is installed. */
+/** Returns a folder of programs, in which the package is installed, until the end of the test file. */
 export async function programsIn(name: string) {
   const folder = await mkdtemp(join(tmpdir(), `run-code-${name}-`));
+  afterAll(() => rm(folder, { recursive: true }));
   await mkdir(join(folder, 'node_modules'));
   await symlink(at('pkg'), join(folder, 'node_modules/vesicle'));
   await symlink(at('node_modules/@zarrita'), join(folder, 'node_modules/@zarrita'));
@@ -42,7 +41,6 @@ export async function programsIn(name: string) {
       expect(seeds.length).toBe(surfaces.length);
       programs.clear();
     },
-    remove: () => rm(folder, { recursive: true }),
   };
 }
 

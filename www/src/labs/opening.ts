@@ -328,8 +328,20 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
     this.kept();
-    if (this.#modelMismatch) this.states.engineBroken = true;
-    this.states.fail(text('labs.openFailed', { name: source.name }), error);
+    const title = text('labs.openFailed', { name: source.name });
+    if (this.#modelMismatch) {
+      this.states.engineBroken = true;
+      if (code !== 'internal' && this.#source && !reopening) return this.#openPrevious(title, message);
+    }
+    this.states.fail(title, error);
+  }
+
+  /** Opens what is displayed again, after the worker has replaced it by what then could not be opened, and says why. */
+  async #openPrevious(title: string, why: string): Promise<void> {
+    const opening = this.reopen();
+    const own = this.#requestCount;
+    await opening;
+    if (own === this.#requestCount && this.states.value !== 'error') this.#ui.banner.show(title, why);
   }
 
   /** Opens a link's example or file without the link's settings, after one of them was rejected, and says why. */
