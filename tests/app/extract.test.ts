@@ -295,7 +295,7 @@ describe('files that cannot be opened', () => {
     expect(before.components).toBe(2);
     await openNotesDuringLoad();
     await app.page.selectOption('.data select', 'head-full');
-    await expect.poll(() => app.page.textContent('.banner')).toContain('notes.txt could not be opened');
+    await app.page.locator('.banner', { hasText: 'notes.txt could not be opened' }).waitFor();
     expect(await app.page.inputValue('.data select')).toBe('linked-rings');
     expect(await state()).toMatch(/paused|done/);
     await app.page.keyboard.press('Escape');
