@@ -153,5 +153,5 @@ function checkAll(surfaces) {
 /** Returns a row for label maps of one label and of several. */
 export async function measure() {
   await init();
-  return { version: version(), host: `Node ${process.versions.node}`, rows: [1, LABELS].map(measureStrokes) };
+  return { version: version(), rows: [1, LABELS].map(measureStrokes) };
 }
