@@ -118,7 +118,7 @@ const GROUPS = [
 ];
 
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
-const SLOW = ['scenes::', 'tracking::', 'fuzz', 'menger'];
+const SLOW = ['scenes::', 'tracking::', 'fuzz'];
 
 /** Stages that only `npm run test:all` runs: too long for every change. */
 const LONG = [

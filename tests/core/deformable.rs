@@ -62,8 +62,8 @@ fn chain_from_bubbles() {
     the_chain_is_two_rings(160, options);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
-#[ignore = "takes most of a minute: npm run test:all"]
 fn menger_sponge_of_depth_two() {
     let volume = scenes::menger(2);
     let params = Some(params(&volume, 0.4, 0.05, 0.001));

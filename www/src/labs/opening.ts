@@ -69,7 +69,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   #adoption: Promise<unknown> = Promise.resolve();
   /**
    * Whether the worker's model is not the one displayed, or is missing; if opening fails then, the engine counts as
-   * broken.
+   * broken, and is restarted with what is displayed.
    */
   #modelMismatch = false;
 
