@@ -120,6 +120,9 @@ const GROUPS = [
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
 const SLOW = ['scenes::', 'tracking::', 'fuzz'];
 
+/** Filters of tests with random input, which run with more of it. */
+const RANDOM = ['fuzz::', 'random_'];
+
 /** Stages that only `npm run test:all` runs: too long for every change. */
 const LONG = [
   [
@@ -130,6 +133,7 @@ const LONG = [
         cargoTests(['--release', '--lib', '--', '--ignored', '--show-output', '--skip', 'write_seeds', ...SLOW]),
         900,
       ],
+      ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '4' } }), 900],
       ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--ignored']), 900],
     ],
   ],

@@ -85,6 +85,30 @@ test('a reference is compared in both directions, also after an edit; a bad file
   expect(csv).toMatch(/^direction,mean,rms,p95,hausdorff\ntoReference,/);
 });
 
+test('a long edit can be cancelled: the edits before it, their undo and the reference stay', async () => {
+  const [before, edits] = [await measures(app.page), await log()];
+  const surface = await saved('[data-export=ply]');
+  const edge = app.page.locator('.finish').getByLabel('Edge length');
+  const given = await edge.inputValue();
+  await edge.fill('0.06');
+  await press('remesh');
+  await press('cancel');
+  const status = app.page.locator('[data-finish=status]');
+  await expect.poll(() => status.textContent()).toBe('Cancelled. Nothing has changed.');
+  expect(await app.page.isDisabled('[data-finish=cancel]')).toBe(true);
+  expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('Remesh');
+  await expect.poll(() => app.page.locator('[data-reference=status]').textContent()).toBe('own.ply');
+  expect(await measures(app.page)).toEqual(before);
+  expect(Buffer.from(await saved('[data-export=ply]')).equals(surface)).toBe(true);
+  expect(await log()).toEqual(edits);
+  await edge.fill(given);
+  await press('undo');
+  await expect.poll(async () => (await log()).length).toBe(edits.length - 1);
+  await press('redo');
+  await expect.poll(log).toEqual(edits);
+  await expect.poll(() => app.page.locator('[data-reference=result]').textContent()).toContain('Dice coefficient');
+});
+
 test('a mask is a reference, too', async () => {
   const { bounds } = Mesh.parse(await saved('[data-export=ply]')).info();
   const dims = bounds.max.map((x) => Math.ceil(x) + 2) as [number, number, number];

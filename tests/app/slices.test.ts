@@ -207,6 +207,10 @@ describe('zoom', () => {
     await slider.press('0');
     await expect.poll(() => reset.isDisabled()).toBe(true);
     expect(await slider.inputValue()).toBe(value);
+    await slider.press('?');
+    const listed = app.page.locator('dialog[open] dd:visible');
+    await expect.poll(() => listed.allTextContents()).toContain('move a slice');
+    await app.page.keyboard.press('Escape');
   });
 });
 

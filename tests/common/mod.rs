@@ -20,13 +20,20 @@ use std::ops::Range;
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, measure};
 
-/// Returns the seeds of a test: `0..usual`, or those of the environment variable `FUZZ_SEEDS=<first>..<last>`.
+/// Returns the seeds of a test: `0..usual`, `FUZZ_TIMES` times as many if that environment variable is set, or those of
+/// `FUZZ_SEEDS=<first>..<last>`.
 pub fn seeds(usual: u64) -> Range<u64> {
-    let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..usual };
+    let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..usual * times() };
     let ends =
         named.split_once("..").and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
     let Some((first, last)) = ends else { panic!("FUZZ_SEEDS is {named}; <first>..<last> is needed") };
     first..last
+}
+
+/// How many times as many seeds as usual run; `npm run test:all` sets it.
+fn times() -> u64 {
+    let Ok(named) = std::env::var("FUZZ_TIMES") else { return 1 };
+    named.parse().unwrap_or_else(|_| panic!("FUZZ_TIMES is {named}; a whole number is needed"))
 }
 
 /// Asserts that a test with random input has done at least `least` of something, so that it fails if, for example, all

@@ -1,6 +1,6 @@
 //! Meshes that are moved and edited at random never intersect themselves.
 
-use super::common::{Random, torus_around};
+use super::common::{Random, seeds, torus_around};
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_self_intersections};
 use vesicle::remesh::{Embedding, Resolver, Sampling};
@@ -38,7 +38,7 @@ fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_mesh_moved_at_random_never_intersects_itself() {
-    for seed in 0..12 {
+    for seed in seeds(5) {
         let mut random = Random(seed);
         let mut mesh = crowd();
         let mut follower = Embedding::default();

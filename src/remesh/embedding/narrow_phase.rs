@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn intersections_are_those_found_by_testing_all_pairs() {
         let (mut separate, mut intersecting) = (0, 0);
-        for seed in 0..2000 {
+        for seed in 0..800 {
             let random = &mut Random::new(seed);
             let mesh = crumpled(random);
             let mut embedding = Embedding::default();
@@ -279,7 +279,7 @@ mod tests {
             assert_eq!(found, expected(&mesh), "seed {seed}");
             if found.is_empty() { separate += 1 } else { intersecting += 1 }
         }
-        assert!(separate > 200 && intersecting > 200, "{separate} separate, {intersecting} intersecting");
+        assert!(separate > 80 && intersecting > 80, "{separate} separate, {intersecting} intersecting");
     }
 
     #[test]

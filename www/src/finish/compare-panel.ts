@@ -2,7 +2,7 @@ import { text } from '../texts';
 import { h, uniqueId } from '../ui/dom';
 import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
 import { figure } from '../ui/format';
-import type { Finishing } from './finishing';
+import { type Finishing, isCancelled } from './finishing';
 import type { Comparison, Distances } from './protocol';
 
 const MEASURES = [
@@ -39,6 +39,8 @@ export class ReferencePanel {
   readonly #more: HTMLElement;
   /** Name of the reference; undefined if there is none. */
   #name: string | undefined;
+  /** Files of the reference. */
+  #files: File[] = [];
   #comparison: Comparison | undefined;
   #enabled = false;
   /** Counts comparisons, so that only the newest is shown. */
@@ -91,6 +93,13 @@ export class ReferencePanel {
     this.clear();
   }
 
+  /** Reads the reference again, for a worker that has lost it. */
+  reopen(): void {
+    if (this.#name === undefined) return;
+    this.forget();
+    void this.#open(this.#files);
+  }
+
   /** Compares the present surface with the reference, if there is one. */
   async compare(): Promise<void> {
     if (this.#name === undefined) return;
@@ -114,6 +123,7 @@ export class ReferencePanel {
     await this.#attempt(async () => {
       await this.#finishing.request('reference', await readFiles(files));
       this.#name = nameOf(files);
+      this.#files = files;
       this.#label.replaceChildren();
       await this.compare();
     });
@@ -126,6 +136,8 @@ export class ReferencePanel {
       await work();
       this.#status.textContent = this.#name ?? '';
     } catch (error) {
+      // It is made again then.
+      if (isCancelled(error)) return;
       this.#status.textContent = this.#name ?? '';
       const reason = error instanceof Error ? error.message : String(error);
       this.#error.textContent = text('finish.referenceFailed', { reason });

@@ -8,7 +8,7 @@ import { ParamControls } from '../ui/params';
 import { callOf, toCode } from './code';
 import { ComponentList } from './component-list';
 import type { EditedView } from './edited-view';
-import type { Finishing } from './finishing';
+import { type Finishing, isCancelled } from './finishing';
 import type { Edit, Edited, SurfacePoint } from './protocol';
 
 /** Name under which the surface before the edits is saved, and the program for them reads it. */
@@ -35,6 +35,11 @@ export class EditPanel {
   readonly #distance = h('p', { class: 'help', role: 'status', 'data-finish': 'distance' });
   readonly #undo = this.#button('undo', text('controls.undo'), () => this.#change('undo', undefined));
   readonly #redo = this.#button('redo', text('controls.redo'), () => this.#change('redo', undefined));
+  readonly #cancel = h(
+    'button',
+    { type: 'button', 'data-finish': 'cancel', disabled: true, onclick: () => this.#finishing.cancel() },
+    text('controls.cancel'),
+  );
   readonly #decimation: ParamValues = { targetTriangles: 1000 };
   readonly #remeshing: ParamValues = { edge: 1 };
   readonly #smoothing: ParamValues = { iterations: 10, keepVolume: true };
@@ -75,7 +80,7 @@ export class EditPanel {
       h('p', { class: 'help' }, text('finish.help')),
       this.#status,
       this.#error,
-      h('div', { class: 'buttons' }, this.#undo, this.#redo),
+      h('div', { class: 'buttons' }, this.#undo, this.#redo, this.#cancel),
       this.#log,
       this.#codeHolder,
       ...this.#operations(),
@@ -202,6 +207,7 @@ export class EditPanel {
     for (const button of this.#buttons) button.disabled = !idle;
     this.#undo.disabled ||= !edited?.undoable;
     this.#redo.disabled ||= !edited?.undone.length;
+    this.#cancel.disabled = !this.#busy;
     this.#choosing.disabled = !idle;
     this.#measuring.disabled = !idle;
   }
@@ -223,6 +229,7 @@ export class EditPanel {
   async #attempt(work: () => Promise<unknown>): Promise<boolean> {
     this.#error.textContent = '';
     this.#status.textContent = text('finish.working');
+    const focused = document.activeElement;
     this.#busy = true;
     this.#enable();
     try {
@@ -230,14 +237,16 @@ export class EditPanel {
       if (this.#status.textContent === text('finish.working')) this.#status.textContent = '';
       return true;
     } catch (error) {
-      this.#status.textContent = '';
-      this.#error.textContent = text('finish.refused', {
-        reason: error instanceof Error ? error.message : String(error),
-      });
+      const reason = error instanceof Error ? error.message : String(error);
+      this.#status.textContent = isCancelled(error) ? text('finish.cancelled') : '';
+      this.#error.textContent = isCancelled(error) ? '' : text('finish.refused', { reason });
       return false;
     } finally {
       this.#busy = false;
       this.#enable();
+      // Buttons lose the focus when they are disabled, as Cancel is now.
+      const isLost = document.activeElement === document.body || document.activeElement === this.#cancel;
+      if (isLost && focused instanceof HTMLElement) focused.focus();
     }
   }
 

@@ -4,11 +4,19 @@ import { text } from '../texts';
 import { FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';
 
+/** Code of the error that cancelled requests are rejected with. */
+const CANCELLED = 'cancelled';
+
+/** Whether a request was rejected since the user cancelled it. */
+export const isCancelled = (error: unknown): boolean => error instanceof RequestError && error.code === CANCELLED;
+
 export interface FinishingEvents {
   /** Receives the edited surface, or undefined if there is none. */
   onChange: (edited: Edited | undefined) => void;
   /** Called after the worker broke, with the surfaces and the reference that it had. */
   onLost: () => void;
+  /** Called after work was cancelled; the reference was lost with it. */
+  onCancelled: () => void;
 }
 
 /**
@@ -55,6 +63,28 @@ export class Finishing {
     const surface = this.#surface;
     const edited = await this.request(kind, body);
     if (surface === this.#surface) this.#adopt(edited);
+  }
+
+  /**
+   * Stops what the worker is doing by replacing it. The new one makes the edits so far again, before anything else that
+   * is asked of it: the same edits give the same bits.
+   */
+  cancel(): void {
+    const client = this.#client;
+    if (!client) return;
+    const { log = [], undone = [] } = this.#edited ?? {};
+    client.restart({ code: CANCELLED, message: text('controls.cancelled') });
+    // Without it, the surface was still being opened.
+    if (this.initial) {
+      const requests = [
+        client.request('open', this.initial),
+        ...[...log, ...undone].map((edit) => client.request('edit', edit)),
+        ...undone.map(() => client.request('undo', undefined)),
+      ];
+      // They fail only if they are cancelled in turn, or if the worker breaks, which its client reports.
+      Promise.all(requests).catch(() => undefined);
+    }
+    this.#events.onCancelled();
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */

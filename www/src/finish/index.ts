@@ -38,6 +38,7 @@ export class Finish {
     this.#finishing = new Finishing(host.mesh, {
       onChange: (edited) => this.#adopt(edited),
       onLost: () => this.#reference.forget(),
+      onCancelled: () => this.#reference.reopen(),
     });
     this.#edits = new EditPanel(this.#finishing, host.view);
     this.#reference = new ReferencePanel(this.#finishing, {

@@ -19,6 +19,12 @@ const VIEW_KEYS: [string, string][] = [
   [text('controls.keyTabName'), text('controls.keyTab')],
 ];
 
+/** Keys of a slice's slider; not all labs have slices. */
+const SLICE_KEYS: [string, string][] = [
+  ['+ − 0', text('controls.keySliceZoom')],
+  ['⇧ ← → ↑ ↓', text('controls.keySlicePan')],
+];
+
 /**
  * Returns the keyboard shortcuts of a lab: those for its run, where `toggleText` describes the space key, then the
  * lab's `own` ones, then undo and redo.
@@ -114,11 +120,13 @@ function shortcutDialog(
   guide: string,
   signal: AbortSignal,
 ): HTMLDialogElement {
-  const rows = [...shortcuts.map(({ shown, text }) => [shown, text]), ...VIEW_KEYS];
+  const row = ([key, text]: [string, string], name = '') =>
+    h('div', { class: name }, h('dt', {}, h('kbd', {}, key)), h('dd', {}, text));
   const list = h(
     'dl',
     { class: 'keys' },
-    ...rows.map(([key = '', text = '']) => h('div', {}, h('dt', {}, h('kbd', {}, key)), h('dd', {}, text))),
+    ...[...shortcuts.map(({ shown, text }): [string, string] => [shown, text]), ...VIEW_KEYS].map((keys) => row(keys)),
+    ...SLICE_KEYS.map((keys) => row(keys, 'slice-keys')),
   );
   const form = h('form', { method: 'dialog' }, h('button', { class: 'primary' }, text('controls.close')));
   const dialog = h(

@@ -474,7 +474,7 @@ mod tests {
     #[test]
     fn eight_thousand_constraints_to_many_digits() {
         let constraints = system(7300, [0.001, 2.0], false);
-        for tolerance in [1e-3, 1e-6, 1e-9] {
+        for tolerance in [1e-3, 1e-9] {
             let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
             let (solution, reported) = solved(&constraints, kernel, tolerance);
             let found = true_residual(&constraints, kernel, &solution);
