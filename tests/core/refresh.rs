@@ -249,6 +249,19 @@ fn voxels_that_have_not_changed_leave_the_surface_as_it_is() {
 }
 
 #[test]
+fn components_that_appear_and_vanish_are_reported_as_such() {
+    let (mut volume, mut model) = ball(0);
+    let island = Region { min: [1; 3], dims: [5; 3] };
+    for (value, expected) in [(200, (1, 0)), (0, (0, 1))] {
+        fill(&mut volume, island, value);
+        model.refresh(&volume, island).unwrap();
+        let events = model.step().unwrap().events;
+        assert_eq!((events.seeds, events.vanished), expected);
+        settle(&mut model, 30);
+    }
+}
+
+#[test]
 fn a_refreshed_run_is_restored_bit_for_bit_with_the_present_volume_only() {
     for levels in [0, 1] {
         let (mut volume, mut model) = ball(levels);
