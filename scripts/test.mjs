@@ -99,7 +99,7 @@ const GROUPS = [
       ['native', cargoTests(['--lib', '--', '--show-output']), 600],
       ['doc tests', cargoTests(['--doc', '--profile', 'dev'], UNOPTIMISED), 60],
       // Has one thread only.
-      ['wasm', cargoTests(['--lib', ...WASM]), 800],
+      ['wasm', cargoTests(['--lib', ...WASM]), 900],
     ],
     [
       ['build', works(build), 700],
