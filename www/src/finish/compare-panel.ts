@@ -136,9 +136,9 @@ export class ReferencePanel {
       await work();
       this.#status.textContent = this.#name ?? '';
     } catch (error) {
+      this.#status.textContent = this.#name ?? '';
       // It is made again then.
       if (isCancelled(error)) return;
-      this.#status.textContent = this.#name ?? '';
       const reason = error instanceof Error ? error.message : String(error);
       this.#error.textContent = text('finish.referenceFailed', { reason });
     }
