@@ -5,7 +5,7 @@
 //! normal. The average is wide enough for the steps of slanted surfaces, whose differences cancel out, to stay smooth.
 
 use super::nets::halves;
-use super::zone::{NONE, Polygon, Zone, within_reach};
+use super::zone::{Polygon, Zone, within_reach};
 use crate::math::Vec3;
 
 /// Number of times that differences are averaged over neighbouring cells; the width of the average, a standard
@@ -70,13 +70,9 @@ impl Zone {
     /// gives, another one gets, so that sums are kept.
     fn averaged(&self, mut gains: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
         for _ in 0..AVERAGES {
-            let next = self.links.iter().enumerate().map(|(i, links)| {
-                let mut sum = gains[i];
-                for &j in links.alike.iter().filter(|&&j| j != NONE) {
-                    let Some(other) = gains.get(j as usize) else { continue };
-                    (0..2).for_each(|k| sum[k] += (other[k] - gains[i][k]) * SHARE);
-                }
-                sum
+            let next = gains.iter().zip(&self.links).map(|(&own, links)| {
+                let others = links.alike.map(|j| gains[j as usize]);
+                [0, 1].map(|k| others.iter().fold(own[k], |sum, other| sum + (other[k] - own[k]) * SHARE))
             });
             gains = next.collect();
         }

@@ -10,8 +10,8 @@ use crate::volume::VolumeError;
 use crate::volume::cube_cases::{EDGES, corner};
 
 /// Number of cells along each side of a block.
-const SIDE: u32 = 8;
-const PER_BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
+pub const BLOCK_SIDE: u32 = 8;
+const PER_BLOCK: usize = (BLOCK_SIDE * BLOCK_SIDE * BLOCK_SIDE) as usize;
 const NONE: u32 = u32::MAX;
 /// Least distance along an edge between the vertices of the labels at its ends, as a share of the gap between labels
 /// twice over.
@@ -148,7 +148,7 @@ impl Cells {
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
-        let blocks = dims.map(|n| n as u32 / SIDE + 1);
+        let blocks = dims.map(|n| n as u32 / BLOCK_SIDE + 1);
         let size = blocks.iter().map(|&n| n as usize).product();
         let mut table = Vec::new();
         table.try_reserve_exact(size).map_err(|_| VolumeError::TooLarge { bytes: 4 * size as u64 })?;
@@ -225,7 +225,7 @@ impl Cells {
             for y in area.low[1]..=area.high[1] {
                 let mut x = area.low[0];
                 while x <= area.high[0] {
-                    let end = (x / SIDE * SIDE + SIDE - 1).min(area.high[0]);
+                    let end = (x / BLOCK_SIDE * BLOCK_SIDE + BLOCK_SIDE - 1).min(area.high[0]);
                     if let Some((block, index)) = self.place([x, y, z])
                         && let Some(slots) = self.slots.get(self.table[block] as usize)
                     {
@@ -237,6 +237,25 @@ impl Cells {
             }
         }
         found
+    }
+
+    /// Returns the index of a block, if it is allocated, from its index along x, y and z.
+    pub fn block(&self, at: [u32; 3]) -> Option<usize> {
+        let index = self.table[self.table_index(at)?];
+        (index != NONE).then_some(index as usize)
+    }
+
+    /// Returns the allocated blocks that have cells of a box: the index of each, and that along x, y and z.
+    pub fn blocks_within(&self, area: &CellBox) -> Vec<(usize, [u32; 3])> {
+        let ranges = [0, 1, 2].map(|axis| area.low[axis] / BLOCK_SIDE..=area.high[axis] / BLOCK_SIDE);
+        let [xs, ys, zs] = &ranges;
+        let all = zs.clone().flat_map(|z| ys.clone().flat_map(move |y| xs.clone().map(move |x| [x, y, z])));
+        all.filter_map(|at| Some((self.block(at)?, at))).collect()
+    }
+
+    /// Returns the slots of the cells of a block, x fastest, with `None` for those that are not stored.
+    pub fn in_block(&self, block: usize) -> impl Iterator<Item = Option<u32>> + '_ {
+        self.slots[block].iter().map(|&slot| (slot != NONE).then_some(slot))
     }
 
     /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass; sets
@@ -335,15 +354,20 @@ impl Cells {
     /// Returns the block of a cell, as an index into `table`, and the cell's index in it.
     #[inline]
     fn place(&self, at: [u32; 3]) -> Option<(usize, usize)> {
-        let block = at.map(|n| n / SIDE);
+        let block = self.table_index(at.map(|n| n / BLOCK_SIDE))?;
+        let [x, y, z] = at.map(|n| (n % BLOCK_SIDE) as usize);
+        let side = BLOCK_SIDE as usize;
+        Some((block, x + side * (y + side * z)))
+    }
+
+    /// Returns the index into `table` of a block, from that along x, y and z; `None` outside of the volume.
+    #[inline]
+    fn table_index(&self, block: [u32; 3]) -> Option<usize> {
         if (0..3).any(|axis| block[axis] >= self.blocks[axis]) {
             return None;
         }
-        let [x, y, z] = at.map(|n| (n % SIDE) as usize);
         let [nx, ny, _] = self.blocks.map(|n| n as usize);
-        let table = block[0] as usize + nx * (block[1] as usize + ny * block[2] as usize);
-        let side = SIDE as usize;
-        Some((table, x + side * (y + side * z)))
+        Some(block[0] as usize + nx * (block[1] as usize + ny * block[2] as usize))
     }
 }
 

@@ -51,6 +51,15 @@ pub fn face(axis: usize, far: bool) -> [usize; 4] {
     [0, b, b | c, c].map(|corner| corner | if far { FAR[axis] } else { 0 })
 }
 
+/// Returns the edges of the near or the far face of a cell along an axis: each from a corner in the order of [`face`] to
+/// the next one.
+pub fn edges_across(axis: usize, far: bool) -> [usize; 4] {
+    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+    // The other two coordinates of an edge along the next axis are the last one and `axis`, and so on.
+    let at = usize::from(far);
+    [edge_at(next, 0, at), edge_at(last, at, 1), edge_at(next, 1, at), edge_at(last, at, 0)]
+}
+
 /// Returns the offset of a corner from the origin of its cell.
 pub fn corner_offset(corner: usize) -> [usize; 3] {
     FAR.map(|bit| usize::from(corner & bit != 0))

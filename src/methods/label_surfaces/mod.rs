@@ -11,6 +11,7 @@
 mod balance;
 mod cells;
 mod coarsen;
+mod components;
 mod counts;
 mod cube_loops;
 mod extract;
@@ -32,6 +33,7 @@ use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
 use crate::remesh::Changes;
 use crate::volume::{Region, Volume, listed};
 use cells::CellBox;
+use components::Components;
 use counts::Counts;
 use label_grid::LabelGrid;
 use nets::Nets;
@@ -67,7 +69,7 @@ pub struct LabelSurfaces {
     counts: Counts,
     /// Those of each label; that of number 1 comes first.
     label_counts: Vec<Counts>,
-    components: usize,
+    components: Components,
     versions: Versions,
     clock: fn() -> f64,
 }
@@ -104,7 +106,7 @@ impl LabelSurfaces {
         let mut surfaces = Self {
             counts: Counts::default(),
             label_counts: Vec::new(),
-            components: nets.components(),
+            components: Components::default(),
             nets,
             params,
             zone: None,
@@ -193,6 +195,7 @@ impl LabelSurfaces {
             self.nets.update(changed)?;
         }
         self.count(&touched, Counts::add);
+        self.components.update(&self.nets.cells, &changed);
         let untangled = if updated.is_ok() { self.nets.untangle(touched) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
         self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
@@ -201,7 +204,6 @@ impl LabelSurfaces {
         updated?;
         self.nets.flag_labels_in(untangled, &mut reconnected);
         self.versions.record(&[], &reconnected);
-        self.components = self.nets.components();
         Ok(())
     }
 
@@ -213,11 +215,14 @@ impl LabelSurfaces {
         self.nets.coarsen(self.params.edge, &area, self.zone.is_some(), reconnected);
     }
 
-    /// Counts again from the beginning, when labels may have other numbers.
+    /// Counts again from the beginning, when labels may have other numbers, and cells other places.
     fn recount(&mut self) {
+        let everywhere = self.nets.everywhere();
         self.counts = Counts::default();
         self.label_counts.clear();
-        self.count(&self.nets.everywhere(), Counts::add);
+        self.count(&everywhere, Counts::add);
+        self.components = Components::default();
+        self.components.update(&self.nets.cells, &everywhere);
     }
 
     /// Adds the counts of the part in a box to those of its labels and of all, or removes them.
@@ -330,7 +335,7 @@ impl LabelSurfaces {
             tolerance: 0.0,
             vertices: vertices as u32,
             triangles: triangles as u32,
-            components: self.components as u32,
+            components: self.components.count() as u32,
             euler: self.counts.euler() as i32,
             events: Changes::default(),
             times,

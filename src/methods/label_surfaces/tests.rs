@@ -32,7 +32,7 @@ fn check(surfaces: &LabelSurfaces, what: &str) {
     assert_eq!([all.positions.len(), all.triangles.len()], counts, "{what}");
     assert_eq!(
         (measures.components, measures.euler),
-        (surfaces.components, surfaces.counts.euler()),
+        (surfaces.components.count(), surfaces.counts.euler()),
         "{what}"
     );
 }
@@ -301,8 +301,8 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
         }
         let anew = LabelSurfaces::new(&volume, None, params.clone()).unwrap();
         assert_eq!(
-            (surfaces.labels(), surfaces.counts, surfaces.components),
-            (anew.labels(), anew.counts, anew.components),
+            (surfaces.labels(), surfaces.counts, surfaces.components.count()),
+            (anew.labels(), anew.counts, anew.components.count()),
             "{what}"
         );
     }
@@ -394,7 +394,7 @@ fn only_labels_asked_for_have_surfaces() {
     assert_eq!(surfaces.labels(), [3.0]);
     assert!(surfaces.mesh(1.0).unwrap().triangles.is_empty());
     assert!(surfaces.mesh(4.0).is_err());
-    assert_eq!(surfaces.components, 1);
+    assert_eq!(surfaces.components.count(), 1);
 }
 
 #[test]
@@ -449,7 +449,7 @@ fn too_many_labels_are_refused_and_change_nothing() {
     let mut most =
         LabelSurfaces::new(&many, Some(some), LabelParams { smoothing: 0, ..LabelParams::default() })
             .unwrap();
-    assert_eq!((most.labels().len(), most.components), (65_535, 65_535));
+    assert_eq!((most.labels().len(), most.components.count()), (65_535, 65_535));
     most.refresh(&many, Region { min: [0; 3], dims }).unwrap();
     most.restore(&most.save()).unwrap();
     assert_eq!(most.mesh(65_535.0).unwrap().components().len(), 1);

@@ -16,7 +16,8 @@ const REACH: f32 = 0.48;
 pub struct Links {
     /// The neighbours along −x, +x, −y, +y, −z and +z that the position moves towards; [`NONE`] if there is none.
     pub towards: [u32; 6],
-    /// Those of them in which the same two labels meet as in this cell, if two do.
+    /// Those of them that move and in which the same two labels meet as in this cell, if two do; the cell itself in place
+    /// of others.
     pub alike: [u32; 6],
 }
 
@@ -59,7 +60,7 @@ impl Zone {
         let mut index = vec![NONE; nets.cells.slots().len()];
         (0..).zip(&slots).for_each(|(i, &slot)| index[slot as usize] = i);
         let cells = |slot: u32| nets.cells.get(slot);
-        let links = slots[..moving].iter().map(|&slot| Self::links_of(nets, cells(slot), &index)).collect();
+        let links = slots[..moving].iter().map(|&slot| Self::links_of(nets, slot, &index, moving)).collect();
         let mut polygons = Vec::new();
         for crossing in all.iter().flat_map(|&slot| nets.crossings(slot)) {
             let mut around = crossing.slots;
@@ -137,17 +138,19 @@ impl Zone {
 
     /// Along a line where three or more labels meet, a cell has only neighbours on that line, if there are two at
     /// least: the line is smoothed by itself, and surfaces do not pull it to one side.
-    fn links_of(nets: &Nets, cell: &Cell, index: &[u32]) -> Links {
+    fn links_of(nets: &Nets, slot: u32, index: &[u32], moving: usize) -> Links {
+        let cell = nets.cells.get(slot);
         let labels = [0, 1, 2, 3, 4, 5].map(|face| labels_on_face(cell, face));
         let is_on_line = labels.iter().filter(|&&labels| labels >= 3).count() >= 2;
         let least = if is_on_line { 3 } else { 2 };
-        let mut links = Links { towards: [NONE; 6], alike: [NONE; 6] };
+        let mut links = Links { towards: [NONE; 6], alike: [index[slot as usize]; 6] };
         let own = pair(cell);
         for (face, _) in labels.iter().enumerate().filter(|&(_, &labels)| labels >= least) {
             let Some(slot) = nets.cells.find(beyond(cell.at, face)) else { continue };
-            links.towards[face] = index[slot as usize];
-            if own.is_some() && pair(nets.cells.get(slot)) == own {
-                links.alike[face] = index[slot as usize];
+            let neighbour = index[slot as usize];
+            links.towards[face] = neighbour;
+            if (neighbour as usize) < moving && own.is_some() && pair(nets.cells.get(slot)) == own {
+                links.alike[face] = neighbour;
             }
         }
         links
