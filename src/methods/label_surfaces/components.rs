@@ -1,7 +1,7 @@
 //! The number of connected components of all surfaces together.
 //!
-//! Each block of cells has its own components, and lists those that pass through its faces. After a change only the
-//! blocks around it are looked at again, and the lists of all blocks are joined.
+//! Each block of cells has its own components, and lists those that pass through its faces. After a change this is
+//! done again for the blocks around it only, and the lists of all blocks are joined.
 
 use super::cells::{BLOCK_SIDE, Cell, CellBox, Cells};
 use super::cube_loops::{cube_loops, edges_across, face};
@@ -84,15 +84,15 @@ impl BlockComponents {
         let mut on_faces: [[Vec<usize>; 2]; 3] = Default::default();
         for (i, cell) in in_block.iter().enumerate() {
             let Some(cell) = cell else { continue };
-            for axis in 0..3 {
+            for (axis, [near_face, far_face]) in on_faces.iter_mut().enumerate() {
                 let stride = side.pow(axis as u32);
                 let place = i / stride % side;
                 let vertices = |far| passing_face(cell, axis, far).map(|vertex| first[i] + vertex);
                 if place == 0 {
-                    on_faces[axis][0].extend(vertices(false));
+                    near_face.extend(vertices(false));
                 }
                 if place == side - 1 {
-                    on_faces[axis][1].extend(vertices(true));
+                    far_face.extend(vertices(true));
                 } else if let Some(next) = in_block[i + stride] {
                     let others = passing_face(next, axis, false).map(|vertex| first[i + stride] + vertex);
                     vertices(true).zip(others).for_each(|(own, other)| sets.union(own, other));
