@@ -111,6 +111,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     refine: 'method',
     restructure: 'method',
     decimate: 'method',
+    decimateWithin: 'method',
     remesh: 'method',
     smooth: 'method',
     transform: 'method',

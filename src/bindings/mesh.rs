@@ -218,16 +218,9 @@ impl RawMesh {
     /// Decimates the mesh by quadric error to at most `target_triangles`, or more if too few edges can be collapsed
     /// safely; see [`decimate`].
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
-        // Truncates a fraction, and saturates a count that no mesh can have.
-        let target = target_triangles as usize;
-        if let MeshKind::Triangles(mesh, _) = &self.0
-            && mesh.triangles.len() <= target
-        {
-            // Already small enough: nothing changes, but an open mesh is still rejected.
-            Mesh::from_triangles(mesh).map_err(Failure::from)?;
-            return Ok(());
+        if let Some((mesh, target)) = self.to_decimate(target_triangles)? {
+            decimate(mesh, target);
         }
-        decimate(self.editable()?, target);
         Ok(())
     }
 
@@ -323,6 +316,23 @@ impl RawMesh {
 
     /// Returns the mesh for editing; a triangle list is replaced by an editable mesh first. An error if the list is not
     /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
+    /// Returns the mesh to be decimated and the target as a whole number; `None` if the mesh has no more triangles already:
+    /// then nothing changes, but an open mesh is still rejected.
+    pub(super) fn to_decimate(
+        &mut self,
+        target_triangles: f64,
+    ) -> Result<Option<(&mut Mesh, usize)>, Failure> {
+        // Truncates a fraction, and saturates a count that no mesh can have.
+        let target = target_triangles as usize;
+        if let MeshKind::Triangles(mesh, _) = &self.0
+            && mesh.triangles.len() <= target
+        {
+            Mesh::from_triangles(mesh)?;
+            return Ok(None);
+        }
+        Ok(Some((self.editable()?, target)))
+    }
+
     pub(super) fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let MeshKind::Triangles(triangles, versions) = &self.0 {
             let mut mesh = Mesh::from_triangles(triangles)?;

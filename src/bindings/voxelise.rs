@@ -1,4 +1,4 @@
-//! Bindings of voxelisation, inside tests, smoothing and transforms of meshes.
+//! Bindings of voxelisation, inside tests, smoothing, bounded decimation and transforms of meshes.
 
 use std::rc::Rc;
 
@@ -10,7 +10,7 @@ use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
 use super::volume::RawVolume;
 use vesicle::mesh::invertible_map;
-use vesicle::remesh::{Smoothing, smooth};
+use vesicle::remesh::{Smoothing, decimate_within, smooth};
 use vesicle::spatial::contains;
 use vesicle::voxelise::{VoxelKind, voxelise};
 
@@ -39,6 +39,16 @@ impl RawMesh {
     pub fn smooth(&mut self, iterations: usize, keep_volume: bool) -> Result<(), JsValue> {
         let smoothing = Smoothing { iterations, keeps_volume: keep_volume };
         Ok(smooth(self.editable()?, smoothing).map_err(Failure::from)?)
+    }
+
+    /// Decimates the mesh as `decimate`, as far as its surface stays within `max_distance` of what it was; see
+    /// [`decimate_within`].
+    #[wasm_bindgen(js_name = decimateWithin)]
+    pub fn decimate_within(&mut self, target_triangles: f64, max_distance: f64) -> Result<(), JsValue> {
+        if let Some((mesh, target)) = self.to_decimate(target_triangles)? {
+            decimate_within(mesh, target, max_distance).map_err(Failure::from)?;
+        }
+        Ok(())
     }
 
     /// Transforms the mesh by a 4 × 4 matrix, column by column.

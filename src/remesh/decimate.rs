@@ -3,12 +3,14 @@
 //!
 //! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns over; no
 //! self-intersections are added, and no component changes sides of another (from inside to outside or back). All of
-//! this is tested before each collapse, intersections exactly. Not guaranteed: a bound on the error.
+//! this is tested before each collapse, intersections exactly. [`decimate_within`] bounds the distance between the mesh
+//! before and after, too.
 
+use super::deviation::Deviation;
 use super::obstacles::Obstacles;
 use crate::math::predicates::collinear;
 use crate::math::{DVec3, Quadric, Vec3, triangle};
-use crate::mesh::{Facet, Mesh, VertexId};
+use crate::mesh::{Facet, Mesh, MeshError, VertexId};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -44,11 +46,36 @@ const WORK_AT_LEAST: u64 = 10_000_000;
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
 /// intersection. The vertex that remains after a collapse has the mean attributes of both ends.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
+    run(mesh, target_triangles, None)
+}
+
+/// Decimates a mesh as [`decimate`], and rejects collapses after which the distance from the mesh before would be
+/// larger than `max_distance`, in the length unit of the mesh: each vertex of the mesh before is within it of the
+/// surface after, and each vertex after is within it of the surface before.
+///
+/// # Errors
+/// [`MeshError::InvalidArgument`] if `max_distance` is negative or not a number; errors of [`TriangleTree::new`].
+///
+/// [`TriangleTree::new`]: crate::spatial::TriangleTree::new
+pub fn decimate_within(
+    mesh: &mut Mesh,
+    target_triangles: usize,
+    max_distance: f64,
+) -> Result<usize, MeshError> {
+    if max_distance.is_nan() || max_distance < 0.0 {
+        let problem = format!("must be at least 0, got {max_distance}");
+        return Err(MeshError::InvalidArgument { parameter: "max_distance", problem });
+    }
+    let deviation = Deviation::new(mesh, max_distance)?;
+    Ok(run(mesh, target_triangles, Some(deviation)))
+}
+
+fn run(mesh: &mut Mesh, target_triangles: usize, deviation: Option<Deviation>) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
     }
     let before = mesh.vertex_count();
-    let mut decimation = Decimation::new(mesh, target_triangles);
+    let mut decimation = Decimation { deviation, ..Decimation::new(mesh, target_triangles) };
     for _ in 0..ROUNDS {
         let vertices = decimation.mesh.vertex_count();
         decimation.queue_all();
@@ -72,6 +99,8 @@ struct Decimation<'a> {
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
+    /// The bound of the distance from the mesh before, if there is one.
+    deviation: Option<Deviation>,
 }
 
 /// An edge to be collapsed, in the priority queue of decimation, ordered by error, then by vertex ids.
@@ -101,6 +130,7 @@ impl<'a> Decimation<'a> {
             stamps: vec![0; mesh.slots()],
             queue: BinaryHeap::new(),
             obstacles: Obstacles::new(mesh, work),
+            deviation: None,
             mesh,
         }
     }
@@ -136,6 +166,10 @@ impl<'a> Decimation<'a> {
             return;
         }
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
+        // Nothing else can be wrong with it: `can_collapse` has been asked.
+        if let Some(deviation) = &mut self.deviation {
+            deviation.collapse(self.mesh, [u, v]);
+        }
         if self.mesh.collapse(u, v, position).is_err() {
             return;
         }
@@ -180,8 +214,8 @@ impl<'a> Decimation<'a> {
     }
 
     /// Returns whether collapsing the edge `uv` into `position` turns no triangle by more than 78°, degenerates none
-    /// and makes none intersect another, moves no component to the other side of the surface, and leaves a valence of
-    /// at most 24.
+    /// and makes none intersect another, moves no component to the other side of the surface, leaves a valence of at
+    /// most 24, and keeps the bound of the distance, if there is one.
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -200,7 +234,8 @@ impl<'a> Decimation<'a> {
                 fresh.push(new);
             }
         }
-        !self.obstacles.blocks(self.mesh, &fresh, &[u, v])
+        self.deviation.as_mut().is_none_or(|deviation| deviation.allows(self.mesh, [u, v], position, &fresh))
+            && !self.obstacles.blocks(self.mesh, &fresh, &[u, v])
     }
 }
 

@@ -13,6 +13,7 @@ mod changes;
 mod clustering;
 mod contact;
 mod decimate;
+mod deviation;
 mod edges;
 mod embedding;
 mod isotropic;
@@ -28,7 +29,7 @@ mod unit_scale;
 
 pub use changes::Changes;
 pub use clustering::clustered;
-pub use decimate::decimate;
+pub use decimate::{decimate, decimate_within};
 pub use embedding::Embedding;
 pub use isotropic::remesh;
 pub use plane_cut::{Plane, cut_by_plane};

@@ -115,6 +115,7 @@ fn signed_distances(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core_tests::common::seeds;
     use crate::math::{DAffine3, DMat3, Random, Vec3, triangle};
     use crate::mesh::shapes::{cuboid, joined, torus};
     use crate::mesh::{Mesh, measure};
@@ -180,9 +181,9 @@ mod tests {
     }
 
     #[test]
-    fn masks_contain_the_centres_with_a_winding_number() {
+    fn masks_of_random_meshes_contain_the_centres_with_a_winding_number() {
         let mut inside = 0;
-        for seed in 0..30 {
+        for seed in seeds(30) {
             let (mesh, like) = (random_mesh(seed), grid([9, 8, 7], oblique(&mut Random::new(seed))));
             let mask = voxelise(&mesh, &like, VoxelKind::Mask { value: 1 }).unwrap().intensities(0).unwrap();
             for (p, found) in centres(&like).into_iter().zip(mask) {
@@ -231,8 +232,8 @@ mod tests {
     }
 
     #[test]
-    fn distances_are_those_of_brute_force() {
-        for seed in 0..9 {
+    fn distances_to_random_meshes_are_those_of_brute_force() {
+        for seed in seeds(9) {
             let (mesh, like) = (random_mesh(seed), grid([9, 8, 7], oblique(&mut Random::new(seed))));
             let found = voxelise(&mesh, &like, VoxelKind::Distance).unwrap().intensities(0).unwrap();
             let points: Vec<Vec3> = centres(&like).into_iter().map(|p| p.as_vec3()).collect();

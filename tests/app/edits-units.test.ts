@@ -51,6 +51,7 @@ function randomEdit(random: () => number, mesh: Mesh): Edit {
   const inside = bounds.min.map((low, k) => low + (0.2 + 0.6 * random()) * ((bounds.max[k] ?? 0) - low));
   const edits: Edit[] = [
     { op: 'decimate', targetTriangles: Math.ceil((0.3 + 0.5 * random()) * triangles) },
+    { op: 'decimateWithin', maxDistance: 0.3 * random() * edge.mean },
     { op: 'remesh', min: edge.mean * (0.6 + 0.3 * random()), max: edge.mean * (1.9 + random()) },
     { op: 'smooth', iterations: Math.floor(8 * random()), keepVolume: random() < 0.5 },
     { op: 'cut', origin: inside as [number, number, number], normal: vector() },

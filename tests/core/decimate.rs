@@ -1,11 +1,12 @@
 //! Decimation: the target is reached, the topology is preserved, nothing intersects, and the shape changes little.
 
 use super::common::scenes;
-use super::common::shapes::HOSTILE_SCALES;
+use super::common::shapes::{HOSTILE_SCALES, cuboid};
 use super::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
-use vesicle::remesh::decimate;
+use vesicle::remesh::{decimate, decimate_within};
+use vesicle::spatial::surface_distance;
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -82,6 +83,9 @@ fn a_noisy_surface_keeps_its_topology() {
     let ratio = measure(&coarse).volume / measure(&mesh).volume;
     assert!((ratio - 1.0).abs() < 0.03, "volume {ratio}");
     decimated(&mesh, 1);
+    // In voxels.
+    let near = [0.05, 0.5].map(|distance| decimated_within(&mesh, 1, distance).triangles.len());
+    assert!(near[1] < near[0] && near[0] < mesh.triangles.len(), "{near:?} of {}", mesh.triangles.len());
 }
 
 /// Two sheets much nearer to each other than the resulting edges are long.
@@ -178,6 +182,60 @@ fn degenerate_meshes_stay_valid() {
     let mut needle = torus_around(Vec3::ZERO, [300, 3], [3.0, 1.0]);
     needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(1e4, 1e-4, 1.0));
     decimated(&needle, 1);
+}
+
+/// Returns the mesh decimated as far as vertices of both surfaces stay within `tolerance` of the other one.
+fn decimated_within(mesh: &TriangleMesh, target: usize, tolerance: f64) -> TriangleMesh {
+    let mut dynamic = Mesh::from_triangles(mesh).unwrap();
+    let collapses = decimate_within(&mut dynamic, target, tolerance).unwrap();
+    assert_eq!(dynamic.check(), Ok(()));
+    let coarse = dynamic.to_triangles();
+    assert!(report(&coarse).unwrap().is_healthy(), "{:?}", report(&coarse));
+    assert_eq!(mesh.triangles.len() - 2 * collapses, coarse.triangles.len());
+    assert_eq!(euler_of_parts(&coarse), euler_of_parts(mesh));
+    let found = surface_distance(mesh, &coarse).unwrap().hausdorff;
+    assert!(found <= tolerance * (1.0 + 1e-6) + 1e-12, "{found}, more than {tolerance}");
+    coarse
+}
+
+#[test]
+fn the_distance_from_the_surface_before_is_bounded() {
+    let shell = torus_around(Vec3::ZERO, [120, 40], [3.0, 1.0]);
+    for mesh in [ball(0.06), shell, surface(&scenes::chain(), 0.5)] {
+        let [low, high] = measure(&mesh).bounds;
+        let size = high.x - low.x;
+        let mut before = mesh.triangles.len();
+        for share in [1e-3, 3e-3, 1e-2] {
+            let count = decimated_within(&mesh, 1, share * size).triangles.len();
+            assert!(count < before, "{count} triangles within {share} of the size, {before} before");
+            before = count;
+        }
+        assert!(before < mesh.triangles.len() / 8, "{before} of {}", mesh.triangles.len());
+        // The target is reached first.
+        let target = mesh.triangles.len() / 2;
+        assert_eq!(decimated_within(&mesh, target, size).triangles.len(), target);
+    }
+}
+
+#[test]
+fn within_no_distance_only_what_is_flat_is_coarsened() {
+    let fine = cuboid([8, 12, 16], Vec3::new(2.0, 3.0, 4.0));
+    let coarse = decimated_within(&fine, 1, 0.0);
+    assert!(coarse.triangles.len() < fine.triangles.len() / 4, "{}", coarse.triangles.len());
+    assert!((measure(&coarse).volume / measure(&fine).volume - 1.0).abs() < 1e-9);
+    let curved = ball(0.2);
+    assert_eq!(decimated_within(&curved, 1, 0.0).triangles.len(), curved.triangles.len());
+}
+
+#[test]
+fn a_distance_that_is_no_distance_is_refused() {
+    let before = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
+    for tolerance in [-1.0, f64::NAN, f64::NEG_INFINITY] {
+        let mut mesh = before.clone();
+        let error = decimate_within(&mut mesh, 1, tolerance).unwrap_err();
+        assert!(error.to_string().contains("max_distance"), "{error}");
+        assert_eq!(mesh, before);
+    }
 }
 
 #[test]

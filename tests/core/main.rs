@@ -9,7 +9,7 @@
 )]
 
 #[path = "../common/mod.rs"]
-mod common;
+pub(crate) mod common;
 
 // Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]

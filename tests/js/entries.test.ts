@@ -20,7 +20,9 @@ import { SPONGE_BITS, spongeBits } from './sponge.js';
 const LABEL_MAPS = ['crop', 'dice', 'frame', 'label', 'labels', 'resample', 'threshold', 'toBytes', 'write'];
 
 /** Members of meshes that only the whole library has. */
-const VOXELISATION = ['contains', 'cut', 'keepComponents', 'removeCavities', 'smooth', 'toVolume', 'transform'];
+const VOXELISATION = [
+  ...['contains', 'cut', 'decimateWithin', 'keepComponents', 'removeCavities', 'smooth', 'toVolume', 'transform'],
+];
 
 type VolumeInit = ConstructorParameters<typeof vesicle.Volume>[0];
 

@@ -144,6 +144,23 @@ test('decimation: a target already met, one out of reach, and open meshes', () =
   for (const target of [1, 2, 3, 1000]) expect(failure(() => open().decimate(target)).code).toBe('not-closed');
 });
 
+test('decimation within a distance, which is that of both surfaces', () => {
+  const before = sphere(1, 0.1);
+  const counts = [0.003, 0.01, 0.03].map((maxDistance) => {
+    const mesh = before.clone();
+    mesh.decimateWithin(maxDistance);
+    expect(mesh.check()).toEqual(HEALTHY);
+    expect(mesh.distanceTo(before).hausdorff).toBeLessThanOrEqual(maxDistance * 1.000001);
+    return mesh.triangleCount;
+  });
+  expect(counts).toEqual([...counts].sort((a, b) => b - a));
+  expect(counts[2]).toBeLessThan(before.triangleCount / 4);
+  const mesh = before.clone();
+  mesh.decimateWithin(1, { targetTriangles: before.triangleCount / 2 });
+  expect(mesh.triangleCount / before.triangleCount).toBeCloseTo(0.5, 2);
+  for (const distance of [0, 1]) expect(failure(() => open().decimateWithin(distance)).code).toBe('not-closed');
+});
+
 test('remeshing: even triangles, the shape kept', () => {
   for (const [mesh, euler] of [
     [sphere(2, 0.2), 2],
@@ -354,6 +371,9 @@ const REFUSED: [string, string, () => unknown][] = [
   ['less than none as a target', 'targetTriangles', () => sphere().decimate(-4)],
   ['NaN as a target', 'targetTriangles', () => sphere().decimate(Number.NaN)],
   ['no target', 'targetTriangles', () => sphere().decimate(wrong(undefined))],
+  ['a distance below 0', 'maxDistance', () => sphere().decimateWithin(-1)],
+  ['an infinite distance', 'maxDistance', () => sphere().decimateWithin(Number.POSITIVE_INFINITY)],
+  ['half a triangle within a distance', 'targetTriangles', () => sphere().decimateWithin(1, { targetTriangles: 0.5 })],
   ['a lower bound of 0', 'edge.min', () => sphere().remesh({ min: 0, max: 1 })],
   ['a lower bound below 0', 'edge.min', () => sphere().remesh({ min: -1, max: 1 })],
   ['NaN as a lower bound', 'edge.min', () => sphere().remesh({ min: Number.NaN, max: 1 })],

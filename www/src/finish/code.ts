@@ -38,6 +38,8 @@ function argumentsOf(edit: Edit): unknown[] {
       return [{ min: edit.min, max: edit.max }];
     case 'decimate':
       return [edit.targetTriangles];
+    case 'decimateWithin':
+      return [edit.maxDistance];
     case 'smooth':
       return [{ iterations: edit.iterations, keepVolume: edit.keepVolume }];
     case 'keepComponents':

@@ -41,10 +41,12 @@ export class EditPanel {
     text('controls.cancel'),
   );
   readonly #decimation: ParamValues = { targetTriangles: 1000 };
+  readonly #bounded: ParamValues = { maxDistance: 0.1 };
   readonly #remeshing: ParamValues = { edge: 1 };
   readonly #smoothing: ParamValues = { iterations: 10, keepVolume: true };
   readonly #cutting: ParamValues = { axis: 'z', position: 50, side: SIDES[0] };
   readonly #decimationForm: ParamControls;
+  readonly #boundedForm: ParamControls;
   readonly #remeshingForm: ParamControls;
   readonly #measuring: HTMLInputElement;
   readonly #choosing: HTMLInputElement;
@@ -58,6 +60,9 @@ export class EditPanel {
     this.#view = view;
     this.#decimationForm = form(this.#decimation, [
       spec('targetTriangles', 'integer', text('finish.triangles'), text('finish.decimateHelp'), { min: 1 }),
+    ]);
+    this.#boundedForm = form(this.#bounded, [
+      spec('maxDistance', 'number', text('finish.distance'), text('finish.boundedHelp'), { min: 0 }),
     ]);
     this.#remeshingForm = form(this.#remeshing, [
       spec('edge', 'number', text('finish.edge'), text('finish.remeshHelp')),
@@ -146,6 +151,9 @@ export class EditPanel {
       group(text('finish.sampling'), this.#decimationForm.element, [
         edit('decimate', text('finish.decimate'), () => ({ op: 'decimate', ...this.#decimation }) as Edit),
       ]),
+      group('', this.#boundedForm.element, [
+        edit('decimate-within', text('finish.bounded'), () => ({ op: 'decimateWithin', ...this.#bounded }) as Edit),
+      ]),
       group('', this.#remeshingForm.element, [edit('remesh', text('finish.remesh'), () => this.#remesh())]),
       group(text('finish.smoothing'), smoothing.element, [
         edit('smooth', text('finish.smooth'), () => ({ op: 'smooth', ...this.#smoothing }) as Edit),
@@ -195,8 +203,10 @@ export class EditPanel {
   /** Proposes half the triangles, and the present length of edges. */
   #suggest({ measures: { info } }: Edited): void {
     this.#decimation.targetTriangles = Math.max(4, Math.round(info.triangles / 2));
+    this.#bounded.maxDistance = Number((info.edge.mean / 10).toPrecision(2));
     this.#remeshing.edge = Number(info.edge.mean.toPrecision(3));
     this.#decimationForm.show(this.#decimation);
+    this.#boundedForm.show(this.#bounded);
     this.#remeshingForm.show(this.#remeshing);
   }
 

@@ -11,7 +11,9 @@ import { Finishing } from './finishing';
 import type { Edit, Edited } from './protocol';
 
 /** Edits that a session may have. */
-const OPERATIONS: Edit['op'][] = ['remesh', 'decimate', 'smooth', 'keepComponents', 'removeCavities', 'cut'];
+const OPERATIONS: Edit['op'][] = [
+  ...(['remesh', 'decimate', 'decimateWithin', 'smooth', 'keepComponents', 'removeCavities', 'cut'] as const),
+];
 
 /** Parts of a lab that the tools use. */
 export interface FinishHost {

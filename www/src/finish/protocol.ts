@@ -5,6 +5,7 @@ import type { Measures, MeshFormat, NamedBytes, Surface, Vec3 } from '../protoco
 export type Edit =
   | { op: 'remesh'; min: number; max: number }
   | { op: 'decimate'; targetTriangles: number }
+  | { op: 'decimateWithin'; maxDistance: number }
   | { op: 'smooth'; iterations: number; keepVolume: boolean }
   | { op: 'keepComponents'; indices: number[] }
   | { op: 'removeCavities' }

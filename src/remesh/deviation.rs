@@ -1,0 +1,95 @@
+//! A bound of the distance between a mesh that is decimated and the mesh before.
+//!
+//! Each vertex of the mesh before has a witness: a triangle of the present mesh within the tolerance of it (Klein,
+//! Liebich & Straßer, *Mesh reduction with error control*, 1996). A collapse is possible if all vertices whose witness
+//! it removes have another one among the new triangles. The vertex that remains has to be within the tolerance of the
+//! mesh before.
+
+use crate::math::{Vec3, triangle};
+use crate::mesh::{Facet, Mesh, MeshError, VertexId};
+use crate::spatial::TriangleTree;
+
+/// The vertices of the mesh before decimation, and their witnesses.
+pub(super) struct Deviation {
+    tolerance: f64,
+    before: TriangleTree,
+    points: Vec<Vec3>,
+    /// The corners of the witness of each point.
+    witnesses: Vec<[u32; 3]>,
+    /// The points whose witness has a vertex as its first corner, by its slot.
+    at: Vec<Vec<u32>>,
+    /// The points whose witnesses the collapse tested last removes, and their new ones.
+    found: Vec<(u32, [u32; 3])>,
+}
+
+impl Deviation {
+    /// Creates the bound `tolerance`, in the length unit of the mesh, of the distance from the present mesh.
+    ///
+    /// # Errors
+    /// As [`TriangleTree::new`].
+    pub fn new(mesh: &Mesh, tolerance: f64) -> Result<Self, MeshError> {
+        let mut deviation = Self {
+            tolerance,
+            before: TriangleTree::new(&mesh.to_triangles())?,
+            points: Vec::new(),
+            witnesses: Vec::new(),
+            at: vec![Vec::new(); mesh.slots()],
+            found: Vec::new(),
+        };
+        for v in mesh.vertices() {
+            if let Some((a, b)) = mesh.ring(v).pairs().next() {
+                deviation.at[v.index()].push(deviation.points.len() as u32);
+                deviation.points.push(mesh.position(v));
+                deviation.witnesses.push([v.0, a.0, b.0]);
+            }
+        }
+        Ok(deviation)
+    }
+
+    /// Returns whether the distance stays within the tolerance if the edge `uv` is collapsed into `position`, which
+    /// replaces the triangles around it by `fresh`.
+    pub fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
+        if !self.before.is_within(position, self.tolerance) {
+            return false;
+        }
+        self.found.clear();
+        let reach = self.tolerance * self.tolerance;
+        for w in around(mesh, [u, v]) {
+            for &point in &self.at[w.index()] {
+                if !is_removed(&self.witnesses[point as usize], [u, v]) {
+                    continue;
+                }
+                let p = self.points[point as usize].as_dvec3();
+                let is_witness = |facet: &&Facet| triangle::distance_squared(facet.points, p) <= reach;
+                let Some(witness) = fresh.iter().find(is_witness) else { return false };
+                self.found.push((point, witness.corners));
+            }
+        }
+        true
+    }
+
+    /// Follows the collapse of the edge `uv` that was tested last, before it is made.
+    pub fn collapse(&mut self, mesh: &Mesh, edge: [VertexId; 2]) {
+        for w in around(mesh, edge) {
+            let witnesses = &self.witnesses;
+            self.at[w.index()].retain(|&point| !is_removed(&witnesses[point as usize], edge));
+        }
+        for &(point, witness) in &self.found {
+            self.witnesses[point as usize] = witness;
+            self.at[witness[0] as usize].push(point);
+        }
+    }
+}
+
+/// Returns the ends of an edge and their neighbours, which are the corners of all triangles that its collapse removes
+/// or replaces.
+fn around(mesh: &Mesh, edge: [VertexId; 2]) -> Vec<VertexId> {
+    let mut vertices = edge.to_vec();
+    mesh.add_neighbours(&mut vertices);
+    vertices
+}
+
+/// Returns whether a collapse of an edge removes or replaces the triangle with the given corners.
+fn is_removed(corners: &[u32; 3], edge: [VertexId; 2]) -> bool {
+    edge.iter().any(|end| corners.contains(&end.0))
+}
