@@ -67,15 +67,15 @@ pub fn decimate_within(
         return Err(MeshError::InvalidArgument { parameter: "max_distance", problem });
     }
     let deviation = Deviation::new(mesh, max_distance)?;
-    Ok(run(mesh, target_triangles, Some(deviation)))
+    Ok(run(mesh, target_triangles, Some(Box::new(deviation))))
 }
 
-fn run(mesh: &mut Mesh, target_triangles: usize, deviation: Option<Deviation>) -> usize {
+fn run(mesh: &mut Mesh, target_triangles: usize, condition: Option<Box<dyn Condition>>) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
     }
     let before = mesh.vertex_count();
-    let mut decimation = Decimation { deviation, ..Decimation::new(mesh, target_triangles) };
+    let mut decimation = Decimation { condition, ..Decimation::new(mesh, target_triangles) };
     for _ in 0..ROUNDS {
         let vertices = decimation.mesh.vertex_count();
         decimation.queue_all();
@@ -86,6 +86,15 @@ fn run(mesh: &mut Mesh, target_triangles: usize, deviation: Option<Deviation>) -
     }
     mesh.reorder();
     before - mesh.vertex_count()
+}
+
+/// A condition of collapses beside safety. Modules without [`decimate_within`] have no code of its only kind.
+pub(super) trait Condition {
+    /// Returns whether the edge `uv` may be collapsed into `position`, which replaces the triangles around it by `fresh`.
+    fn allows(&mut self, mesh: &Mesh, edge: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool;
+
+    /// Adopts the collapse of the edge that was allowed last, before it is made.
+    fn adopt(&mut self, mesh: &Mesh, edge: [VertexId; 2]);
 }
 
 struct Decimation<'a> {
@@ -99,8 +108,8 @@ struct Decimation<'a> {
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
-    /// The bound of the distance from the mesh before, if there is one.
-    deviation: Option<Deviation>,
+    /// A further condition of collapses, if there is one.
+    condition: Option<Box<dyn Condition>>,
 }
 
 /// An edge to be collapsed, in the priority queue of decimation, ordered by error, then by vertex ids.
@@ -130,7 +139,7 @@ impl<'a> Decimation<'a> {
             stamps: vec![0; mesh.slots()],
             queue: BinaryHeap::new(),
             obstacles: Obstacles::new(mesh, work),
-            deviation: None,
+            condition: None,
             mesh,
         }
     }
@@ -167,8 +176,8 @@ impl<'a> Decimation<'a> {
         }
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         // Nothing else can be wrong with it: `can_collapse` has been asked.
-        if let Some(deviation) = &mut self.deviation {
-            deviation.collapse(self.mesh, [u, v]);
+        if let Some(condition) = &mut self.condition {
+            condition.adopt(self.mesh, [u, v]);
         }
         if self.mesh.collapse(u, v, position).is_err() {
             return;
@@ -215,7 +224,7 @@ impl<'a> Decimation<'a> {
 
     /// Returns whether collapsing the edge `uv` into `position` turns no triangle by more than 78°, degenerates none
     /// and makes none intersect another, moves no component to the other side of the surface, leaves a valence of at
-    /// most 24, and keeps the bound of the distance, if there is one.
+    /// most 24, and meets the further condition, if there is one.
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -234,7 +243,7 @@ impl<'a> Decimation<'a> {
                 fresh.push(new);
             }
         }
-        self.deviation.as_mut().is_none_or(|deviation| deviation.allows(self.mesh, [u, v], position, &fresh))
+        self.condition.as_mut().is_none_or(|condition| condition.allows(self.mesh, [u, v], position, &fresh))
             && !self.obstacles.blocks(self.mesh, &fresh, &[u, v])
     }
 }

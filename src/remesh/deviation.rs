@@ -5,6 +5,7 @@
 //! it removes have another one among the new triangles. The vertex that remains has to be within the tolerance of the
 //! mesh before.
 
+use super::decimate::Condition;
 use crate::math::{Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
 use crate::spatial::TriangleTree;
@@ -45,10 +46,10 @@ impl Deviation {
         }
         Ok(deviation)
     }
+}
 
-    /// Returns whether the distance stays within the tolerance if the edge `uv` is collapsed into `position`, which
-    /// replaces the triangles around it by `fresh`.
-    pub fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
+impl Condition for Deviation {
+    fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
         if !self.before.is_within(position, self.tolerance) {
             return false;
         }
@@ -68,8 +69,7 @@ impl Deviation {
         true
     }
 
-    /// Follows the collapse of the edge `uv` that was tested last, before it is made.
-    pub fn collapse(&mut self, mesh: &Mesh, edge: [VertexId; 2]) {
+    fn adopt(&mut self, mesh: &Mesh, edge: [VertexId; 2]) {
         for w in around(mesh, edge) {
             let witnesses = &self.witnesses;
             self.at[w.index()].retain(|&point| !is_removed(&witnesses[point as usize], edge));
