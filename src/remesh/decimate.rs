@@ -46,7 +46,7 @@ const WORK_AT_LEAST: u64 = 10_000_000;
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
 /// intersection. The vertex that remains after a collapse has the mean attributes of both ends.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
-    run(mesh, target_triangles, None)
+    run(mesh, target_triangles, Box::new(Unconditional))
 }
 
 /// Decimates a mesh as [`decimate`], and rejects collapses after which the distance from the mesh before would be
@@ -67,15 +67,15 @@ pub fn decimate_within(
         return Err(MeshError::InvalidArgument { parameter: "max_distance", problem });
     }
     let deviation = Deviation::new(mesh, max_distance)?;
-    Ok(run(mesh, target_triangles, Some(Box::new(deviation))))
+    Ok(run(mesh, target_triangles, Box::new(deviation)))
 }
 
-fn run(mesh: &mut Mesh, target_triangles: usize, condition: Option<Box<dyn Condition>>) -> usize {
+fn run(mesh: &mut Mesh, target_triangles: usize, condition: Box<dyn Condition>) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
     }
     let before = mesh.vertex_count();
-    let mut decimation = Decimation { condition, ..Decimation::new(mesh, target_triangles) };
+    let mut decimation = Decimation::new(mesh, target_triangles, condition);
     for _ in 0..ROUNDS {
         let vertices = decimation.mesh.vertex_count();
         decimation.queue_all();
@@ -88,13 +88,25 @@ fn run(mesh: &mut Mesh, target_triangles: usize, condition: Option<Box<dyn Condi
     before - mesh.vertex_count()
 }
 
-/// A condition of collapses beside safety. Modules without [`decimate_within`] have no code of its only kind.
+/// A condition of collapses beside safety. Called through a table, so that modules without [`decimate_within`] have no
+/// code of [`Deviation`].
 pub(super) trait Condition {
     /// Returns whether the edge `uv` may be collapsed into `position`, which replaces the triangles around it by `fresh`.
     fn allows(&mut self, mesh: &Mesh, edge: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool;
 
     /// Adopts the collapse of the edge that was allowed last, before it is made.
     fn adopt(&mut self, mesh: &Mesh, edge: [VertexId; 2]);
+}
+
+/// Allows all collapses.
+struct Unconditional;
+
+impl Condition for Unconditional {
+    fn allows(&mut self, _: &Mesh, _: [VertexId; 2], _: Vec3, _: &[Facet]) -> bool {
+        true
+    }
+
+    fn adopt(&mut self, _: &Mesh, _: [VertexId; 2]) {}
 }
 
 struct Decimation<'a> {
@@ -108,8 +120,8 @@ struct Decimation<'a> {
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
-    /// A further condition of collapses, if there is one.
-    condition: Option<Box<dyn Condition>>,
+    /// A further condition of collapses.
+    condition: Box<dyn Condition>,
 }
 
 /// An edge to be collapsed, in the priority queue of decimation, ordered by error, then by vertex ids.
@@ -129,7 +141,7 @@ struct Candidate {
 type RatedPosition = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
-    fn new(mesh: &'a mut Mesh, target: usize) -> Self {
+    fn new(mesh: &'a mut Mesh, target: usize, condition: Box<dyn Condition>) -> Self {
         let origin = mesh.vertices().next().map_or(DVec3::ZERO, |v| mesh.position(v).as_dvec3());
         let work = WORK_AT_LEAST + WORK_PER_TRIANGLE * mesh.triangle_count() as u64;
         Self {
@@ -139,7 +151,7 @@ impl<'a> Decimation<'a> {
             stamps: vec![0; mesh.slots()],
             queue: BinaryHeap::new(),
             obstacles: Obstacles::new(mesh, work),
-            condition: None,
+            condition,
             mesh,
         }
     }
@@ -176,9 +188,7 @@ impl<'a> Decimation<'a> {
         }
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         // Nothing else can be wrong with it: `can_collapse` has been asked.
-        if let Some(condition) = &mut self.condition {
-            condition.adopt(self.mesh, [u, v]);
-        }
+        self.condition.adopt(self.mesh, [u, v]);
         if self.mesh.collapse(u, v, position).is_err() {
             return;
         }
@@ -224,7 +234,7 @@ impl<'a> Decimation<'a> {
 
     /// Returns whether collapsing the edge `uv` into `position` turns no triangle by more than 78°, degenerates none
     /// and makes none intersect another, moves no component to the other side of the surface, leaves a valence of at
-    /// most 24, and meets the further condition, if there is one.
+    /// most 24, and meets the further condition.
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -243,7 +253,7 @@ impl<'a> Decimation<'a> {
                 fresh.push(new);
             }
         }
-        self.condition.as_mut().is_none_or(|condition| condition.allows(self.mesh, [u, v], position, &fresh))
+        self.condition.allows(self.mesh, [u, v], position, &fresh)
             && !self.obstacles.blocks(self.mesh, &fresh, &[u, v])
     }
 }
@@ -300,7 +310,7 @@ mod tests {
     #[test]
     fn the_best_place_comes_first() {
         let mut mesh = Mesh::icosphere(Vec3::splat(100.0), 1.0, 0.3).unwrap();
-        let decimation = Decimation::new(&mut mesh, 4);
+        let decimation = Decimation::new(&mut mesh, 4, Box::new(Unconditional));
         for (u, v) in decimation.mesh.edges() {
             let positions = decimation.positions(u, v);
             assert_eq!(positions.len(), 4);
