@@ -42,10 +42,14 @@ test('edits change the surface, its measures and the saved files; undo and redo'
   await app.page.locator('.finish').getByLabel('Target').fill('400');
   await press('decimate');
   await expect.poll(async () => (await measures(app.page)).triangles).toBeLessThanOrEqual(400);
+  const { triangles } = await measures(app.page);
+  await app.page.locator('.finish').getByLabel('Largest distance').fill('0.5');
+  await press('decimate-within');
+  await expect.poll(async () => (await measures(app.page)).triangles).toBeLessThan(triangles);
   const edited = await measures(app.page);
   expect(edited).toMatchObject({ components: 1, closed: true, oriented: true, crossings: 0 });
   expect(Mesh.parse(await saved('[data-export=ply]')).triangleCount).toBe(edited.triangles);
-  for (let edits = 3; edits > 0; edits--) {
+  for (let edits = 4; edits > 0; edits--) {
     await press('undo');
     await expect.poll(async () => (await log()).length).toBe(edits - 1);
   }
