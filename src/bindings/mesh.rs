@@ -218,7 +218,7 @@ impl RawMesh {
     /// Decimates the mesh by quadric error to at most `target_triangles`, or more if too few edges can be collapsed
     /// safely; see [`decimate`].
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
-        if let Some((mesh, target)) = self.to_decimate(target_triangles)? {
+        if let Some((mesh, target)) = self.larger_than(target_triangles)? {
             decimate(mesh, target);
         }
         Ok(())
@@ -314,11 +314,9 @@ impl RawMesh {
         }
     }
 
-    /// Returns the mesh for editing; a triangle list is replaced by an editable mesh first. An error if the list is not
-    /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
-    /// Returns the mesh to be decimated and the target as a whole number; `None` if the mesh has no more triangles already:
-    /// then nothing changes, but an open mesh is still rejected.
-    pub(super) fn to_decimate(
+    /// Returns the mesh, to be decimated, and the target as a whole number; `None` if the mesh has no more triangles than
+    /// that: then nothing changes, but an open mesh is still rejected.
+    pub(super) fn larger_than(
         &mut self,
         target_triangles: f64,
     ) -> Result<Option<(&mut Mesh, usize)>, Failure> {
@@ -333,6 +331,8 @@ impl RawMesh {
         Ok(Some((self.editable()?, target)))
     }
 
+    /// Returns the mesh for editing; a triangle list is replaced by an editable mesh first. An error if the list is not
+    /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
     pub(super) fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let MeshKind::Triangles(triangles, versions) = &self.0 {
             let mut mesh = Mesh::from_triangles(triangles)?;

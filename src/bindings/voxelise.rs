@@ -45,7 +45,7 @@ impl RawMesh {
     /// [`decimate_within`].
     #[wasm_bindgen(js_name = decimateWithin)]
     pub fn decimate_within(&mut self, target_triangles: f64, max_distance: f64) -> Result<(), JsValue> {
-        if let Some((mesh, target)) = self.to_decimate(target_triangles)? {
+        if let Some((mesh, target)) = self.larger_than(target_triangles)? {
             decimate_within(mesh, target, max_distance).map_err(Failure::from)?;
         }
         Ok(())

@@ -89,19 +89,21 @@ test('a reference is compared in both directions, also after an edit; a bad file
   expect(csv).toMatch(/^direction,mean,rms,p95,hausdorff\ntoReference,/);
 });
 
-test('a long edit can be cancelled: the edits before it, their undo and the reference stay', async () => {
+test('a long edit can be cancelled: the edits before it, their undo and references stay', async () => {
   const [before, edits] = [await measures(app.page), await log()];
   const surface = await saved('[data-export=ply]');
   const edge = app.page.locator('.finish').getByLabel('Edge length');
   const given = await edge.inputValue();
   await edge.fill('0.06');
   await press('remesh');
+  // Waits for the edit, and is read after it was cancelled.
+  await choose('other.ply', surface);
   await press('cancel');
   const status = app.page.locator('[data-finish=status]');
   await expect.poll(() => status.textContent()).toBe('Cancelled. Nothing has changed.');
   expect(await app.page.isDisabled('[data-finish=cancel]')).toBe(true);
   expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('Remesh');
-  await expect.poll(() => app.page.locator('[data-reference=status]').textContent()).toBe('own.ply');
+  await expect.poll(() => app.page.locator('[data-reference=status]').textContent()).toBe('other.ply');
   expect(await measures(app.page)).toEqual(before);
   expect(Buffer.from(await saved('[data-export=ply]')).equals(surface)).toBe(true);
   expect(await log()).toEqual(edits);

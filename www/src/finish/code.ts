@@ -31,22 +31,22 @@ export function callOf(edit: Edit): string {
   return `${edit.op}(${argumentsOf(edit).map(literal).join(', ')})`;
 }
 
-/** Returns the arguments of an edit, and nothing else: a log may come from a file of anyone. */
+type Arguments = { [Op in Edit['op']]: (edit: Extract<Edit, { op: Op }>) => unknown[] };
+
+/** The arguments of each edit, and nothing else: a log may come from a file of anyone. */
+const ARGUMENTS: Arguments = {
+  remesh: ({ min, max }) => [{ min, max }],
+  decimate: ({ targetTriangles }) => [targetTriangles],
+  decimateWithin: ({ maxDistance }) => [maxDistance],
+  smooth: ({ iterations, keepVolume }) => [{ iterations, keepVolume }],
+  keepComponents: ({ indices }) => [indices],
+  removeCavities: () => [],
+  cut: ({ origin, normal }) => [{ origin, normal }],
+};
+
+/** Returns whether a session may have an edit of this name. */
+export const isEdit = (op: string): boolean => Object.hasOwn(ARGUMENTS, op);
+
 function argumentsOf(edit: Edit): unknown[] {
-  switch (edit.op) {
-    case 'remesh':
-      return [{ min: edit.min, max: edit.max }];
-    case 'decimate':
-      return [edit.targetTriangles];
-    case 'decimateWithin':
-      return [edit.maxDistance];
-    case 'smooth':
-      return [{ iterations: edit.iterations, keepVolume: edit.keepVolume }];
-    case 'keepComponents':
-      return [edit.indices];
-    case 'removeCavities':
-      return [];
-    case 'cut':
-      return [{ origin: edit.origin, normal: edit.normal }];
-  }
+  return (ARGUMENTS[edit.op] as (edit: Edit) => unknown[])(edit);
 }

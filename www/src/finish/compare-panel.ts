@@ -41,6 +41,8 @@ export class ReferencePanel {
   #name: string | undefined;
   /** Files of the reference. */
   #files: File[] = [];
+  /** Files of a reference that is being read. */
+  #reading: File[] | undefined;
   #comparison: Comparison | undefined;
   #enabled = false;
   /** Counts comparisons, so that only the newest is shown. */
@@ -93,11 +95,13 @@ export class ReferencePanel {
     this.clear();
   }
 
-  /** Reads the reference again, for a worker that has lost it. */
+  /** Reads the reference again, and one that was being read, for a worker that has lost them. */
   reopen(): void {
-    if (this.#name === undefined) return;
+    const lost = this.#name === undefined ? [] : [this.#files];
+    if (this.#reading) lost.push(this.#reading);
+    if (lost.length === 0) return;
     this.forget();
-    void this.#open(this.#files);
+    for (const files of lost) void this.#open(files);
   }
 
   /** Compares the present surface with the reference, if there is one. */
@@ -121,7 +125,9 @@ export class ReferencePanel {
 
   async #open(files: File[]): Promise<void> {
     await this.#attempt(async () => {
+      this.#reading = files;
       await this.#finishing.request('reference', await readFiles(files));
+      if (this.#reading === files) this.#reading = undefined;
       this.#name = nameOf(files);
       this.#files = files;
       this.#label.replaceChildren();
@@ -139,6 +145,7 @@ export class ReferencePanel {
       this.#status.textContent = this.#name ?? '';
       // It is made again then.
       if (isCancelled(error)) return;
+      this.#reading = undefined;
       const reason = error instanceof Error ? error.message : String(error);
       this.#error.textContent = text('finish.referenceFailed', { reason });
     }

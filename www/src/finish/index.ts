@@ -4,16 +4,12 @@ import type { Measures, MeshFormat } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
+import { isEdit } from './code';
 import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
 import type { EditedView } from './edited-view';
 import { Finishing } from './finishing';
 import type { Edit, Edited } from './protocol';
-
-/** Edits that a session may have. */
-const OPERATIONS: Edit['op'][] = [
-  ...(['remesh', 'decimate', 'decimateWithin', 'smooth', 'keepComponents', 'removeCavities', 'cut'] as const),
-];
 
 /** Parts of a lab that the tools use. */
 export interface FinishHost {
@@ -88,7 +84,7 @@ export class Finish {
   /** Makes edits of a session again, also those that were undone there, which can be redone then. */
   async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
     for (const edit of [...edits, ...undone]) {
-      if (!OPERATIONS.includes(edit.op)) throw new Error(text('sessions.badIndex'));
+      if (!isEdit(edit.op)) throw new Error(text('sessions.badIndex'));
       await this.#finishing.change('edit', edit);
     }
     for (const _ of undone) await this.#finishing.change('undo', undefined);
