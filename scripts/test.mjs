@@ -128,13 +128,16 @@ const LONG = [
   [
     [
       ['features', works(checkFeatures), 120],
+      ['app long', vitest('tests/app', 'long'), 600],
+      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--ignored']), 900],
+    ],
+    [
       [
         'slow',
         cargoTests(['--release', '--lib', '--', '--ignored', '--show-output', '--skip', 'write_seeds', ...SLOW]),
         900,
       ],
       ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '4' } }), 900],
-      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--ignored']), 900],
     ],
   ],
 ];

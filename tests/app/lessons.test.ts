@@ -1,12 +1,10 @@
 /** Lessons in the browser: done by the interface, opened from files and addresses, saved, printed, and in German. */
-import { readFileSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import type { Dialog } from 'playwright-core';
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { at } from '../../scripts/shell.mjs';
-import { type Lesson, parseLesson } from '../../www/src/lessons/lesson';
 import { type App, drop, openApp, overflow, reach } from './browser';
+import { doLesson, ticked as tickedIn } from './lesson-steps';
 
 let app: App;
 
@@ -21,14 +19,9 @@ afterEach(() => {
 const panel = () => app.page.locator('#lesson');
 const step = () => panel().locator('.lesson-step');
 const answerField = () => step().getByRole('textbox');
-const ticked = () => step().locator('[data-ticked]').waitFor({ timeout: 240_000 });
+const ticked = () => tickedIn(app);
 const next = () => step().getByRole('button', { name: 'Next' }).click();
 const complete = () => panel().locator('.lesson-steps button', { hasText: '✓' }).count();
-
-function lessonOf(id: string): Lesson {
-  const file = (name: string) => readFileSync(at(`www/public/lessons/${id}/${name}`), 'utf8');
-  return parseLesson({ 'lesson.json': file('lesson.json'), 'text.en.md': file('text.en.md') }, 'en');
-}
 
 async function goTo(address: string): Promise<void> {
   await app.page.goto('about:blank');
@@ -142,23 +135,7 @@ describe('topology and χ, by the interface of the lab alone', () => {
   });
 });
 
-describe.each(['coarse-to-fine', 'forces', 'regularisation', 'heart', 'detail'])('%s', (id) => {
-  const lesson = lessonOf(id);
-
-  test('is ticked step by step with its settings', { timeout: 900_000 }, async () => {
-    await goTo(`?lesson=${id}#extract?example=linked-rings&v=2`);
-    await reach(app.page, 'done');
-    for (const { check, open, title } of lesson.steps) {
-      await step().getByRole('heading', { name: title }).waitFor();
-      if (check) expect(await step().locator('[data-ticked]').count(), title).toBe(0);
-      if (check && open) await step().getByRole('button', { name: 'Do it for me' }).click();
-      if (check) await ticked();
-      await step()
-        .getByRole('button', { name: 'Next' })
-        .evaluate((button: HTMLButtonElement) => button.click());
-    }
-  });
-});
+test('detail on a base is ticked step by step with its settings', () => doLesson(app, 'detail'));
 
 describe('lessons of the user', () => {
   const data = {

@@ -6,6 +6,9 @@ const at = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 /** Tests that count frames, measure how soon a page responds, or pause a run that takes a second. */
 const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
 
+/** Whole figures and lessons, and other people's programs: for `npm run test:all`. */
+const LONG = ['**/*.long.test.ts'];
+
 export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
   resolve: {
@@ -25,11 +28,15 @@ export default defineConfig({
       // Two files at a time: a page that waits for its worker, or for a test, leaves a core free.
       {
         extends: true,
-        test: { name: 'together', exclude: ALONE, maxWorkers: 2, sequence: { groupOrder: 0 } },
+        test: { name: 'together', exclude: [...ALONE, ...LONG], maxWorkers: 2, sequence: { groupOrder: 0 } },
       },
       {
         extends: true,
         test: { name: 'alone', include: ALONE, fileParallelism: false, sequence: { groupOrder: 1 } },
+      },
+      {
+        extends: true,
+        test: { name: 'long', include: LONG, maxWorkers: 2, sequence: { groupOrder: 2 } },
       },
     ],
   },
