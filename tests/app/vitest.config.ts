@@ -6,7 +6,7 @@ const at = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 /** Tests that count frames, measure how soon a page responds, or pause a run that takes a second. */
 const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
 
-/** Whole figures and lessons, and other people's programs: for `npm run test:all`. */
+/** Whole figures and lessons, and third-party programs: for `npm run test:all`. */
 const LONG = ['**/*.long.test.ts'];
 
 export default defineConfig({
