@@ -120,6 +120,11 @@ const GROUPS = [
 /** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
 const SLOW = ['scenes::', 'tracking::', 'fuzz'];
 
+const skipping = (filters) => filters.flatMap((filter) => ['--skip', filter]);
+
+/** Filters of tests that take minutes natively, and are not run in wasm. */
+const ONLY_NATIVE = ['of_the_papers_size', 'a_head_phantom', 'nine_more_radii', 'valid_for_long', 'depth_three'];
+
 /** Filters of tests with random input, which run with more of it. */
 const RANDOM = ['fuzz::', 'random_'];
 
@@ -129,7 +134,8 @@ const LONG = [
     [
       ['features', works(checkFeatures), 120],
       ['app long', vitest('tests/app', 'long'), 600],
-      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--ignored']), 900],
+      // The runner runs ignored tests only with all others.
+      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--include-ignored', ...skipping(ONLY_NATIVE)]), 1200],
     ],
     [
       [

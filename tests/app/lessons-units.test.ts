@@ -3,9 +3,9 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { describe, expect, test } from 'vitest';
 import { EXAMPLES } from '../../www/src/examples';
-import { type Check, checkProblem, holds, type Operand } from '../../www/src/lessons/check';
+import { type Check, checkProblem, holds, type Operand, unmetPart } from '../../www/src/lessons/check';
 import { type LessonFiles, parseLesson } from '../../www/src/lessons/lesson';
-import { isAnswered, isComplete, type Progress, parseNumber } from '../../www/src/lessons/progress';
+import { isAnswered, isComplete, numbersFrom, type Progress } from '../../www/src/lessons/progress';
 import type { LabReading } from '../../www/src/lessons/reading';
 import { PRESETS } from '../../www/src/presets';
 import { CLOUDS } from '../../www/src/reconstruct/examples';
@@ -55,6 +55,16 @@ describe('a condition', () => {
   ])('%j is %s', (check, expected) => {
     expect(checkProblem(check, ['first', 'later'])).toBeUndefined();
     expect(holds(check, READING, RECORDS)).toBe(expected);
+  });
+
+  test('says which part of it is not true first', () => {
+    const unmet = (check: Check) => unmetPart(check, READING, RECORDS);
+    const [example, state] = [{ example: 'ovule' }, { state: 'paused' }];
+    expect(unmet({ all: [{ lab: 'extract' }, example, state] })).toBe(example);
+    expect(unmet({ all: [{ lab: 'extract' }, { all: [state, example] }] })).toBe(state);
+    expect(unmet({ any: [state, example] })).toEqual({ any: [state, example] });
+    expect(unmet({ not: { state: 'done' } })).toEqual({ not: { state: 'done' } });
+    expect(unmet({ state: 'done' })).toBeUndefined();
   });
 
   test.each<[unknown, RegExp]>([
@@ -130,8 +140,19 @@ describe('progress', () => {
   const step = (id: string, more: object) => ({ id, language: 'en', title: '', parts: {}, ...more });
 
   test('numbers are read with point or comma, and either minus sign', () => {
-    expect(['1.5', '1,5', ' −4 ', '-4', '1e3'].map(parseNumber)).toEqual([1.5, 1.5, -4, -4, 1000]);
-    expect([parseNumber(''), parseNumber('ten')]).toEqual([Number.NaN, Number.NaN]);
+    expect(['1.5', '1,5', ' −4 ', '-4', '1e3'].map(numbersFrom)).toEqual([[1.5], [1.5], [-4], [-4], [1000]]);
+    expect([numbersFrom(''), numbersFrom('ten'), numbersFrom('-')]).toEqual([[], [], []]);
+  });
+
+  test('digits may be in groups of three', () => {
+    expect(numbersFrom('15,540')).toEqual([15.54, 15540]);
+    expect(numbersFrom('15.540')).toEqual([15.54, 15540]);
+    for (const typed of ['15 540', '15’540', '15\u202f540']) expect(numbersFrom(typed)).toEqual([15540]);
+    expect(numbersFrom('−1,234,567')).toEqual([-1234567]);
+    expect(numbersFrom('1.234.567,8')).toEqual([1234567.8]);
+    expect(numbersFrom('1,234.5')).toEqual([1234.5]);
+    expect(numbersFrom('1,23')).toEqual([1.23]);
+    expect(numbersFrom('1,2345')).toEqual([1.2345]);
   });
 
   test('an answer is compared with a number or a recorded measure; words are right unless missing', () => {

@@ -48,6 +48,18 @@ describe('topology and χ, by the interface of the lab alone', () => {
     expect(new URL(app.page.url()).searchParams.get('lesson')).toBe('topology');
   });
 
+  test('a step that is not ticked says why', async () => {
+    const missing = () => panel().locator('.lesson-check .help').textContent();
+    expect(await missing()).toMatch(/^Not yet\. The example “Figure 24: .*” is not open\.$/);
+  });
+
+  test('the page is not longer for what the panel hides', async () => {
+    const { page } = app;
+    await panel().getByText('Results', { exact: true }).click();
+    expect(await page.evaluate(() => document.documentElement.scrollHeight - innerHeight)).toBeLessThanOrEqual(0);
+    await panel().getByText('Results', { exact: true }).click();
+  });
+
   test('a step is ticked and announced when the lab shows what it expects, and a wrong answer is told from a right one', async () => {
     expect(await step().locator('[data-ticked]').count()).toBe(0);
     await choose('figure-24');
@@ -56,7 +68,9 @@ describe('topology and χ, by the interface of the lab alone', () => {
     await answer('12');
     await step().getByText('Not yet. The hint may help.').waitFor();
     const measured = JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
-    await answer(String(1.5 * measured.triangles));
+    // As the table writes numbers, and with the button, which does not move away when the pointer leaves the field.
+    await answerField().fill((1.5 * measured.triangles).toLocaleString('en'));
+    await step().getByRole('button', { name: 'Check' }).click();
     await step().getByText('Right.').waitFor();
     expect(await complete()).toBe(1);
   });
@@ -127,9 +141,13 @@ describe('topology and χ, by the interface of the lab alone', () => {
     expect(await sheet.textContent()).toContain('Expected number: 81');
   });
 
-  test('start again deletes ticks and answers', async () => {
+  test('start again deletes ticks and answers, once that is confirmed', async () => {
     await goTo('?lesson=topology#extract?example=linked-rings&v=2');
     await panel().getByText('Results', { exact: true }).click();
+    app.page.once('dialog', (dialog) => dialog.dismiss());
+    await panel().getByRole('button', { name: 'Start again' }).click();
+    expect(await complete()).toBe(6);
+    app.page.once('dialog', (dialog) => dialog.accept());
     await panel().getByRole('button', { name: 'Start again' }).click();
     expect(await complete()).toBe(0);
   });

@@ -90,8 +90,11 @@ fn a_plane_beside_the_mesh() {
     let ball = ball(1.0);
     let whole = cut(&ball, plane([0.0, 0.0, 1.5], [0.0, 0.0, 1.0])).unwrap();
     assert_eq!(whole.positions, ball.positions);
+    let lowest = ball.positions.iter().map(|p| f64::from(p.z)).fold(f64::MAX, f64::min);
     for wrong in [
         plane([0.0, 0.0, -1.5], [0.0, 0.0, 1.0]),
+        // Touched by one vertex.
+        plane([0.0, 0.0, lowest], [0.0, 0.0, 1.0]),
         plane([0.0; 3], [0.0; 3]),
         plane([f64::NAN, 0.0, 0.0], [1.0, 0.0, 0.0]),
         plane([0.0; 3], [f64::INFINITY, 0.0, 0.0]),

@@ -99,6 +99,13 @@ export function holds(check: Check, reading: LabReading, records: Records): bool
   });
 }
 
+/** Returns the first part of a condition that is not true; undefined if all of it is. */
+export function unmetPart(check: Check, reading: LabReading, records: Records): Check | undefined {
+  if (holds(check, reading, records)) return undefined;
+  const parts = (check.all ?? []) as Check[];
+  return parts.map((one) => unmetPart(one, reading, records)).find((one) => one !== undefined) ?? check;
+}
+
 /** Returns the names of the measures and parameters that a condition is about. */
 export function namesIn(check: Check): { kind: 'measure' | 'param'; name: string }[] {
   const list = (check.all ?? check.any ?? (check.not ? [check.not] : undefined)) as Check[] | undefined;

@@ -2,7 +2,7 @@
 import { plural, text } from '../texts';
 import { h, uniqueId } from '../ui/dom';
 import { download } from '../ui/files';
-import { holds, namesIn } from './check';
+import { type Check, holds, namesIn, unmetPart } from './check';
 import { shownValue } from './format';
 import type { Lesson, Step } from './lesson';
 import {
@@ -13,8 +13,9 @@ import {
   type Progress,
   recordsOf,
   saveProgress,
+  type Tick,
 } from './progress';
-import { labelIn, readLab, watchLab } from './reading';
+import { type LabReading, labelIn, labelOfExample, readLab, watchLab } from './reading';
 import { resultsFile } from './results';
 import { partsOf, prose } from './step';
 
@@ -28,6 +29,7 @@ export class LessonView {
   readonly #news = h('p', { class: 'visually-hidden', role: 'status' });
   readonly #complete = h('p', { class: 'help' });
   readonly #finished = h('p', { class: 'lesson-finished', role: 'status' });
+  readonly #saved = h('p', { class: 'help', role: 'status' }, text('lessons.saveHelp'));
   readonly #closing = new AbortController();
   /** Element with the present values of what the step's condition is about. */
   #now: HTMLElement | undefined;
@@ -83,7 +85,7 @@ export class LessonView {
     return h(
       'button',
       { type: 'button', title: label, 'aria-label': label, 'aria-current': current, onclick: () => this.#go(index) },
-      complete ? '✓' : String(index + 1),
+      complete ? `${index + 1} ✓` : String(index + 1),
     );
   }
 
@@ -135,14 +137,8 @@ export class LessonView {
     if (!check) return;
     const reading = readLab(this.#lab);
     const tick = this.#progress.ticks[id];
-    // Those at the time of the tick, which the lab may have left since.
-    const measures = tick?.measures ?? reading.measures;
-    const facts = namesIn(check).map(({ kind, name }) => {
-      const value = (kind === 'measure' ? measures : reading.params)[name];
-      return text('lessons.fact', { name: labelIn(this.#lab, kind, name), value: shownValue(value) });
-    });
-    const state = text(tick ? 'lessons.ticked' : 'lessons.unticked');
-    if (this.#now) this.#now.textContent = [state, [...new Set(facts)].join(', ')].filter(Boolean).join(' ');
+    if (this.#now)
+      this.#now.textContent = tick ? this.#tickedText(check, tick, reading) : this.#missing(check, reading);
     if (tick || !holds(check, reading, recordsOf(this.#progress))) return;
     this.#progress.ticks[id] = { at: new Date().toISOString(), link: location.href, measures: reading.measures };
     this.#save();
@@ -151,10 +147,34 @@ export class LessonView {
     this.#test();
   }
 
+  #tickedText(check: Check, { measures }: Tick, reading: LabReading): string {
+    // Those at the time of the tick, which the lab may have left since.
+    return `${text('lessons.ticked')} ${this.#facts(check, { ...reading, measures })}`.trim();
+  }
+
+  /** Returns why the step is not ticked yet: what is not open, or not done, and the values that are to change. */
+  #missing(check: Check, reading: LabReading): string {
+    const { lab, example, state } = unmetPart(check, reading, recordsOf(this.#progress)) ?? {};
+    const reason =
+      (lab !== undefined && text('lessons.labNotOpen', { lab: nameOfLab(String(lab)) })) ||
+      (example !== undefined && text('lessons.exampleNotOpen', { name: labelOfExample(this.#lab, String(example)) })) ||
+      (state === 'done' && text('lessons.notDone'));
+    const isElsewhere = lab !== undefined || example !== undefined;
+    return [text('lessons.unticked'), reason, !isElsewhere && this.#facts(check, reading)].filter(Boolean).join(' ');
+  }
+
+  #facts(check: Check, { measures, params }: LabReading): string {
+    const facts = namesIn(check).map(({ kind, name }) => {
+      const value = (kind === 'measure' ? measures : params)[name];
+      return text('lessons.fact', { name: labelIn(this.#lab, kind, name), value: shownValue(value) });
+    });
+    return [...new Set(facts)].join(', ');
+  }
+
   #question(step: Step, part: HTMLElement): HTMLElement {
     const asked = part.querySelector<HTMLElement>('.prose') ?? part;
     asked.id = uniqueId('question');
-    const feedback = h('p', { class: 'help', role: 'status' });
+    const feedback = h('p', { class: 'help lesson-feedback', role: 'status' });
     const attributes = { 'aria-labelledby': asked.id };
     const field =
       step.question === 'text'
@@ -165,13 +185,21 @@ export class LessonView {
       feedback.textContent = isAsked ? this.#feedback(step) : '';
       feedback.toggleAttribute('data-right', isAsked && isAnswered(step, this.#progress));
     };
-    field.addEventListener('change', () => {
+    const commit = () => {
       this.#progress.answers[step.id] = field.value;
       this.#save();
       tell(true);
-    });
+    };
+    field.addEventListener('change', commit);
     tell(field.value !== '');
-    part.append(field, feedback);
+    const label = text(step.question === 'text' ? 'lessons.keepAnswer' : 'lessons.checkAnswer');
+    const form = h('form', { class: 'lesson-answer' }, field, h('button', {}, label));
+    form.addEventListener('submit', (event) => {
+      event.preventDefault();
+      commit();
+      feedback.scrollIntoView({ block: 'nearest' });
+    });
+    part.append(form, feedback);
     return part;
   }
 
@@ -198,7 +226,7 @@ export class LessonView {
       this.#complete,
       h('div', { class: 'row stacked' }, h('label', { for: id }, text('lessons.name')), name),
       h('button', { type: 'button', onclick: () => this.#saveResults() }, text('lessons.save')),
-      h('p', { class: 'help' }, text('lessons.saveHelp')),
+      this.#saved,
       h('p', {}, sheet('sheet', text('lessons.sheet')), ' · ', sheet('teacher', text('lessons.teacher'))),
       h('button', { type: 'button', onclick: () => this.#startAgain() }, text('lessons.again')),
       h('p', { class: 'help' }, text('lessons.againHelp')),
@@ -208,13 +236,16 @@ export class LessonView {
   #saveResults(): void {
     download(
       `${this.#lesson.id}-results.html`,
-      new TextEncoder().encode(resultsFile(this.#lesson, this.#progress)),
+      new TextEncoder().encode(
+        resultsFile(this.#lesson, this.#progress, (name) => labelIn(this.#lab, 'measure', name)),
+      ),
       'text/html',
     );
-    this.#news.textContent = plural('lessons.saved', completeSteps(this.#lesson, this.#progress));
+    this.#saved.textContent = plural('lessons.saved', completeSteps(this.#lesson, this.#progress));
   }
 
   #startAgain(): void {
+    if (!window.confirm(text('lessons.againConfirm'))) return;
     this.#progress = { step: 0, name: this.#progress.name, ticks: {}, answers: {} };
     this.#go(0);
   }
@@ -228,5 +259,7 @@ function sheetAddress(address: string, view: string): string {
   url.searchParams.set('view', view);
   return url.href;
 }
+
+const nameOfLab = (lab: string) => document.querySelector(`#labs [data-lab="${CSS.escape(lab)}"]`)?.textContent ?? lab;
 
 const isPresent = (element: HTMLElement | undefined): element is HTMLElement => element !== undefined;

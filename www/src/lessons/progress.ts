@@ -46,9 +46,19 @@ export function recordsOf({ ticks }: Progress): Records {
   return Object.fromEntries(Object.entries(ticks).map(([id, tick]) => [id, tick?.measures]));
 }
 
-/** Parses a number as typed by a student: with a decimal point or comma, and with a minus sign of either kind. */
-export function parseNumber(typed: string): number {
-  return typed.trim() === '' ? Number.NaN : Number(typed.trim().replace('−', '-').replace(',', '.'));
+/** A number with its digits in groups of three, and decimals with the other separator. */
+const GROUPED = /^(-?\d{1,3}([.,])\d{3}(?:\2\d{3})*)(?:(?!\2)[.,](\d+))?$/;
+
+/**
+ * Returns the numbers that a student may mean, with a decimal point or comma, and a minus sign of either kind: the comma
+ * of "15,540" begins decimals or groups digits.
+ */
+export function numbersFrom(typed: string): number[] {
+  const plain = typed.replace('−', '-').replace(/[\s'’]/g, '');
+  if (plain === '') return [];
+  const [, whole, , decimals = '0'] = GROUPED.exec(plain) ?? [];
+  const grouped = whole && Number(`${whole.replace(/[.,]/g, '')}.${decimals}`);
+  return [Number(plain.replace(',', '.')), Number(grouped ?? Number.NaN)].filter((one) => !Number.isNaN(one));
 }
 
 /** Tests whether the answer to a step's question is right; any text is right as an answer in words. */
@@ -56,7 +66,8 @@ export function isAnswered({ id, question }: Step, progress: Progress): boolean 
   const typed = progress.answers[id]?.trim() ?? '';
   if (!question || question === 'text') return !question || typed !== '';
   const expected = Number(operandValue(question.answer, recordsOf(progress)));
-  return Math.abs(parseNumber(typed) - expected) <= (question.within ?? 0);
+  const { within = 0 } = question;
+  return numbersFrom(typed).some((number) => Math.abs(number - expected) <= within);
 }
 
 /** Tests whether a step is complete: its condition was true, and its question is answered. */

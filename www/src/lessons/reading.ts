@@ -71,6 +71,11 @@ export function labelIn(root: HTMLElement, kind: 'measure' | 'param', name: stri
   return label?.textContent?.trim() || name;
 }
 
+/** Returns the name under which the lab offers an example; its id if it does not offer it. */
+export function labelOfExample(root: HTMLElement, id: string): string {
+  return root.querySelector(`.data select option[value="${CSS.escape(id)}"]`)?.textContent ?? id;
+}
+
 /**
  * Calls `callback`, at most once per animation frame, whenever what the lab in `root` shows may have changed, until
  * `signal` is aborted.

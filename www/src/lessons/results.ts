@@ -8,8 +8,8 @@ import { completeSteps, isAnswered, isComplete, type Progress } from './progress
 const STYLE = `body { font: 15px/1.5 system-ui, sans-serif; max-width: 48em; margin: 2em auto; padding: 0 1em }
 section { border-top: 1px solid #bbb } dl { display: grid; grid-template-columns: auto 1fr; gap: 0 1em } dd { margin: 0 }`;
 
-/** Returns the results as an HTML file. */
-export function resultsFile(lesson: Lesson, progress: Progress): string {
+/** Returns the results as an HTML file; `label` returns that of a measure by its name. */
+export function resultsFile(lesson: Lesson, progress: Progress, label: (measure: string) => string): string {
   const page = document.implementation.createHTMLDocument(text('lessons.resultsOf', { title: lesson.title }));
   page.documentElement.lang = lesson.language;
   // Within JSON, this is the same character, but ends no element.
@@ -19,7 +19,7 @@ export function resultsFile(lesson: Lesson, progress: Progress): string {
     h('h1', {}, page.title),
     h('p', {}, progress.name),
     h('p', {}, text('lessons.progress', { done: completeSteps(lesson, progress), steps: lesson.steps.length })),
-    ...lesson.steps.map((step) => stepResult(step, progress)),
+    ...lesson.steps.map((step, index) => stepResult(step, index + 1, progress, label)),
     h('script', { type: 'application/json', id: 'results' }, data),
   );
   // As an element, this page's security policy would forbid the style.
@@ -38,10 +38,10 @@ function resultsData(lesson: Lesson, progress: Progress): unknown {
   return { lesson: lesson.id, title: lesson.title, name: progress.name, saved: new Date().toISOString(), steps };
 }
 
-function stepResult(step: Step, progress: Progress): HTMLElement {
+function stepResult(step: Step, number: number, progress: Progress, label: (measure: string) => string): HTMLElement {
   const tick = progress.ticks[step.id];
   const measures = Object.entries(tick?.measures ?? {}).flatMap(([name, value]) => [
-    h('dt', {}, name),
+    h('dt', {}, label(name)),
     h('dd', {}, shownValue(value)),
   ]);
   const answer = step.question && [
@@ -51,7 +51,11 @@ function stepResult(step: Step, progress: Progress): HTMLElement {
   return h(
     'section',
     {},
-    h('h2', {}, `${isComplete(step, progress) ? '✓' : '○'} ${step.title}`),
+    h(
+      'h2',
+      {},
+      `${isComplete(step, progress) ? '✓' : '○'} ${text('lessons.stepTitle', { number, title: step.title })}`,
+    ),
     ...(tick
       ? [
           h(
