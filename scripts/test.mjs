@@ -111,7 +111,7 @@ const GROUPS = [
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', 'together'), 900],
+      ['app', vitest('tests/app', 'together'), 700],
     ],
   ],
   [[['app alone', vitest('tests/app', 'alone'), 200]]],
@@ -132,7 +132,7 @@ const RANDOM = ['fuzz::', 'random_'];
 const LONG = [
   [
     [
-      ['features', works(checkFeatures), 120],
+      ['features', works(checkFeatures), 300],
       ['app long', vitest('tests/app', 'long'), 600],
       // The runner runs ignored tests only with all others.
       ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--include-ignored', ...skipping(ONLY_NATIVE)]), 1200],
