@@ -111,7 +111,7 @@ const GROUPS = [
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', 'together'), 700],
+      ['app', vitest('tests/app', 'together'), 900],
     ],
   ],
   [[['app alone', vitest('tests/app', 'alone'), 200]]],

@@ -43,7 +43,13 @@ mod label_surfaces;
 mod labels;
 #[cfg(feature = "processing")]
 mod mesh;
-#[cfg(feature = "processing")]
+#[cfg(any(
+    feature = "deformable",
+    feature = "implicit",
+    feature = "tracking",
+    feature = "multires",
+    feature = "labels"
+))]
 mod method;
 #[cfg(feature = "multires")]
 mod multires;
