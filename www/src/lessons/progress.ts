@@ -57,8 +57,9 @@ export function numbersFrom(typed: string): number[] {
   const plain = typed.replace('−', '-').replace(/[\s'’]/g, '');
   if (plain === '') return [];
   const [, whole, , decimals = '0'] = GROUPED.exec(plain) ?? [];
-  const grouped = whole && Number(`${whole.replace(/[.,]/g, '')}.${decimals}`);
-  return [Number(plain.replace(',', '.')), Number(grouped ?? Number.NaN)].filter((one) => !Number.isNaN(one));
+  const readings = [plain.replace(',', '.')];
+  if (whole) readings.push(`${whole.replace(/[.,]/g, '')}.${decimals}`);
+  return readings.map(Number).filter((one) => !Number.isNaN(one));
 }
 
 /** Tests whether the answer to a step's question is right; any text is right as an answer in words. */
