@@ -31,7 +31,7 @@ const only = (method) => ({
 /** The readers of files alone, which have glue of another name, since they have other classes. */
 const READERS = { target: 'target', name: 'import/vesicle_bg', features: ['import'], glue: 'files' };
 
-const MODULES = [WHOLE, PLAIN, ...METHODS.map(only), READERS];
+const MODULES = [WHOLE, ...METHODS.map(only), READERS];
 
 /** Folder of a module's glue, and of the module as the glue needs it. */
 const folder = ({ name }) => at('target/modules', name);
@@ -133,7 +133,7 @@ async function optimise(module) {
   await rm(`${module}.opt`);
 }
 
-async function assemble() {
+async function assemble(modules) {
   await rm(at('pkg'), { recursive: true, force: true });
   await mkdir(at('pkg'));
   for (const file of ['vesicle.js', 'vesicle.d.ts']) await copyFile(join(folder(WHOLE), file), at('pkg', file));
@@ -142,22 +142,24 @@ async function assemble() {
     const module = MODULES.find(({ name }) => name.startsWith(`${entry}/`));
     return join(folder(module), glueName(module));
   });
-  for (const module of MODULES) await copyFile(optimised(module), at('pkg', `${module.name}.wasm`));
+  for (const module of modules) await copyFile(optimised(module), at('pkg', `${module.name}.wasm`));
   await makeInline();
   await makeElement();
   await writeNotices('pkg/licences.txt', 'element');
   for (const file of PAPERS) await cp(at(file), at('pkg', file), { recursive: true });
-  await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
+  await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(modules), null, 2)}\n`);
 }
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
+
+const file = ({ name }) => [`./${name}.wasm`, `./${name}.wasm`];
 
 const entry = (part) => [
   [`./${part}`, { types: `./${part}/index.d.ts`, default: `./${part}/index.js` }],
   [`./${part}/vesicle_bg.wasm`, `./${part}/vesicle_bg.wasm`],
 ];
 
-async function manifest() {
+async function manifest(modules) {
   const { description, license, version, engines, devDependencies } = JSON.parse(
     await readFile(at('package.json'), 'utf8'),
   );
@@ -184,20 +186,23 @@ async function manifest() {
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
       './zarr': { types: './zarr/index.d.ts', default: './zarr/index.js' },
       './element': { types: './element/index.d.ts', default: './element.js' },
-      './vesicle_bg.wasm': './vesicle_bg.wasm',
-      './vesicle_plain_bg.wasm': './vesicle_plain_bg.wasm',
+      ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(file)),
       './package.json': './package.json',
     },
   };
 }
 
-/** The whole package; fast where nothing changed. */
-export async function build() {
+/**
+ * The whole package, or all but its module without vector instructions, which needs a compilation of its own; fast
+ * where nothing changed.
+ */
+export async function build({ plain = true } = {}) {
   const started = performance.now();
   const sources = await sourceHash();
-  await Promise.all(MODULES.map((module) => make(module, sources)));
-  await compareGlue();
-  await assemble();
+  const modules = plain ? [...MODULES, PLAIN] : MODULES;
+  await Promise.all(modules.map((module) => make(module, sources)));
+  if (plain) await compareGlue();
+  await assemble(modules);
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;
   say('pkg', `${Math.round(size / 1000)} kB of wasm, ${((performance.now() - started) / 1000).toFixed(1)} s`);
 }

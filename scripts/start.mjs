@@ -14,7 +14,8 @@ async function listen() {
 
 await script(async () => {
   await setup({ browser: false });
-  await build();
+  // The app needs vector instructions.
+  await build({ plain: false });
   await buildApp();
   const { address } = await listen();
   say('ready', address);

@@ -55,23 +55,28 @@ const cargoTests = (args, options) => async () => {
 /** Examples in the documentation are small: most of the time is that of compiling the library for them. */
 const UNOPTIMISED = { env: { CARGO_PROFILE_DEV_OPT_LEVEL: '0', CARGO_PROFILE_DEV_DEBUG: '0' } };
 
-/** Returns a stage that runs the tests of a folder, or those of one project of its configuration. */
-const vitest = (folder, project) => async () => {
-  const report = at('target', `${[folder.replace('/', '-'), project].filter(Boolean).join('-')}.json`);
-  await rm(report, { force: true });
-  const config = at(folder, 'vitest.config.ts');
-  const args = [
-    ...['run', '--dir', at(folder)],
-    ...['--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
-    // A busy machine is slow, not wrong.
-    ...(existsSync(config) ? ['--config', config] : ['--testTimeout=300000']),
-    ...(project ? ['--project', project] : []),
-  ];
-  const { code, output } = await run(tool('vitest'), args, { echo });
-  if (!existsSync(report)) return { passed: 0, failed: 1, output };
-  const { numPassedTests, numFailedTests } = JSON.parse(await readFile(report, 'utf8'));
-  return { output, ...atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests }) };
-};
+/** Files of tests that only `npm run test:all` runs. */
+const LONG_FILES = '**/*.long.test.ts';
+
+/** Returns a stage that runs the tests of a folder which further arguments of the runner select. */
+const vitest =
+  (folder, ...selection) =>
+  async () => {
+    const report = at('target', `${[folder, ...selection].join('-').replaceAll(/[^\w-]+/g, '-')}.json`);
+    await rm(report, { force: true });
+    const config = at(folder, 'vitest.config.ts');
+    const args = [
+      ...['run', '--dir', at(folder)],
+      ...['--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
+      // A busy machine is slow, not wrong.
+      ...(existsSync(config) ? ['--config', config] : ['--testTimeout=300000']),
+      ...selection,
+    ];
+    const { code, output } = await run(tool('vitest'), args, { echo });
+    if (!existsSync(report)) return { passed: 0, failed: 1, output };
+    const { numPassedTests, numFailedTests } = JSON.parse(await readFile(report, 'utf8'));
+    return { output, ...atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests }) };
+  };
 
 // A run that does not compile, or crashes, fails without reporting how many tests did not run.
 function atLeastOneFailed(code, { passed, failed }) {
@@ -102,23 +107,23 @@ const GROUPS = [
       ['wasm', cargoTests(['--lib', ...WASM]), 900],
     ],
     [
-      ['build', works(build), 700],
+      ['build', works(() => build({ plain: false })), 700],
       ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
       ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
-      ['package', vitest('tests/js'), 200],
+      ['package', vitest('tests/js', `--exclude=${LONG_FILES}`), 200],
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', 'together'), 900],
+      ['app', vitest('tests/app', '--project=together', '--tags-filter=!long'), 900],
     ],
   ],
-  [[['app alone', vitest('tests/app', 'alone'), 200]]],
+  [[['app alone', vitest('tests/app', '--project=alone'), 200]]],
 ];
 
-/** Filters of the core's tests that are ignored for their duration; others need files that are not in the repository. */
-const SLOW = ['scenes::', 'tracking::', 'fuzz'];
+/** Filters of the core's ignored tests that write files, or need files that are not in the repository. */
+const BY_HAND = ['::write_', 'elsewhere::'];
 
 const skipping = (filters) => filters.flatMap((filter) => ['--skip', filter]);
 
@@ -133,17 +138,20 @@ const LONG = [
   [
     [
       ['features', works(checkFeatures), 300],
-      ['app long', vitest('tests/app', 'long'), 600],
+      ['whole build', works(build), 400],
+      ['package long', vitest('tests/js', '.long.test'), 30],
+      ['app long', vitest('tests/app', '--project=long'), 600],
+      ['app more', vitest('tests/app', '--project=together', '--tags-filter=long'), 500],
       // The runner runs ignored tests only with all others.
-      ['slow wasm', cargoTests(['--lib', ...WASM, '--', '--include-ignored', ...skipping(ONLY_NATIVE)]), 1200],
+      [
+        'slow wasm',
+        cargoTests(['--lib', ...WASM, '--', '--include-ignored', ...skipping([...ONLY_NATIVE, ...BY_HAND])]),
+        1200,
+      ],
     ],
     [
-      [
-        'slow',
-        cargoTests(['--release', '--lib', '--', '--ignored', '--show-output', '--skip', 'write_seeds', ...SLOW]),
-        900,
-      ],
-      ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '4' } }), 900],
+      ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 600],
+      ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 900],
     ],
   ],
 ];

@@ -269,6 +269,7 @@ mod tests {
 
     /// Sheets that nearly touch, needles and flat parts: nothing intersects, and the volume of each component is kept.
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn nothing_intersects() {
         let mut held_volumes = 0;
         for seed in 0..24 {

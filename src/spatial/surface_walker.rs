@@ -184,6 +184,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn walks_on_a_ball_end_at_the_closest_point() {
         let walker = ball();
         let mut random = Random::new(5);

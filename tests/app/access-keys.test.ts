@@ -1,6 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, LABS, open, openApp, QUICK, reach, unfold } from './browser';
+import { inOneLab } from './long';
 import { changes, showsAgain } from './pixels';
 
 const SLICED = ['extract', 'track', 'segment'];
@@ -76,22 +77,29 @@ async function walk(key: string, controls: string[]): Promise<string[]> {
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('can be traversed with Tab in light and dark mode, with a visible focus at each stop', async () => {
+  beforeAll(async () => {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
     await unfold(app.page);
-    const controls = await numberControls(app.page);
-    expect(controls.length).toBeGreaterThan(20);
-    const all = controls.map((_, i) => String(i));
-    await app.page.emulateMedia({ colorScheme: 'light' });
-    expect(await walk('Tab', controls)).toEqual(all);
-    // No keyboard trap at the end: the focus leaves the page and enters it again.
-    await app.page.keyboard.press('Tab');
-    expect(['BODY', '0']).toContain((await focused(app.page)).number);
-    await app.page.locator(`[data-number="${controls.length - 1}"]`).focus();
-    await app.page.emulateMedia({ colorScheme: 'dark' });
-    expect(await walk('Shift+Tab', controls.slice(1))).toEqual(all.slice(0, -1).reverse());
   });
+
+  test(
+    'can be traversed with Tab in light and dark mode, with a visible focus at each stop',
+    inOneLab(lab),
+    async () => {
+      const controls = await numberControls(app.page);
+      expect(controls.length).toBeGreaterThan(20);
+      const all = controls.map((_, i) => String(i));
+      await app.page.emulateMedia({ colorScheme: 'light' });
+      expect(await walk('Tab', controls)).toEqual(all);
+      // No keyboard trap at the end: the focus leaves the page and enters it again.
+      await app.page.keyboard.press('Tab');
+      expect(['BODY', '0']).toContain((await focused(app.page)).number);
+      await app.page.locator(`[data-number="${controls.length - 1}"]`).focus();
+      await app.page.emulateMedia({ colorScheme: 'dark' });
+      expect(await walk('Shift+Tab', controls.slice(1))).toEqual(all.slice(0, -1).reverse());
+    },
+  );
 
   test('returns the focus when the keyboard shortcuts are closed', async () => {
     for (const opener of ['#help', 'canvas[tabindex]']) {

@@ -15,6 +15,7 @@ import {
   reach,
   recordStates,
 } from './browser';
+import { inOneLab } from './long';
 import { countColors, showsAgain } from './pixels';
 import { ball } from './volumes';
 
@@ -54,7 +55,7 @@ async function turns(count: number): Promise<void> {
 }
 
 describe.each(LABS)('the %s lab', (lab) => {
-  test('renders its view again after a lost WebGL context is restored', async () => {
+  test('renders its view again after a lost WebGL context is restored', inOneLab(lab), async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     await page.locator('canvas[tabindex]').first().press('Home');
@@ -74,6 +75,8 @@ describe.each(LABS)('the %s lab', (lab) => {
   });
 
   test('refuses files with false headers, and keeps the previous data', async () => {
+    await openLab(QUICK[lab]);
+    await reach(page, 'done');
     const before = await measures(page);
     const states = await recordStates(page);
     for (const file of hostile(lab)) {
@@ -88,7 +91,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await states()).not.toContain('running');
   });
 
-  test('survives random key presses and changes of the example', async () => {
+  test('survives random key presses and changes of the example', inOneLab(lab), async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     const keys = [' ', 's', 'd', 'r', 'Control+z', 'Control+y', 'Escape', ' ', 'ArrowLeft'];
@@ -121,7 +124,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await reach(page, 'paused');
   });
 
-  test('runs without WebGL 2 and without any storage, and says what is missing', async () => {
+  test('runs without WebGL 2 and without any storage, and says what is missing', inOneLab(lab), async () => {
     await openLab(QUICK[lab], () => {
       const { getContext } = HTMLCanvasElement.prototype as { getContext: (...given: unknown[]) => unknown };
       Object.assign(HTMLCanvasElement.prototype, {
@@ -151,6 +154,7 @@ describe.each(LABS)('the %s lab', (lab) => {
   // Segment, whose surfaces follow strokes alone, has a test of its own.
   test.skipIf(lab === 'segment')(
     'keeps the last surface when its worker crashes during a run, and restarts',
+    inOneLab(lab),
     async () => {
       // The two balls are done with the first surface that is shown.
       await openLab(lab === 'reconstruct' ? lab : QUICK[lab], () => {
@@ -189,6 +193,7 @@ describe.each(LABS)('the %s lab', (lab) => {
 
   test.skipIf(lab === 'segment')(
     'continues or pauses in a hidden tab, and shows everything when it becomes visible',
+    inOneLab(lab),
     async () => {
       await openLab(QUICK[lab], () => {
         // As in a background tab, animation frames stop.

@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, anotherPage, LABS, open, openApp, QUICK, reach } from './browser';
+import { inOneLab } from './long';
 
 let app: App;
 
@@ -224,15 +225,17 @@ describe('a plot', () => {
     expect(iterations).toBe(`Iteration ${curves[0]}`);
   });
 
-  test.each(LABS.filter((lab) => lab !== 'segment'))('each in the %s lab has a button that saves it', async (lab) => {
-    const page = await anotherPage(app);
-    await open({ page, address: app.address }, QUICK[lab]);
-    await reach(page, 'done');
-    const figures = page.locator('figure:has(.plot)');
-    expect(await figures.count()).toBeGreaterThan(0);
-    expect(await figures.getByRole('button', { name: /^Save as SVG: ./, includeHidden: true }).count()).toBe(
-      await figures.count(),
-    );
-    await page.close();
+  describe.each(LABS.filter((lab) => lab !== 'segment'))('in the %s lab', (lab) => {
+    test('each has a button that saves it', inOneLab(lab), async () => {
+      const page = await anotherPage(app);
+      await open({ page, address: app.address }, QUICK[lab]);
+      await reach(page, 'done');
+      const figures = page.locator('figure:has(.plot)');
+      expect(await figures.count()).toBeGreaterThan(0);
+      expect(await figures.getByRole('button', { name: /^Save as SVG: ./, includeHidden: true }).count()).toBe(
+        await figures.count(),
+      );
+      await page.close();
+    });
   });
 });

@@ -5,6 +5,7 @@ import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, drop, openApp, overflow, reach } from './browser';
 import { doLesson, ticked as tickedIn } from './lesson-steps';
+import { LONG } from './long';
 
 let app: App;
 
@@ -153,7 +154,7 @@ describe('topology and χ, by the interface of the lab alone', () => {
   });
 });
 
-test('detail on a base is ticked step by step with its settings', () => doLesson(app, 'detail'));
+test('detail on a base is ticked step by step with its settings', LONG, () => doLesson(app, 'detail'));
 
 describe('lessons of the user', () => {
   const data = {

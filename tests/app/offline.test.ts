@@ -5,6 +5,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
 import { measures, open, reach } from './browser';
 import { deploy } from './deployment';
+import { LONG } from './long';
 
 let app: Awaited<ReturnType<typeof deploy>>;
 
@@ -60,7 +61,7 @@ test('data never opened before need the network, which a message says, and the l
   expect(app.uncaught).toEqual([]);
 });
 
-test('during development nothing is cached', async () => {
+test('during development nothing is cached', LONG, async () => {
   const vite = await createServer({ configFile: at('www/vite.config.ts'), server: { port: 0 }, logLevel: 'error' });
   await vite.listen();
   const developing = await app.browser.newPage();

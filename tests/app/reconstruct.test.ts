@@ -15,6 +15,7 @@ import {
   recordStates,
   unnamedControls,
 } from './browser';
+import { LONG } from './long';
 import { countPixels } from './pixels';
 
 let app: App;
@@ -503,20 +504,22 @@ describe('a link', () => {
     expect(await measured()).toMatchObject({ components: 1, genus: 0 });
   });
 
-  test.each([
-    ['p.delta=-1', 'delta'],
-    ['p.kernel=cubic', 'kernel'],
-    ['p.nonsense=3', 'nonsense'],
-    ['maxPoints=2', 'maxPoints'],
-    ['keepComponents=1.5', 'keepComponents'],
-    ['add=1e30,0,0', 'added'],
-    ['outside=0,0,1e30', 'exterior'],
-  ])('with %s opens its example without the settings, and gives the reason', async (settings, why) => {
-    await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
-    expect(await text('.banner')).toMatch(new RegExp(`settings were ignored.*${why}`));
-    expect(await measured()).toMatchObject({ components: 2, closed: true });
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
-  });
+  for (const [settings, why, options] of [
+    ['p.delta=-1', 'delta', {}],
+    ['p.kernel=cubic', 'kernel', LONG],
+    ['p.nonsense=3', 'nonsense', LONG],
+    ['maxPoints=2', 'maxPoints', LONG],
+    ['keepComponents=1.5', 'keepComponents', LONG],
+    ['add=1e30,0,0', 'added', {}],
+    ['outside=0,0,1e30', 'exterior', LONG],
+  ] as const) {
+    test(`with ${settings} opens its example without the settings, and gives the reason`, options, async () => {
+      await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
+      expect(await text('.banner')).toMatch(new RegExp(`settings were ignored.*${why}`));
+      expect(await measured()).toMatchObject({ components: 2, closed: true });
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+    });
+  }
 
   test('warns beside the view if δ is too large for gaps', async () => {
     await openAt('#reconstruct?example=torus&p.delta=30', 'done');
@@ -537,11 +540,19 @@ describe('a link', () => {
     expect((await measured()).surfaceConstraints).toBe(1599);
   });
 
-  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('ignores %s', async (nonsense) => {
-    await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
-    expect(await app.page.locator('.banner').isVisible()).toBe(false);
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
-  });
+  for (const [nonsense, options] of [
+    ['maxPoints=abc', {}],
+    ['add=1,2', LONG],
+    ['photo=99', LONG],
+    ['&&', LONG],
+    ['%E0%A4%A', {}],
+  ] as const) {
+    test(`ignores ${nonsense}`, options, async () => {
+      await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
+      expect(await app.page.locator('.banner').isVisible()).toBe(false);
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+    });
+  }
 });
 
 describe('the page', () => {

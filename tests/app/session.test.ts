@@ -7,6 +7,7 @@ import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { readSession } from '../../www/src/session/file';
 import { type App, afterRun, drop, open, openApp, QUICK, reach, unfold } from './browser';
+import { LONG } from './long';
 
 let app: App;
 /** A file of the user's: a tooth, of few voxels. */
@@ -69,7 +70,7 @@ async function reopened(page: Page, files: { name: string; bytes: Uint8Array }[]
   await page.waitForSelector(`#lab.${lab}[data-state=paused], #lab.${lab}[data-state=done]`);
 }
 
-test('a run that was interrupted opens in a new browser as it was, and ends at the same bits', async () => {
+test('a run that was interrupted opens in a new browser as it was, and ends at the same bits', LONG, async () => {
   const { page } = app;
   await open(app, 'extract?example=linked-rings&v=2&p.iso=100');
   await reach(page, 'done');
@@ -164,7 +165,7 @@ test('a file of version 1 opens', async () => {
   expect(now.undo).toEqual(content.undo);
 });
 
-test('labels go on in a new browser: the same voxels, surfaces, names and view', async () => {
+test('labels go on in a new browser: the same voxels, surfaces, names and view', LONG, async () => {
   const { page } = app;
   await open(app, QUICK.segment);
   await reach(page, 'done');
@@ -198,7 +199,7 @@ test('labels go on in a new browser: the same voxels, surfaces, names and view',
   });
 });
 
-test('edits that were undone can be redone in a new browser', async () => {
+test('edits that were undone can be redone in a new browser', LONG, async () => {
   const { page } = app;
   const edits = (one: Page) => one.locator('.edit-log li').allTextContents();
   await open(app, 'extract?example=linked-rings&v=2');

@@ -14,6 +14,7 @@ import { imageById, isTrackPreset, TRACK_PRESETS, variantInForce } from '../../w
 import { buildTracker, openImage, prepare } from '../../www/src/track/source';
 import { invert, sliceOrientations } from '../../www/src/view/anatomy';
 import { votesIn } from '../../www/src/view/votes';
+import { LONG } from './long';
 
 let film: Volume;
 let volume: Volume;
@@ -75,7 +76,7 @@ test('figure 2: the surface of the first frame runs through the shell of its poi
   expect(enclosed).toBeGreaterThan(30_000);
 });
 
-test('figure 3: in this heart prediction makes little difference; in thick slices projections take more steps without it', async () => {
+test('figure 3: in this heart prediction makes little difference', () => {
   const [, without] = figure('figure-3').variants;
   tracker.step(3);
   const [predicted, present] = [tracker.volumes(), tracker.save()];
@@ -85,6 +86,9 @@ test('figure 3: in this heart prediction makes little difference; in thick slice
   for (const [i, volume] of tracker.volumes().entries())
     expect(Math.abs(volume / (predicted[i] ?? 1) - 1)).toBeLessThan(0.05);
   tracker.restore(present);
+});
+
+test('figure 3: in thick slices projections take more steps without prediction', LONG, async () => {
   expect(await stepsIn(true)).toBeLessThan(0.95 * (await stepsIn(false)));
 });
 

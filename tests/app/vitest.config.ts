@@ -6,7 +6,7 @@ const at = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 /** Tests that count frames, measure how soon a page responds, or pause a run that takes a second. */
 const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `${name}.test.ts`);
 
-/** Whole figures and lessons, and third-party programs: for `npm run test:all`. */
+/** Files of whole figures and lessons, and third-party programs: for `npm run test:all`. */
 const LONG = ['**/*.long.test.ts'];
 
 export default defineConfig({
@@ -24,6 +24,7 @@ export default defineConfig({
     testTimeout: 300_000,
     hookTimeout: 300_000,
     expect: { poll: { timeout: 120_000 } },
+    tags: [{ name: 'long', description: 'Too long for every change: for `npm run test:all`.' }],
     projects: [
       // Two files at a time: a page that waits for its worker, or for a test, leaves a core free.
       {

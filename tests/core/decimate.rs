@@ -70,6 +70,7 @@ fn linked_rings_stay_linked() {
 
 /// A ball with noise so strong that small components float around it and holes go through it.
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_noisy_surface_keeps_its_topology() {
     // A function of position, so that the order of voxels does not matter.
     let noise = |p: Vec3| Random((p.x + 32.0 * (p.y + 32.0 * p.z)) as u64).unit();
@@ -199,6 +200,7 @@ fn decimated_within(mesh: &TriangleMesh, target: usize, tolerance: f64) -> Trian
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn the_distance_from_the_surface_before_is_bounded() {
     let shell = torus_around(Vec3::ZERO, [120, 40], [3.0, 1.0]);
     for mesh in [ball(0.06), shell, surface(&scenes::chain(), 0.5)] {

@@ -62,8 +62,8 @@ fn chain_from_bubbles() {
     the_chain_is_two_rings(160, options);
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn menger_sponge_of_depth_two() {
     let volume = scenes::menger(2);
     let params = Some(params(&volume, 0.4, 0.05, 0.001));
@@ -647,6 +647,7 @@ fn oscillations_on_a_coarse_level_converge() {
 /// iterations.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn oscillations_in_a_noisy_image_converge() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head.nii.gz");
     let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();

@@ -119,8 +119,8 @@ fn two_components_stay_separate() {
 }
 
 /// Outward directions are found even from few points far apart.
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn few_points_are_enough() {
     let shapes: [(&str, Shape, usize, &[i64]); 3] =
         [("ball", sphere, 60, &[2]), ("torus", torus, 250, &[0]), ("pair", pair, 240, &[2, 2])];
@@ -138,6 +138,7 @@ fn few_points_are_enough() {
 
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn twenty_thousand_noisy_points_of_a_torus() {
     let surface = finished(noisy(torus, 20_000, 0.01, 7), ImplicitParams::default());
     sound(surface.surface());
@@ -164,6 +165,7 @@ fn without_regularization_the_surface_passes_through_the_points() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn more_regularization_smooths_noisy_points() {
     let points = noisy(sphere, 1000, 0.01, 5);
     let mut surface = begun(points, ImplicitParams::default());
@@ -207,6 +209,7 @@ fn the_mean_level_passes_nearer_to_the_points() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn changed_parameters_give_the_result_of_a_new_surface() {
     let points = noisy(torus, 500, 0.005, 2);
     let changes = [
@@ -283,6 +286,7 @@ fn a_failure_keeps_the_surface_and_other_parameters_continue() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn an_unsolvable_system_is_reported() {
     let mut points = noisy(sphere, 300, 0.0, 4);
     let twins: Vec<Vec3> = points.iter().map(|p| *p + Vec3::new(1e-7, 0.0, -1e-7)).collect();
@@ -309,6 +313,7 @@ fn an_unsolvable_system_is_reported() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_restored_run_continues_bit_for_bit() {
     let mut random = Random(3);
     let (exact, normals) = surface_points(blend, 500, &mut random);
@@ -440,6 +445,7 @@ fn a_dense_cluster_beside_a_ball_is_solved_with_a_narrow_gaussian() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn points_can_be_added_far_from_the_origin() {
     let points = noisy(sphere, 3000, 0.0, 3).iter().map(|p| *p + Vec3::X * 120.0).collect();
     let mut surface = finished(points, ImplicitParams::default());

@@ -139,19 +139,19 @@ fn the_accuracy_at_the_defaults_is_as_recorded() {
 }
 
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[ignore = "long: npm run test:all"]
 fn without_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(0, &usual());
 }
 
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[ignore = "long: npm run test:all"]
 fn with_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(1, &usual());
 }
 
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[ignore = "long: npm run test:all"]
 fn with_twice_the_noise_tuned_parameters_are_as_accurate_as_poisson() {
     as_good_as_poisson(2, &smoother());
 }

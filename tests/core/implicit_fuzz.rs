@@ -14,7 +14,7 @@ use vesicle::methods::implicit::{
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
 /// Number of seeds; fewer in wasm, which reports more slowly.
-const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 20 } else { 40 };
+const SEEDS: u64 = 20;
 
 /// Upper bound of a run's slices.
 const MOST_STEPS: usize = 20_000;

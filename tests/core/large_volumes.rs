@@ -95,8 +95,8 @@ fn deliver(store: &Store, volume: &SparseVolume, needs: &[BrickBox], random: &mu
     }
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn the_surface_does_not_depend_on_the_order_in_which_bricks_arrive() {
     let store = store();
     for options in [options(), SparseOptions { finest: 1, ..SparseOptions::default() }] {

@@ -13,7 +13,7 @@ use vesicle::volume::Volume;
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
 /// Number of seeds.
-const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 4 } else { 25 };
+const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 4 } else { 12 };
 
 /// Iterations within which every run converges, from any start.
 const MOST: u32 = 400;

@@ -434,6 +434,7 @@ fn invalid_input_is_refused_by_name() {
 
 /// Scaled a million times with the same edge lengths, the surface would need more vertices than fit into memory.
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_surface_that_gets_too_large_is_refused_and_kept() {
     let mut model = lamp(&[ball(0.0, 0.0, 0.0, 1.0)], coarse(0.2));
     model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1e5)]).unwrap();

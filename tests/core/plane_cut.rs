@@ -119,7 +119,7 @@ fn self_intersections_at_the_plane_are_refused() {
 fn random_planes_through_difficult_shapes() {
     let shapes = all();
     let (mut cuts, mut refusals) = (0, 0);
-    for seed in seeds(104) {
+    for seed in seeds(52) {
         let _named = Named::new(seed);
         let mut random = Random(seed);
         let (name, mesh) = &shapes[seed as usize % shapes.len()];
@@ -143,7 +143,7 @@ fn random_planes_through_difficult_shapes() {
             }
         }
     }
-    assert_at_least(90, cuts, "cuts");
+    assert_at_least(45, cuts, "cuts");
     assert!(refusals <= 3, "{refusals} refusals");
 }
 

@@ -55,8 +55,8 @@ fn distance(a: &TriangleMesh, b: &TriangleMesh, aim: f32) -> f64 {
     surface_distance(a, b).unwrap().hausdorff / f64::from(aim)
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn assorted_shapes_at_three_sizes() {
     let mut sharpest = Vec::new();
     for (name, mesh) in shapes::all() {
@@ -138,6 +138,7 @@ fn random_shapes_and_bounds_give_valid_meshes() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn self_intersecting_meshes_are_remeshed() {
     let ball = shapes::ellipsoid(0.1, Vec3::ONE);
     let mut other = ball.clone();

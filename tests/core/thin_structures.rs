@@ -91,6 +91,7 @@ fn plates_of_one_voxel_and_more() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn curved_plates_of_one_voxel_and_more() {
     let middle = Vec3::new(15.4, 15.2, 15.3);
     for thickness in [1.0, 1.5, 2.0, 3.0] {
@@ -121,6 +122,7 @@ fn straight_tubes_of_one_voxel_radius_and_more() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn three_nested_hollow_spheres() {
     let middle = Vec3::new(19.4, 19.2, 19.3);
     is_found("nested spheres", [39; 3], &[2; 6], |p| {

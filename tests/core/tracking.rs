@@ -70,6 +70,7 @@ fn assert_area_and_ejection(cine: &Cine, tracker: &SurfaceTracker, hard: &[usize
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
     let cine = Cine::small();
     let tracker = tracked(options(&cine, cine.volume()));
@@ -131,8 +132,8 @@ fn a_given_mesh_is_tracked_and_the_component_is_chosen() {
     assert!(measure(&chosen.meshes()[2]).volume > 0.5 * measure(&given.meshes()[2]).volume);
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     let fine = DVec3::splat(1.4);
     let cine =
@@ -153,8 +154,8 @@ fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     assert_area_and_ejection(&cine, &tracker, &[3, 4]);
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
+#[ignore = "long: npm run test:all"]
 fn gaps_that_open_faster_than_the_boundary_attracts_are_filled() {
     // Thick slices, and a beat in eight frames: gaps close and open by several voxels from one frame to the next.
     let cine = Cine { dims: [48, 48, 23], beats: 3.0, ..Cine::full() }.first(6);
@@ -206,6 +207,7 @@ fn tube(mirrored: bool) -> Volume {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn the_box_closes_surfaces_that_continue_beyond_it_also_in_mirrored_volumes() {
     for mirrored in [false, true] {
         for bounds in [None, Some(Bounds::Voxels([[1, 1, 6], [26, 26, 25]]))] {
@@ -254,6 +256,7 @@ fn a_side_of_the_box_inside_the_cavity_closes_the_surface() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn extreme_time_scales_and_short_cycles_are_tracked() {
     for (frames, time_scale, window_frames) in [(2, 1e-9, 2), (3, 1e-9, 2), (3, 1e9, 0), (5, 0.0, 4)] {
         let cine = Cine::small().first(frames);
@@ -271,6 +274,7 @@ fn extreme_time_scales_and_short_cycles_are_tracked() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_cycle_closes_and_every_frame_has_its_volume() {
     let cine = Cine::small();
     let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
@@ -295,6 +299,7 @@ fn a_cycle_closes_and_every_frame_has_its_volume() {
 }
 
 #[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_restored_run_continues_bit_for_bit() {
     let cine = Cine::small().first(4);
     let volume = cine.volume();

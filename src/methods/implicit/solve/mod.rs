@@ -472,6 +472,7 @@ mod tests {
     /// For 8,000 constraints the matrix is stored in single precision, and iterations restart from the true residual.
     #[cfg(not(target_arch = "wasm32"))]
     #[test]
+    #[ignore = "long: npm run test:all"]
     fn eight_thousand_constraints_to_many_digits() {
         let constraints = system(7300, [0.001, 2.0], false);
         for tolerance in [1e-3, 1e-9] {
@@ -551,6 +552,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn a_few_other_constraints_are_solved_as_if_from_the_start() {
         for lambda in [[0.0, 0.0], [0.001, 2.0]] {
             let base = system(900, lambda, false);
