@@ -152,11 +152,11 @@ async function assemble(modules) {
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
 
-const file = ({ name }) => [`./${name}.wasm`, `./${name}.wasm`];
+const file = (name) => [`./${name}.wasm`, `./${name}.wasm`];
 
 const entry = (part) => [
   [`./${part}`, { types: `./${part}/index.d.ts`, default: `./${part}/index.js` }],
-  [`./${part}/vesicle_bg.wasm`, `./${part}/vesicle_bg.wasm`],
+  file(`${part}/vesicle_bg`),
 ];
 
 async function manifest(modules) {
@@ -186,7 +186,7 @@ async function manifest(modules) {
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
       './zarr': { types: './zarr/index.d.ts', default: './zarr/index.js' },
       './element': { types: './element/index.d.ts', default: './element.js' },
-      ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(file)),
+      ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(({ name }) => file(name))),
       './package.json': './package.json',
     },
   };

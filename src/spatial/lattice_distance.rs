@@ -507,7 +507,7 @@ mod tests {
     #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn far_points_have_the_distance_of_the_closest_of_many_triangles() {
         let mut random = Random::new(9);
-        let ball = Mesh::icosphere(Vec3::splat(0.1), 2.0, 0.2).unwrap().to_triangles();
+        let ball = Mesh::icosphere(Vec3::splat(0.1), 2.0, 0.12).unwrap().to_triangles();
         for noise in [0.0, 0.02, 0.4] {
             let mut mesh = joined(&[ball.clone(), torus(1.2, 0.3, 40, 20)]);
             for p in &mut mesh.positions {

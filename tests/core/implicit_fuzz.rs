@@ -13,7 +13,7 @@ use vesicle::methods::implicit::{
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-/// Number of seeds; fewer in wasm, which reports more slowly.
+/// Number of seeds.
 const SEEDS: u64 = 20;
 
 /// Upper bound of a run's slices.

@@ -317,7 +317,7 @@ fn fuzz_strokes(seed: u64, strokes: usize) {
 #[test]
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn surfaces_follow_random_strokes() {
-    (0..6).for_each(|seed| fuzz_strokes(seed, 6));
+    (0..12).for_each(|seed| fuzz_strokes(seed, 6));
     // Polygons touched with all vertices in the middle of their cells.
     fuzz_strokes(709, 10);
 }
@@ -551,7 +551,7 @@ fn coarse_surfaces_follow_strokes_as_if_made_anew() {
     settle(&mut surfaces);
     let mut copies = Copies::of(&surfaces);
     let mut random = Random::new(7);
-    for stroke in 0..3 {
+    for stroke in 0..6 {
         let what = format!("stroke {stroke}");
         let min = [0; 3].map(|_| 8 + random.below(22) as usize);
         let region = Region { min, dims: [5, 6, 4] };
