@@ -26,6 +26,8 @@ export async function openLevels(
   selection: Selection,
   signal: AbortSignal | undefined,
 ): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
+  // The abort may have come before there was a request to end.
+  signal?.throwIfAborted();
   // Ends all other requests if one fails.
   const stop = new AbortController();
   const abort = () => stop.abort(signal?.reason);

@@ -428,6 +428,16 @@ describe('an abort', () => {
     },
   );
 
+  test('is not lost while zarrita is imported, before the first request', async () => {
+    const store = await storeOf('v3-zstd-zyx');
+    store.fault = stall;
+    const stop = new AbortController();
+    const opening = reasonOf(openZarr(store, { signal: stop.signal, retries: 0, timeoutMs: 2000 }));
+    stop.abort('enough');
+    expect(await opening).toBe('enough');
+    expect(store.open).toBe(0);
+  });
+
   test('ends pauses between repetitions, and waiting for a slot', async () => {
     const store = await storeOf('v3-zstd-zyx');
     const zarr = await openZarr(store, { concurrency: 2 });

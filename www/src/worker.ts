@@ -120,8 +120,11 @@ class Session {
   }
 
   async #load({ name, source, setup, frame, saved }: Requests['load']['body']): Promise<Loaded> {
+    // Before anything is waited for, so that it can be cancelled from now on.
+    const opening = new AbortController();
+    this.#opening = opening;
     await this.#pause();
-    if ('zarr' in source) return this.#loadLarge(name, source, setup);
+    if ('zarr' in source) return this.#loadLarge(name, source, setup, opening.signal);
     const { volume, frames, unit } = await openFrame(source, frame);
     try {
       const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
@@ -140,11 +143,9 @@ class Session {
     }
   }
 
-  async #loadLarge(name: string, source: LargeSource, setup: Setup): Promise<Loaded> {
-    const opening = new AbortController();
-    this.#opening = opening;
+  async #loadLarge(name: string, source: LargeSource, setup: Setup, signal: AbortSignal): Promise<Loaded> {
     const { LargeVolume } = await import('./worker/large');
-    const large = await LargeVolume.open(source, opening.signal);
+    const large = await LargeVolume.open(source, signal);
     try {
       const view = large.view(name);
       const levels = Math.min(setup.levels, large.coarserLevels);
