@@ -4,6 +4,7 @@
 //! an edit reaches it. Before a pyramid level ends, the forces on all vertices are evaluated once, and vertices that
 //! have not settled wake.
 
+use super::image::is_any_sparse;
 use crate::math::Bounds;
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
@@ -37,8 +38,7 @@ impl Awake {
     /// `within`, vertices outside that box sleep in any case.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool, within: Option<Bounds>) {
         let still = mesh.scalar(still);
-        // A constant without the feature, so that smaller modules have no code for boxes.
-        let within = if cfg!(feature = "sparse") { within } else { None };
+        let within = if is_any_sparse() { within } else { None };
         self.moving.clear();
         let is_awake = |v: &VertexId| {
             (still[v.index()] < ITERATIONS_TO_SLEEP || all && within.is_some())

@@ -3,6 +3,8 @@
 //! Model space is the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second way);
 //! the volume's affine transform maps it to world space.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::DeformableParams;
 use crate::math::Vec3;
 use crate::math::order::median;
@@ -30,9 +32,20 @@ pub(super) struct LevelImage {
     offset: Vec3,
 }
 
+/// Whether there has been a pyramid of a sparse volume. Only the function that makes one sets this: a module that does not
+/// call it, of an entry point with one method, is linked without it; then this is a constant, and the code for bricks is
+/// left out as well.
+static IS_ANY_SPARSE: AtomicBool = AtomicBool::new(false);
+
+/// Returns whether levels may be sparse; asked before anything that only these need.
+#[inline]
+pub(super) fn is_any_sparse() -> bool {
+    IS_ANY_SPARSE.load(Ordering::Relaxed)
+}
+
 impl Clone for LevelImage {
     fn clone(&self) -> Self {
-        // By `bricks`, so that modules without sparse volumes do not copy them.
+        // By `bricks`, so that modules without sparse volumes have no code to copy them.
         Self {
             grid: self.grid.clone(),
             bricks: self.bricks().cloned(),
@@ -49,15 +62,14 @@ impl LevelImage {
     }
 
     /// Returns the loaded bricks of a sparse level, while the model computes; `None` for a level that is there as a whole.
-    /// A constant without the feature `sparse`, so that modules without it have no code for bricks.
     #[inline]
     pub(super) fn bricks(&self) -> Option<&BrickGrid> {
-        if cfg!(feature = "sparse") { self.bricks.as_ref() } else { None }
+        if is_any_sparse() { self.bricks.as_ref() } else { None }
     }
 
     /// As [`Self::bricks`], to change them.
     pub(super) fn bricks_mut(&mut self) -> Option<&mut BrickGrid> {
-        if cfg!(feature = "sparse") { self.bricks.as_mut() } else { None }
+        if is_any_sparse() { self.bricks.as_mut() } else { None }
     }
 
     /// Returns the length of the side of a cube with the volume of a voxel of this level, in model units.
@@ -272,16 +284,17 @@ impl Pyramid {
         if let Some(level) = levels.last_mut() {
             *level = LevelImage { grid: coarsest, bricks: None, ..level.clone() };
         }
+        IS_ANY_SPARSE.store(true, Ordering::Relaxed);
         let sparse = Some(SparseLevels { volume: volume.clone(), finest, reach: super::sparse::REACH });
         let axes = first.affine.matrix3;
         let spacing = [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()];
         Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse })
     }
 
-    /// Returns whether this is the pyramid of a sparse volume; a constant without the feature `sparse`.
+    /// Returns whether this is the pyramid of a sparse volume.
     #[inline]
     pub(super) fn is_sparse(&self) -> bool {
-        cfg!(feature = "sparse") && self.sparse.is_some()
+        is_any_sparse() && self.sparse.is_some()
     }
 
     /// Returns δ, the lower bound of the edge length, on a level in voxels of the finest level; it grows by

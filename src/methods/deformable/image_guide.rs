@@ -6,7 +6,7 @@
 
 use super::DeformableParams;
 use super::contour::ObjectIs;
-use super::image::LevelImage;
+use super::image::{LevelImage, is_any_sparse};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{TopologyGuide, Unguided};
@@ -49,8 +49,7 @@ impl<'a> ImageGuide<'a> {
 
     /// Returns whether the image is followed at all of some vertices.
     fn follows(&self, mesh: &Mesh, vertices: &[VertexId]) -> bool {
-        // The first is a constant, by which modules without the feature have no code for boxes.
-        !cfg!(feature = "sparse")
+        !is_any_sparse()
             || self.within.is_none_or(|bounds| vertices.iter().all(|&v| bounds.contains(mesh.position(v))))
     }
 
