@@ -2,17 +2,23 @@ import type { Result } from 'axe-core';
 import axe from 'axe-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, LABS, open, openApp, QUICK, reach, unfold } from './browser';
+import { inOneLab, LONG } from './long';
 
 /** The rules of WCAG 2.2 up to level AA, best practices, and axe's experimental rules. */
 const TAGS = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice', 'experimental'];
 const WIDE = { width: 1280, height: 800 };
 const NARROW = { width: 390, height: 844 };
+/** Each colour scheme and each size. */
 const LOOKS = [
   { colorScheme: 'light', size: WIDE },
-  { colorScheme: 'dark', size: WIDE },
   { colorScheme: 'dark', size: NARROW },
+] as const;
+/** Their other combinations. */
+const OTHER_LOOKS = [
+  { colorScheme: 'dark', size: WIDE },
   { colorScheme: 'light', size: NARROW },
 ] as const;
+type Look = (typeof LOOKS)[number] | (typeof OTHER_LOOKS)[number];
 
 let app: App;
 
@@ -41,7 +47,7 @@ function violations(part: string): Promise<string[]> {
 }
 
 /** Fails with all findings for a part of the page in the given colour schemes. */
-async function expectNothing(part = 'html', looks: readonly (typeof LOOKS)[number][] = LOOKS): Promise<void> {
+async function expectNothing(part = 'html', looks: readonly Look[] = LOOKS): Promise<void> {
   for (const { colorScheme, size } of looks) {
     await app.page.emulateMedia({ colorScheme });
     await app.page.setViewportSize(size);
@@ -51,7 +57,7 @@ async function expectNothing(part = 'html', looks: readonly (typeof LOOKS)[numbe
 }
 
 /** Addresses of runs that take longer than the check does, also on a busy machine. */
-const LONG: Partial<typeof QUICK> = {
+const LONG_RUNS: Partial<typeof QUICK> = {
   extract: 'extract?p.timeStep=0.05&v=2',
   reconstruct: 'reconstruct?maxPoints=30000',
 };
@@ -65,24 +71,25 @@ test('lessons: the list, an open one with everything unfolded, and its sheets', 
   await app.page.locator('.lesson-list button').first().click();
   await app.page.locator('.lesson-step').waitFor();
   await unfold(app.page);
-  await expectNothing('html', LOOKS.slice(0, 3));
+  await expectNothing();
   for (const view of ['sheet', 'teacher']) {
     await app.page.goto(`${app.address}?lesson=forces&view=${view}`);
     await app.page.locator('.lesson-sheet section').first().waitFor();
-    await expectNothing('html', LOOKS.slice(0, 2));
+    await expectNothing();
   }
 });
 
 describe.each(LABS)('the %s lab', (lab) => {
   // Segment only runs for moments, after a stroke.
-  test.skipIf(lab === 'segment')('has no violations while it runs', async () => {
-    await open(app, LONG[lab] ?? lab);
+  test.skipIf(lab === 'segment')('has no violations while it runs', inOneLab(lab), async () => {
+    await open(app, LONG_RUNS[lab] ?? lab);
     await reach(app.page, 'running');
-    await expectNothing('html', [LOOKS[1]]);
+    await expectNothing('html', [OTHER_LOOKS[0]]);
     expect(await app.page.getAttribute('[data-state]', 'data-state')).toBe('running');
   });
 
-  test('has no violations when it is done and everything is expanded, nor in its message', async () => {
+  /** Checks the lab when it is done, with everything expanded, and a message. */
+  async function expectNothingWhenDone(looks: readonly Look[]): Promise<void> {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
     await app.page.evaluate((address) => {
@@ -90,10 +97,17 @@ describe.each(LABS)('the %s lab', (lab) => {
     }, `${lab}?example=nowhere`);
     await app.page.waitForSelector('.banner:not([hidden])');
     await unfold(app.page);
-    await expectNothing();
-  });
+    await expectNothing('html', looks);
+  }
 
-  test('has no violations in its list of keyboard shortcuts', async () => {
+  test('has no violations when it is done and everything is expanded, nor in its message', () =>
+    expectNothingWhenDone(LOOKS));
+
+  test('has none in other looks either', LONG, () => expectNothingWhenDone(OTHER_LOOKS));
+
+  test('has no violations in its list of keyboard shortcuts', inOneLab(lab), async () => {
+    await open(app, QUICK[lab]);
+    await reach(app.page, 'done');
     await app.page.click('#help');
     await expectNothing('dialog');
   });

@@ -74,7 +74,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await countColors(page, await view())).toBeGreaterThan(500);
   });
 
-  test('refuses files with false headers, and keeps the previous data', async () => {
+  test('refuses files with false headers, and keeps the previous data', inOneLab(lab), async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     const before = await measures(page);

@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { PRESETS } from '../../www/src/presets';
 import { type App, iteration, measures, openApp, reach } from './browser';
+import { LONG } from './long';
 import { changes, showsAgain } from './pixels';
 
 let app: App;
@@ -148,7 +149,7 @@ describe('a figure of the paper', () => {
     expect(await app.page.getAttribute('[data-comparison]', 'data-comparison')).toBe('{}');
   });
 
-  test('with several pictures leads from one to the next', async () => {
+  test('with several pictures leads from one to the next', LONG, async () => {
     await openAt('#extract?example=figure-24');
     const first = await iteration(app.page);
     expect(await measures(app.page)).toMatchObject({ components: 1 });

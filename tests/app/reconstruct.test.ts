@@ -363,15 +363,19 @@ describe('files', () => {
     expect(await text('.facts')).toContain('balls.xyz');
   });
 
-  test("a file does not inherit an example's settings: both balls are kept after the cow, of which one cluster is kept", async () => {
-    await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
-    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
-    expect(await measured()).toMatchObject({ components: 2 });
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
-    await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
-    await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
-  });
+  test(
+    "a file does not inherit an example's settings: both balls are kept after the cow, of which one cluster is kept",
+    LONG,
+    async () => {
+      await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
+      await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+      expect(await measured()).toMatchObject({ components: 2 });
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+      await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
+      await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
+    },
+  );
 
   test('a link to a file waits for it and then applies its settings', async () => {
     await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
@@ -484,7 +488,7 @@ describe('a link', () => {
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
   });
 
-  test("to a figure with another of its pictures states that one's result", async () => {
+  test("to a figure with another of its pictures states that one's result", LONG, async () => {
     await openAt('#reconstruct?example=figure-8&p.lambdaSurface=0.001', 'done');
     const pressed = () => text('.figure button[aria-pressed=true]');
     expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
@@ -510,7 +514,7 @@ describe('a link', () => {
     ['p.nonsense=3', 'nonsense', LONG],
     ['maxPoints=2', 'maxPoints', LONG],
     ['keepComponents=1.5', 'keepComponents', LONG],
-    ['add=1e30,0,0', 'added', {}],
+    ['add=1e30,0,0', 'added', LONG],
     ['outside=0,0,1e30', 'exterior', LONG],
   ] as const) {
     test(`with ${settings} opens its example without the settings, and gives the reason`, options, async () => {
@@ -545,7 +549,7 @@ describe('a link', () => {
     ['add=1,2', LONG],
     ['photo=99', LONG],
     ['&&', LONG],
-    ['%E0%A4%A', {}],
+    ['%E0%A4%A', LONG],
   ] as const) {
     test(`ignores ${nonsense}`, options, async () => {
       await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');

@@ -99,7 +99,7 @@ test('a run that was interrupted opens in a new browser as it was, and ends at t
   });
 });
 
-test('undo goes back beyond the opening of a session', async () => {
+test('undo goes back beyond the opening of a session', LONG, async () => {
   const { page } = app;
   await open(app, 'extract?example=linked-rings&v=2');
   await reach(page, 'done');
@@ -232,7 +232,7 @@ test('edits that were undone can be redone in a new browser', LONG, async () => 
   });
 });
 
-test('a session keeps the log of a run, also after a change of edge lengths in Sculpt', async () => {
+test('a session keeps the log of a run, also after a change of edge lengths in Sculpt', LONG, async () => {
   const { page } = app;
   const codeOf = async (one: Page) => {
     await one.evaluate(() => Object.assign(navigator.clipboard, { writeText: () => Promise.reject() }));

@@ -15,6 +15,7 @@ import {
   recordStates,
   unnamedControls,
 } from './browser';
+import { LONG } from './long';
 
 let app: App;
 
@@ -252,7 +253,7 @@ describe('changes', () => {
     await tracked(4);
   });
 
-  test('to a threshold within the noise show a warning', async () => {
+  test('to a threshold within the noise show a warning', LONG, async () => {
     const warning = () => text('[data-param=threshold] .warning');
     expect(await warning()).toBe('');
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
