@@ -15,7 +15,6 @@ import {
   recordStates,
   unnamedControls,
 } from './browser';
-import { LONG } from './long';
 
 let app: App;
 
@@ -253,7 +252,7 @@ describe('changes', () => {
     await tracked(4);
   });
 
-  test('to a threshold within the noise show a warning', LONG, async () => {
+  test('to a threshold within the noise show a warning', async () => {
     const warning = () => text('[data-param=threshold] .warning');
     expect(await warning()).toBe('');
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
