@@ -1,3 +1,4 @@
+import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { type App, LABS, openApp, overflow, reach, unnamedControls } from './browser';
 
@@ -20,6 +21,28 @@ test.each([
 
 test('every control has a name', async () => {
   expect(await unnamedControls(app.page)).toEqual([]);
+});
+
+test('the help can be opened as soon as the lab is there, not before', async () => {
+  const browser = app.page.context().browser() as Browser;
+  // A service worker would have the lab's code already.
+  const page = await browser.newPage({ serviceWorkers: 'block' });
+  let load = () => {};
+  const wanted = new Promise<void>((resolve) => {
+    load = resolve;
+  });
+  await page.route('**/assets/extract-*.js', async (route) => {
+    await wanted;
+    await route.continue();
+  });
+  await page.goto(`${app.address}#extract?example=linked-rings`);
+  await page.waitForSelector('[data-state=loading]', { state: 'attached' });
+  expect(await page.isDisabled('#help')).toBe(true);
+  const pressed = page.click('#help');
+  load();
+  await pressed;
+  expect(await page.isVisible('dialog')).toBe(true);
+  await page.close();
 });
 
 test('the help lists the keyboard shortcuts and closes again', async () => {

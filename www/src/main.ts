@@ -103,12 +103,15 @@ class Labs {
     const turn = ++this.#turn;
     this.#present(kind);
     this.#root.dataset.state = 'loading';
+    // The lab lists its shortcuts; a press before would be lost.
+    this.#help.toggleAttribute('disabled', true);
     try {
       // The engine loads in parallel with the lab's own code.
       preloadWorker(kind.spawn);
       const Kind = await kind.load();
       if (turn !== this.#turn) return;
       this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
+      this.#help.toggleAttribute('disabled', false);
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
