@@ -1,4 +1,5 @@
 // Volumes of which only parts are in memory, as the models see them.
+import { endingTogether } from './abort.js';
 import type { DataOptions, Vec3, VoxelArray } from './data.js';
 import type { Handle } from './runtime.js';
 import type { RawSparseVolume } from './vesicle.js';
@@ -59,29 +60,20 @@ export async function supply(
   insert: (box: SparseBox, voxels: VoxelArray) => void,
   { signal, onData }: DataOptions = {},
 ): Promise<void> {
-  signal?.throwIfAborted();
-  const stop = new AbortController();
-  const abort = () => stop.abort(signal?.reason);
-  signal?.addEventListener('abort', abort);
   const left = inOrder(boxes).values();
   let waiting = boxes.length;
-  const take = async () => {
-    // All take from the same iterator.
-    for (const box of left) {
-      const voxels = await source.read(box, stop.signal);
-      insert(box, voxels);
-      waiting -= 1;
-      onData?.({ ...source.loaded(), waiting });
-    }
-  };
-  try {
-    await Promise.all(Array.from({ length: source.concurrency }, take));
-  } catch (error) {
-    stop.abort(error);
-    throw error;
-  } finally {
-    signal?.removeEventListener('abort', abort);
-  }
+  await endingTogether(signal, (signal) => {
+    const take = async () => {
+      // All take from the same iterator.
+      for (const box of left) {
+        const voxels = await source.read(box, signal);
+        insert(box, voxels);
+        waiting -= 1;
+        onData?.({ ...source.loaded(), waiting });
+      }
+    };
+    return Promise.all(Array.from({ length: source.concurrency }, take));
+  });
 }
 
 /** Number of voxels along the edge of the blocks within which boxes are read together; that of common chunks. */

@@ -1,5 +1,6 @@
 // Opens the arrays of an image.
 import type { Group, Location, Readable, Array as ZarrArray } from 'zarrita';
+import { endingTogether } from '../abort.js';
 import { invalid } from '../check.js';
 import { badZarr, RefusedError, translated, type Zarrita } from './error.js';
 import { checkPyramid, checkSeries, Level, type Selection } from './levels.js';
@@ -26,20 +27,7 @@ export async function openLevels(
   selection: Selection,
   signal: AbortSignal | undefined,
 ): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
-  // The abort may have come before there was a request to end.
-  signal?.throwIfAborted();
-  // Ends all other requests if one fails.
-  const stop = new AbortController();
-  const abort = () => stop.abort(signal?.reason);
-  signal?.addEventListener('abort', abort);
-  try {
-    return await openArrays(zarrita, store, path, selection, stop.signal);
-  } catch (error) {
-    stop.abort(error);
-    throw error;
-  } finally {
-    signal?.removeEventListener('abort', abort);
-  }
+  return endingTogether(signal, (signal) => openArrays(zarrita, store, path, selection, signal));
 }
 
 async function openArrays(

@@ -1,3 +1,4 @@
+import { endingTogether } from '../abort.js';
 import { checkProperties, invalid, numbers, shallowCopy } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
@@ -149,23 +150,14 @@ export class ZarrVolume {
   }
 
   async #fill(target: Brick, index: number, level: Level, signal: AbortSignal | undefined): Promise<void> {
-    const stop = new AbortController();
-    const abort = () => stop.abort(signal?.reason);
-    signal?.throwIfAborted();
-    signal?.addEventListener('abort', abort);
     const chunks = chunksOf(target, level.info.chunks);
-    const take = async () => {
-      // All take from the same iterator.
-      for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, stop.signal), target);
-    };
-    try {
-      await Promise.all(Array.from({ length: this.#concurrency }, take));
-    } catch (error) {
-      stop.abort(error);
-      throw error;
-    } finally {
-      signal?.removeEventListener('abort', abort);
-    }
+    await endingTogether(signal, (signal) => {
+      const take = async () => {
+        // All take from the same iterator.
+        for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, signal), target);
+      };
+      return Promise.all(Array.from({ length: this.#concurrency }, take));
+    });
   }
 
   #brick(index: number, level: Level, chunk: Vec3, signal: AbortSignal): Promise<Brick> {

@@ -128,8 +128,8 @@ test('the view rotates by keys and is described in words', async () => {
   await changes(page, before, () => view.screenshot(), 0.02);
 });
 
-/** Elements that cannot be used, and their messages. */
-const UNUSABLE: [string, string | RegExp][] = [
+/** Elements with invalid attributes or data, and their error messages. */
+const INVALID: [string, string | RegExp][] = [
   ['<vesicle-lab></vesicle-lab>', 'src: must be the address of a file'],
   [
     '<vesicle-lab src="ring.mha" method="magic"></vesicle-lab>',
@@ -142,11 +142,11 @@ const UNUSABLE: [string, string | RegExp][] = [
   ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],
 ];
 
-test('elements that cannot be used each give an error message', async () => {
-  await open(UNUSABLE.map(([body]) => body).join(''));
-  await expect.poll(() => page.locator('vesicle-lab[data-state=error]').count()).toBe(UNUSABLE.length);
+test('each element with invalid attributes or data shows an error message', async () => {
+  await open(INVALID.map(([body]) => body).join(''));
+  await expect.poll(() => page.locator('vesicle-lab[data-state=error]').count()).toBe(INVALID.length);
   const messages = await page.locator('vesicle-lab output').allTextContents();
-  for (const [i, [body, message]] of UNUSABLE.entries()) expect(messages[i], body).toMatch(message);
+  for (const [i, [body, message]] of INVALID.entries()) expect(messages[i], body).toMatch(message);
 });
 
 test('a missing file', async () => {

@@ -82,16 +82,16 @@ class Session {
   #receivedAt = 0;
   /** The last report on how much has been read of a volume larger than memory. */
   #data: Omit<DataEvent, 'event'> | undefined;
-  /** Aborts the opening of a volume larger than memory. */
-  #opening: AbortController | undefined;
+  /** Only that of a volume larger than memory can be aborted. */
+  readonly #opening = new Work();
   readonly #run = new Work();
   readonly #comparison = new Work();
   readonly #coverageRun = new Work();
 
   readonly handlers: Handlers<Requests> = {
-    load: (body) => this.#load(body),
+    load: (body) => this.#opening.begin((signal) => this.#load(body, signal)),
     cancelLoad: () => {
-      this.#opening?.abort();
+      this.#opening.abort();
       return undefined;
     },
     rebuild: (setup) => this.#rebuild(setup),
@@ -119,12 +119,9 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load({ name, source, setup, frame, saved }: Requests['load']['body']): Promise<Loaded> {
-    // Before anything is waited for, so that it can be cancelled from now on.
-    const opening = new AbortController();
-    this.#opening = opening;
+  async #load({ name, source, setup, frame, saved }: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
     await this.#pause();
-    if ('zarr' in source) return this.#loadLarge(name, source, setup, opening.signal);
+    if ('zarr' in source) return this.#loadLarge(name, source, setup, signal);
     const { volume, frames, unit } = await openFrame(source, frame);
     try {
       const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
