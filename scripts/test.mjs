@@ -16,8 +16,10 @@ const DENY = ['--', '-D', 'warnings'];
 /** Record of the last run of all tests, which `npm test` prints. */
 const RECORD = 'tests/all.json';
 
-// A fresh clone is compiled once: without what cargo writes for the next time, and in fewer pieces, it takes 15 % less.
-if (process.env.CI) Object.assign(process.env, { CARGO_INCREMENTAL: '0', CARGO_PROFILE_TEST_CODEGEN_UNITS: '4' });
+// A fresh clone is compiled once: without what cargo writes for the next time, in fewer pieces, and without line numbers of
+// backtraces, it takes a quarter less.
+const ONCE = { CARGO_INCREMENTAL: '0', CARGO_PROFILE_TEST_CODEGEN_UNITS: '4', CARGO_PROFILE_TEST_DEBUG: '0' };
+if (process.env.CI) Object.assign(process.env, ONCE);
 
 const EVERYTHING = '--all';
 
@@ -55,8 +57,9 @@ const cargoTests = (args, options) => async () => {
 /** Examples in the documentation are small: most of the time is that of compiling the library for them. */
 const UNOPTIMISED = { env: { CARGO_PROFILE_DEV_OPT_LEVEL: '0', CARGO_PROFILE_DEV_DEBUG: '0' } };
 
-/** Files of tests that only `npm run test:all` runs. */
-const LONG_FILES = '**/*.long.test.ts';
+/** Arguments that leave out the tests with the tag `long`, or select them. */
+const SHORT = '--tags-filter=!long';
+const LONG_ONES = '--tags-filter=long';
 
 /** Returns a stage that runs the tests of a folder which further arguments of the runner select. */
 const vitest =
@@ -66,10 +69,8 @@ const vitest =
     await rm(report, { force: true });
     const config = at(folder, 'vitest.config.ts');
     const args = [
-      ...['run', '--dir', at(folder)],
+      ...['run', '--dir', at(folder), '--config', config],
       ...['--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
-      // A busy machine is slow, not wrong.
-      ...(existsSync(config) ? ['--config', config] : ['--testTimeout=300000']),
       ...selection,
     ];
     const { code, output } = await run(tool('vitest'), args, { echo });
@@ -102,7 +103,6 @@ const GROUPS = [
       ],
       // Shows the tests' measurements in the log.
       ['native', cargoTests(['--lib', '--', '--show-output']), 600],
-      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], UNOPTIMISED), 60],
       // Has one thread only.
       ['wasm', cargoTests(['--lib', ...WASM]), 900],
     ],
@@ -112,14 +112,14 @@ const GROUPS = [
       ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
-      ['package', vitest('tests/js', `--exclude=${LONG_FILES}`), 200],
+      ['package', vitest('tests/js', SHORT), 200],
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
       ['app build', works(buildApp), 20],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', '--project=together', '--tags-filter=!long'), 900],
+      ['app', vitest('tests/app', '--project=together', SHORT), 900],
     ],
   ],
-  [[['app alone', vitest('tests/app', '--project=alone'), 200]]],
+  [[['app alone', vitest('tests/app', '--project=alone', SHORT), 200]]],
 ];
 
 /** Filters of the core's ignored tests that write files, or need files that are not in the repository. */
@@ -139,9 +139,9 @@ const LONG = [
     [
       ['features', works(checkFeatures), 300],
       ['whole build', works(build), 400],
-      ['package long', vitest('tests/js', '.long.test'), 30],
+      ['package more', vitest('tests/js', LONG_ONES), 100],
       ['app long', vitest('tests/app', '--project=long'), 600],
-      ['app more', vitest('tests/app', '--project=together', '--tags-filter=long'), 500],
+      ['app more', vitest('tests/app', '--project=together', LONG_ONES), 900],
       // The runner runs ignored tests only with all others.
       [
         'slow wasm',
@@ -150,10 +150,12 @@ const LONG = [
       ],
     ],
     [
+      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], UNOPTIMISED), 60],
       ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 600],
       ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 900],
     ],
   ],
+  [[['app alone more', vitest('tests/app', '--project=alone', LONG_ONES), 200]]],
 ];
 
 /** Checks that each feature of the bindings compiles alone. */

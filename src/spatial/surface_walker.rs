@@ -188,7 +188,7 @@ mod tests {
     fn walks_on_a_ball_end_at_the_closest_point() {
         let walker = ball();
         let mut random = Random::new(5);
-        for start in 0..walker.mesh().triangles.len() as u32 {
+        for start in (0..walker.mesh().triangles.len() as u32).step_by(3) {
             let direction = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
             let p = Vec3::new(1.0, 2.0, 3.0) + direction.normalize() * 2.5;
             let (found, expected) = (walker.walk(start, p), walker.closest(p).unwrap());

@@ -229,6 +229,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn voxels_inside_are_those_of_winding_numbers() {
         let mut inside = 0;
         for seed in 0..60 {

@@ -90,6 +90,7 @@ fn a_noisy_surface_keeps_its_topology() {
 }
 
 /// Two sheets much nearer to each other than the resulting edges are long.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_thin_shell_does_not_intersect_itself() {
     let inner = ball(0.1);

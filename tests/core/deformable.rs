@@ -54,6 +54,7 @@ fn chain_from_an_enclosing_icosahedron_in_ninety_iterations() {
     the_chain_is_two_rings(90, options);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn chain_from_bubbles() {
     let params = Some(params(&scenes::chain(), 0.5, 0.0, 0.0));

@@ -133,6 +133,7 @@ fn run(seed: u64, tally: &mut Tally) {
     assert!(misplaced.is_empty(), "seed {seed}: {misplaced:?}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn every_run_keeps_the_mesh_valid() {
     let seeds = seeds(SEEDS);

@@ -87,6 +87,7 @@ fn spheres_pushed_together_flatten() {
 }
 
 /// Large triangles beside small ones, all vertices with large displacements: contacts are found at all sizes.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn large_and_small_triangles_do_not_intersect() {
     let mut mesh = Mesh::icosahedron(Vec3::ZERO, 40.0);
@@ -131,6 +132,7 @@ fn an_edit_that_would_intersect_is_rolled_back() {
 }
 
 /// Moves alternate with remeshing, while components join and split; the mesh is valid after each.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_mesh_resolved_after_every_move_never_intersects_itself() {
     let sampling = Sampling::new(1.0);

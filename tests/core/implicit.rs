@@ -94,6 +94,7 @@ fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
     assert!(found[0] < mean && found[1] < largest, "{found:?}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_ball_is_reconstructed() {
     comes_out(sphere, &[2], 0.0, 0.003, 0.01);
@@ -106,12 +107,14 @@ fn a_torus_is_reconstructed() {
     comes_out(torus, &[0], 0.01, 0.008, 0.04);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn blended_shapes_keep_their_hole() {
     comes_out(blend, &[0], 0.0, 0.003, 0.02);
     comes_out(blend, &[0], 0.01, 0.008, 0.06);
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn two_components_stay_separate() {
     comes_out(pair, &[2, 2], 0.0, 0.003, 0.01);
@@ -185,6 +188,7 @@ fn more_regularization_smooths_noisy_points() {
     assert!(free > 1.4 * usual && usual > 1.08 * more && usual > 1.05 * most, "{curvatures:?}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_gap_is_closed() {
     let mut points = noisy(sphere, 2 * MANY / 3, 0.0, 9);
@@ -197,6 +201,7 @@ fn a_gap_is_closed() {
     assert!(found[0] < 0.03 && found[1] < 0.25, "{found:?}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_mean_level_passes_nearer_to_the_points() {
     let mut surface = finished(noisy(sphere, 1000, 0.0, 1), ImplicitParams::default());
@@ -259,6 +264,7 @@ fn only_phases_that_depend_on_a_changed_parameter_run_again() {
     assert_eq!(surface.step().unwrap().phase, "solve");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_failure_keeps_the_surface_and_other_parameters_continue() {
     let points = noisy(sphere, 400, 0.0, 4);
@@ -312,8 +318,8 @@ fn an_unsolvable_system_is_reported() {
     sound(surface.surface());
 }
 
+#[ignore = "long: npm run test:all"]
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_restored_run_continues_bit_for_bit() {
     let mut random = Random(3);
     let (exact, normals) = surface_points(blend, 500, &mut random);
@@ -377,6 +383,7 @@ fn edited() -> (Vec<Vec3>, PointEdits) {
     (points, edits)
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn edits_have_the_effect_of_other_input_points() {
     let (points, edits) = edited();
@@ -415,6 +422,7 @@ fn edits_have_the_effect_of_other_input_points() {
     assert!((now / then - 1.0).abs() < 1e-5, "{now} for {then}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn many_added_points_are_solved_from_the_start() {
     let points = noisy(torus, 900, 0.0, 4);
@@ -431,6 +439,7 @@ fn many_added_points_are_solved_from_the_start() {
 }
 
 /// A wide block of the matrix must not be treated as 0 because its first row underflows.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_dense_cluster_beside_a_ball_is_solved_with_a_narrow_gaussian() {
     let mut points = noisy(sphere, 500, 0.0, 3);
@@ -557,6 +566,7 @@ fn a_sampled_volume_has_the_same_shape() {
     }
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn fitness_of_a_ball() {
     let surface = finished(noisy(sphere, MANY, 0.0, 1), ImplicitParams::default());
@@ -628,6 +638,7 @@ fn cameras(count: u8, size: u32) -> Vec<Camera> {
     (0..count).map(camera).collect()
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn cameras_determine_exterior_points_and_colours() {
     let options = ImplicitOptions { cameras: cameras(4, 100), ..ImplicitOptions::default() };
@@ -667,7 +678,7 @@ fn given_exterior_points_are_used() {
     assert!(matches!(failed, MethodError::InvalidArgument { parameter: "exterior", .. }), "{failed}");
 }
 
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[ignore = "long: npm run test:all"]
 #[test]
 fn scaled_and_shifted_points_give_the_same_shape() {
     let points = noisy(torus, 800, 0.0, 6);
@@ -697,6 +708,7 @@ fn scaled_and_shifted_points_give_the_same_shape() {
 }
 
 /// Like map coordinates, where single precision has few digits left for the shape.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn far_from_the_origin_cells_are_coarser() {
     for shift in [100.0_f32, 450.0] {
@@ -807,6 +819,7 @@ fn results_requested_too_early_are_refused() {
     assert!(surface.preview().unwrap().triangles.is_empty());
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn equal_points_are_merged_and_counted() {
     let mut points = noisy(sphere, 300, 0.0, 4);
@@ -820,6 +833,7 @@ fn equal_points_are_merged_and_counted() {
 
 /// Regression: a ball sampled by longitude and latitude has many points at its poles that differ by rounding. Depending
 /// on the ball's position, they were refused as exterior points on the surface, or the solver did not end.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn points_that_differ_by_rounding_are_solved() {
     for shift in [Vec3::ZERO, Vec3::new(0.3, 0.1, 0.7)] {
@@ -866,6 +880,7 @@ fn bits_are_the_same_on_every_platform() {
 /// After an intended change of the core, copy the value that the test finds here and to `tests/js/bumps.ts`.
 const BUMPS_BITS: &str = "374a46a66599111a";
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn previews_grow_during_extraction() {
     let mut surface = begun(noisy(sphere, 300, 0.0, 4), ImplicitParams::default());

@@ -120,8 +120,8 @@ fn as_good_as_poisson(noise: usize, params: &ImplicitParams) {
 /// [`BAR`] is not reached. With noise of 0.02 it is 1.7 and 1.9 times on the sphere and the torus, and the other two
 /// shapes get up to five spurious components. Only one seed of three is run; the errors of the others differ by at most
 /// 7 %.
+#[ignore = "long: npm run test:all"]
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn the_accuracy_at_the_defaults_is_as_recorded() {
     let mut cases = 0;
     for (noise, known) in (0..3).flat_map(|noise| ALL.iter().map(move |known| (noise, known))) {

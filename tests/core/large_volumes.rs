@@ -122,6 +122,7 @@ fn the_surface_does_not_depend_on_the_order_in_which_bricks_arrive() {
 
 /// Bricks that arrive long before they are asked for, or are dropped and asked for again, change nothing; a model shares
 /// its bricks with another one that drops them.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn two_models_share_a_volume() {
     let store = store();

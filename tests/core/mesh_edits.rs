@@ -281,25 +281,26 @@ fn followed(mut mesh: Mesh) -> (Mesh, VectorKey) {
     (mesh, key)
 }
 
-/// 100,000 edits in all; a failing seed is named.
+/// 100,000 edits in all natively, a quarter of them in wasm; a failing seed is named.
 #[test]
 fn random_edits_keep_every_invariant() {
     let starts: [fn() -> Mesh; 5] =
         [tetrahedron, sphere, || torus(3, 7), || torus(9, 3), || Mesh::icosahedron(Vec3::ZERO, 1.0)];
     let (mut edits, mut refused) = ([0; EDITS.len()], 0);
-    for seed in 0..20 {
+    let seeds = if cfg!(target_arch = "wasm32") { 5 } else { 20 };
+    for seed in 0..seeds {
         let (made, not_made) = run_random_edits(starts[seed % starts.len()], seed as u64, 5_000);
         edits.iter_mut().zip(made).for_each(|(sum, made)| *sum += made);
         refused += not_made;
     }
-    assert_eq!(edits.iter().sum::<usize>(), 100_000);
+    assert_eq!(edits.iter().sum::<usize>(), seeds * 5_000);
     println!("{edits:?} of {EDITS:?}; {refused} refused");
     for ((name, _), (made, least)) in
-        EDITS.iter().zip(edits.into_iter().zip([20_000, 20_000, 30_000, 3_000, 500, 3_000]))
+        EDITS.iter().zip(edits.into_iter().zip([1_000, 1_000, 1_500, 150, 25, 150]))
     {
-        assert!(made >= least, "only {made} {name}");
+        assert!(made >= seeds * least, "only {made} {name}");
     }
-    assert!(refused >= 10_000, "only {refused} edits were refused: refusals are not tested");
+    assert!(refused >= seeds * 500, "only {refused} edits were refused: refusals are not tested");
 }
 
 /// Returns the serialised mesh, which leaves out its versions.

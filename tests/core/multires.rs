@@ -108,6 +108,7 @@ fn every_ellipsoid_stays_covered_and_is_never_penetrated() {
     }
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_neck_splits_and_the_components_join_again() {
     let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
@@ -156,6 +157,7 @@ fn without_topology_changes_a_thread_remains() {
     }
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_detail_follows_a_rigid_motion_exactly() {
     let mut model = bumpy_model(coarse(0.12));
@@ -208,6 +210,7 @@ fn the_detail_reproduces_the_surface_and_keeps_it_under_deformation() {
     assert!(distances.len() > 50 && mean < 0.02, "{mean}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_base_correspondence_keeps_areas_and_does_not_fold() {
     let globe = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles();
@@ -291,6 +294,7 @@ fn a_new_ellipsoid_outside_grows_out_of_its_neighbour() {
 }
 
 /// Frames in between may only relax the surface; the final one is solved for.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn many_small_moves_end_like_one_large_move() {
     let at = |way: f64| [ball(-0.7, 0.0, 0.0, 0.8), ball(0.5 + way, 0.2 * way, 0.0, 0.7)];
@@ -311,6 +315,7 @@ fn many_small_moves_end_like_one_large_move() {
     assert!(apart < 0.15, "{apart}");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn edges_grow_to_forty_times_their_length_within_a_few_frames() {
     let mut model = lamp(&[ball(0.0, 0.0, 0.0, 20.0)], coarse(0.5));

@@ -115,6 +115,7 @@ fn self_intersections_at_the_plane_are_refused() {
     assert_eq!(count_self_intersections(&rest), count_self_intersections(&two));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn random_planes_through_difficult_shapes() {
     let shapes = all();
@@ -147,6 +148,7 @@ fn random_planes_through_difficult_shapes() {
     assert!(refusals <= 3, "{refusals} refusals");
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn again_and_again() {
     for seed in seeds(6) {

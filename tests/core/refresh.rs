@@ -3,6 +3,7 @@
 use super::common::scenes;
 use super::common::strokes::{ISO, Scene, Stroke, StrokeKind};
 use super::common::{Named, Random, assert_at_least, euler_of_parts, seeds};
+use std::sync::OnceLock;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Topology};
@@ -24,6 +25,17 @@ fn settled(volume: &Volume) -> DeformableModel {
     let mut model = DeformableModel::new(volume, options(volume)).unwrap();
     while !model.step().unwrap().done {}
     model
+}
+
+/// Returns the scene without strokes and the model settled on it, which several tests begin with.
+fn settled_scene(is_smooth: bool) -> (Scene, DeformableModel) {
+    static SCENES: [OnceLock<(Scene, DeformableModel)>; 2] = [OnceLock::new(), OnceLock::new()];
+    let make = || {
+        let scene = Scene::new(SIDE, BRUSH, is_smooth);
+        let model = settled(&scene.volume);
+        (scene, model)
+    };
+    SCENES[usize::from(is_smooth)].get_or_init(make).clone()
 }
 
 fn check(model: &DeformableModel) {
@@ -66,13 +78,13 @@ fn assert_covered(model: &DeformableModel) {
 
 /// Makes one stroke of a kind on a settled model, lets it settle, and returns χ and the number of parts before and after.
 fn stroke(kind: StrokeKind, is_smooth: bool) -> [(i64, usize); 2] {
-    let mut scene = Scene::new(SIDE, BRUSH, is_smooth);
+    let (mut scene, mut model) = settled_scene(is_smooth);
     let mut random = Random(5);
     if kind == StrokeKind::EraseIsland {
         let island = scene.stroke(StrokeKind::Island, &mut random).unwrap();
         scene.paint(island);
+        model = settled(&scene.volume);
     }
-    let mut model = settled(&scene.volume);
     let counts = |model: &DeformableModel| (model.mesh().euler(), model.mesh().component_count());
     let before = counts(&model);
     let stroke = scene.stroke(kind, &mut random).unwrap();

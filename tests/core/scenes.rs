@@ -78,6 +78,7 @@ fn chain_from_radii(numbers: impl Iterator<Item = u32>) {
     }
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn chain_from_three_radii() {
     chain_from_radii((0..12).step_by(4));
@@ -198,7 +199,7 @@ fn marching_cubes_of_noise_without_rigidity_stay_valid_for_long() {
 }
 
 /// A model restored from a state saved in the middle of a merge continues with the same bits.
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[ignore = "long: npm run test:all"]
 #[test]
 fn a_run_restored_during_a_merge_continues_bit_for_bit() {
     let volume = scenes::chain();

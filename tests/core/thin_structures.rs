@@ -81,6 +81,7 @@ fn to_box(p: Vec3, middle: Vec3, half: Vec3) -> f32 {
     q.max(Vec3::ZERO).length() + q.max_element().min(0.0)
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn plates_of_one_voxel_and_more() {
     let middle = Vec3::new(15.7, 15.3, 9.3);
@@ -90,8 +91,8 @@ fn plates_of_one_voxel_and_more() {
     }
 }
 
+#[ignore = "long: npm run test:all"]
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn curved_plates_of_one_voxel_and_more() {
     let middle = Vec3::new(15.4, 15.2, 15.3);
     for thickness in [1.0, 1.5, 2.0, 3.0] {
@@ -131,6 +132,7 @@ fn three_nested_hollow_spheres() {
     });
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn two_sheets_side_by_side() {
     for gap in [1.0, 2.0, 3.0] {
@@ -211,6 +213,7 @@ fn parts_that_are_too_small_are_left_out() {
 
 /// Positions are returned in world space in single precision. Regression: sheets nearer than rounding intersected
 /// there.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn nothing_intersects_in_world_space() {
     let dims = [18, 17, 16];

@@ -255,8 +255,8 @@ fn a_side_of_the_box_inside_the_cavity_closes_the_surface() {
     }
 }
 
+#[ignore = "long: npm run test:all"]
 #[test]
-#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn extreme_time_scales_and_short_cycles_are_tracked() {
     for (frames, time_scale, window_frames) in [(2, 1e-9, 2), (3, 1e-9, 2), (3, 1e9, 0), (5, 0.0, 4)] {
         let cine = Cine::small().first(frames);
@@ -339,6 +339,7 @@ fn a_restored_run_continues_bit_for_bit() {
     assert!(tracker.meshes().is_empty() && tracker.step().is_ok());
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn boundary_parameters_restart_tracking_and_others_do_not() {
     let cine = Cine::small().first(3);

@@ -260,7 +260,9 @@ function describeEach(title: string, work: (make: () => { free(): void }) => Pro
   });
 }
 
-test('with memory nearly full, calls fail with a named error and succeed again once memory is freed', () => {
+test('with memory nearly full, calls fail with a named error and succeed again once memory is freed', {
+  tags: ['long'],
+}, () => {
   // Runs in a separate process, which uses all 4 GiB that wasm can have.
   const script = `
     const vesicle = await import('./pkg/index.js');

@@ -405,7 +405,7 @@ test('invalid files are refused', () => {
   for (const bytes of broken) expect(failure(() => Mesh.parse(bytes)).code).toBe('bad-file');
 });
 
-test('more triangles than fit into memory are refused', () => {
+test('more triangles than fit into memory are refused', { tags: ['long'] }, () => {
   expect(failure(() => Mesh.icosphere([0, 0, 0], 1, 1e-6)).code).toBe('too-large');
 });
 

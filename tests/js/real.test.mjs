@@ -7,11 +7,20 @@ import { at } from '../../scripts/shell.mjs';
 
 beforeAll(() => init());
 
-const VOLUMES = ['ovule.nrrd', 'tooth.nrrd', 'visible-human-head.nii.gz', 'heart.nii.gz'];
+const VOLUMES = [
+  { name: 'tooth.nrrd' },
+  { name: 'heart.nii.gz' },
+  { name: 'ovule.nrrd', tags: ['long'] },
+  { name: 'visible-human-head.nii.gz', tags: ['long'] },
+];
 
 const volumeOf = async (name) => library.Volume.parse(new Uint8Array(await readFile(at('www/public/data', name))));
 
-test.each(VOLUMES)('the whole contour of %s is found, and nothing else', async (name) => {
+for (const { name, ...options } of VOLUMES) {
+  test(`the whole contour of ${name} is found, and nothing else`, options, () => findsContour(name));
+}
+
+async function findsContour(name) {
   const volume = await volumeOf(name);
   for (const iso of valleys(volume.histogram(256), volume.range, 2)) {
     const row = await measured(library, volume, iso, 0);
@@ -20,7 +29,7 @@ test.each(VOLUMES)('the whole contour of %s is found, and nothing else', async (
     expect(row.share, `vertices of marching cubes' at ${iso}`).toBeLessThan(0.6);
   }
   volume.free();
-});
+}
 
 test('coarse to fine, too', async () => {
   const volume = await volumeOf('tooth.nrrd');

@@ -229,7 +229,7 @@ test.each(Object.entries(SCENES))('%s: the same as without a worker', async (_, 
   expect(await scene(worker)).toEqual(here);
 });
 
-test('two hundred steps give the same bits as the native core', async () => {
+test('two hundred steps give the same bits as the native core', { tags: ['long'] }, async () => {
   expect(await spongeBits(worker)).toBe(SPONGE_BITS);
 });
 

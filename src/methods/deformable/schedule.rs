@@ -345,6 +345,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn the_fastest_vertex_counts_again_once_a_parameter_was_set() {
         let mut model = model();
         while !model.step().unwrap().done {}

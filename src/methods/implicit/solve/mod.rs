@@ -451,6 +451,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
     fn the_residual_is_the_true_one() {
         for tolerance in [1e-3, 1e-5, 1e-7, 1e-10] {
             for lambda in [[0.0, 0.0], [0.001, 2.0]] {

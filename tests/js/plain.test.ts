@@ -1,4 +1,4 @@
-// The module for engines without vector instructions.
+// The module for engines without vector instructions, which is compiled for `npm run test:all` only.
 import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdtempSync, readFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -7,7 +7,7 @@ import { expect, test } from 'vitest';
 import { bits, node, root } from './processes.js';
 import { SPONGE_BITS } from './sponge.js';
 
-test('an engine without SIMD gets the plain module, with the same bits', () => {
+test('an engine without SIMD gets the plain module, with the same bits', { tags: ['long'] }, () => {
   const without = `
     const { readFile } = (await import('node:fs')).promises;
     const read = [];
@@ -20,7 +20,7 @@ test('an engine without SIMD gets the plain module, with the same bits', () => {
   expect(node(`${without}${bits('./pkg/index.js')}${sizes}`)).toBe(`${SPONGE_BITS}\ntrue false`);
 });
 
-test('only the plain module is valid without SIMD', () => {
+test('only the plain module is valid without SIMD', { tags: ['long'] }, () => {
   const check = (...args: string[]) =>
     spawnSync('node_modules/.bin/wasm-opt', ['--all-features', ...args], { cwd: root }).status;
   const isValid = (module: string) => {
@@ -33,7 +33,7 @@ test('only the plain module is valid without SIMD', () => {
   expect(isValid('vesicle_bg.wasm')).toBe(false);
 });
 
-test('its size is that in sizes.json', () => {
+test('its size is that in sizes.json', { tags: ['long'] }, () => {
   const print = "import('./scripts/sizes.mjs').then(async ({ PLAIN, sizeOf }) => console.log(await sizeOf(PLAIN)))";
   const size = Number(execFileSync(process.execPath, ['--eval', print], { cwd: root, encoding: 'utf8' }));
   const known = JSON.parse(readFileSync(`${root}sizes.json`, 'utf8'))['vesicle_plain_bg.wasm'];
