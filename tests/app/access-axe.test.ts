@@ -62,7 +62,7 @@ const LONG_RUNS: Partial<typeof QUICK> = {
   reconstruct: 'reconstruct?maxPoints=30000',
 };
 
-test('lessons: the list, an open one with everything unfolded, and its sheets', async () => {
+test('lessons: the list, an open one with everything unfolded, and its sheets', LONG, async () => {
   await open(app, QUICK.extract);
   await reach(app.page, 'done');
   await app.page.getByRole('button', { name: 'Lessons' }).click();
@@ -100,12 +100,13 @@ describe.each(LABS)('the %s lab', (lab) => {
     await expectNothing('html', looks);
   }
 
-  test('has no violations when it is done and everything is expanded, nor in its message', () =>
-    expectNothingWhenDone(LOOKS));
+  test('has no violations when it is done and everything is expanded, nor in its message', inOneLab(lab), () =>
+    expectNothingWhenDone(LOOKS),
+  );
 
   test('has none in other looks either', LONG, () => expectNothingWhenDone(OTHER_LOOKS));
 
-  test('has no violations in its list of keyboard shortcuts', inOneLab(lab), async () => {
+  test('has no violations in its list of keyboard shortcuts', LONG, async () => {
     await open(app, QUICK[lab]);
     await reach(app.page, 'done');
     await app.page.click('#help');
@@ -113,7 +114,7 @@ describe.each(LABS)('the %s lab', (lab) => {
   });
 });
 
-test('the benchmark page has no violations', async () => {
+test('the benchmark page has no violations', LONG, async () => {
   await app.page.goto(`${app.address}bench.html`);
   await app.page.waitForSelector('[data-bench]');
   await unfold(app.page);

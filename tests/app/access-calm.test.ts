@@ -1,7 +1,7 @@
 import type { Browser } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, LABS, open, openApp, overflow, QUICK, reach, unfold } from './browser';
-import { LONG } from './long';
+import { inOneLab, LONG } from './long';
 
 let app: App;
 
@@ -55,80 +55,84 @@ function cut(): Promise<string[]> {
   });
 }
 
-describe.each(LABS)('the %s lab', (lab) => {
-  test('does not animate with reduced motion when its example is done', async () => {
-    await open(app, QUICK[lab]);
-    await reach(app.page, 'done');
-    // Pending frames are drawn first.
-    await expect.poll(() => drawings(5)).toBe(0);
-    expect(await drawings(60)).toBe(0);
-    const animations = await app.page.evaluate(() => document.getAnimations().length);
-    expect(animations).toBe(0);
-  });
-
-  test('shows pressed buttons, the current lab and colour legends in forced colours', async () => {
-    await app.page.emulateMedia({ forcedColors: 'active' });
-    const styles = await app.page.evaluate(() => {
-      const all = (selector: string) =>
-        [...document.querySelectorAll<HTMLElement>(selector)].filter((one) => one.checkVisibility());
-      const outlined = (one: HTMLElement) => getComputedStyle(one).outlineStyle !== 'none';
-      const color = (one: HTMLElement) => getComputedStyle(one).backgroundColor;
-      return {
-        forced: matchMedia('(forced-colors: active)').matches,
-        current: all('.labs a').map((one) => outlined(one) === one.hasAttribute('aria-current')),
-        pressed: all('button[aria-pressed]').map(
-          (one) => outlined(one) === (one.getAttribute('aria-pressed') === 'true'),
-        ),
-        swatches: new Set(all('.swatch').map(color)).size,
-      };
+for (const lab of LABS) {
+  describe(`the ${lab} lab`, inOneLab(lab), () => {
+    test('does not animate with reduced motion when its example is done', async () => {
+      await open(app, QUICK[lab]);
+      await reach(app.page, 'done');
+      // Pending frames are drawn first.
+      await expect.poll(() => drawings(5)).toBe(0);
+      expect(await drawings(60)).toBe(0);
+      const animations = await app.page.evaluate(() => document.getAnimations().length);
+      expect(animations).toBe(0);
     });
-    await app.page.emulateMedia({ forcedColors: null });
-    expect(styles.forced).toBe(true);
-    expect(styles.current).toEqual(LABS.map(() => true));
-    // Two balls have neither photographs nor figures to choose from.
-    expect(styles.pressed.length > 0).toBe(lab !== 'reconstruct');
-    expect(styles.pressed.every(Boolean)).toBe(true);
-    expect(styles.swatches).toBe(['extract', 'track', 'segment'].includes(lab) ? 3 : 0);
-  });
 
-  test('describes all its pictures in words', async () => {
-    await unfold(app.page);
-    const untold = await app.page.evaluate(() => {
-      const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
-      const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
-      const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
-      // A picture on a button is described by the button's label.
-      const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
-      return shown.filter((one) => !named(one) && !button(one) && caption(one).length < 20).map((one) => one.outerHTML);
+    test('shows pressed buttons, the current lab and colour legends in forced colours', async () => {
+      await app.page.emulateMedia({ forcedColors: 'active' });
+      const styles = await app.page.evaluate(() => {
+        const all = (selector: string) =>
+          [...document.querySelectorAll<HTMLElement>(selector)].filter((one) => one.checkVisibility());
+        const outlined = (one: HTMLElement) => getComputedStyle(one).outlineStyle !== 'none';
+        const color = (one: HTMLElement) => getComputedStyle(one).backgroundColor;
+        return {
+          forced: matchMedia('(forced-colors: active)').matches,
+          current: all('.labs a').map((one) => outlined(one) === one.hasAttribute('aria-current')),
+          pressed: all('button[aria-pressed]').map(
+            (one) => outlined(one) === (one.getAttribute('aria-pressed') === 'true'),
+          ),
+          swatches: new Set(all('.swatch').map(color)).size,
+        };
+      });
+      await app.page.emulateMedia({ forcedColors: null });
+      expect(styles.forced).toBe(true);
+      expect(styles.current).toEqual(LABS.map(() => true));
+      // Two balls have neither photographs nor figures to choose from.
+      expect(styles.pressed.length > 0).toBe(lab !== 'reconstruct');
+      expect(styles.pressed.every(Boolean)).toBe(true);
+      expect(styles.swatches).toBe(['extract', 'track', 'segment'].includes(lab) ? 3 : 0);
     });
-    expect(untold).toEqual([]);
-  });
 
-  test.skipIf(['track', 'segment'].includes(lab))('has the numbers of its plots in a table', async () => {
-    const table = app.page.locator('[data-plot-table]');
-    const last = table.locator('tbody tr:not([hidden])').last();
-    await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);
-    const iteration = (await app.page.textContent('.iteration'))?.replace('Iteration ', '');
-    await expect.poll(() => last.locator('th').textContent()).toBe(iteration);
-    const heads = await table.locator('thead th').count();
-    expect(await last.locator('td').count()).toBe(heads - 1);
-  });
+    test('describes all its pictures in words', async () => {
+      await unfold(app.page);
+      const untold = await app.page.evaluate(() => {
+        const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
+        const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
+        const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
+        // A picture on a button is described by the button's label.
+        const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
+        return shown
+          .filter((one) => !named(one) && !button(one) && caption(one).length < 20)
+          .map((one) => one.outerHTML);
+      });
+      expect(untold).toEqual([]);
+    });
 
-  test.each([
-    [640, 400],
-    [320, 256],
-  ])('shows all its texts at %i by %i, as when zoomed in', async (width, height) => {
-    await app.page.setViewportSize({ width: 1280, height: 800 });
-    const wide = await words();
-    expect(wide).toContain('How it works');
-    expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
-    const narrow = await words();
-    expect(wide.filter((word) => !narrow.includes(word))).toEqual([]);
-    expect(await cut()).toEqual([]);
-  });
-});
+    test.skipIf(['track', 'segment'].includes(lab))('has the numbers of its plots in a table', async () => {
+      const table = app.page.locator('[data-plot-table]');
+      const last = table.locator('tbody tr:not([hidden])').last();
+      await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);
+      const iteration = (await app.page.textContent('.iteration'))?.replace('Iteration ', '');
+      await expect.poll(() => last.locator('th').textContent()).toBe(iteration);
+      const heads = await table.locator('thead th').count();
+      expect(await last.locator('td').count()).toBe(heads - 1);
+    });
 
-describe('with reduced motion', () => {
+    test.each([
+      [640, 400],
+      [320, 256],
+    ])('shows all its texts at %i by %i, as when zoomed in', async (width, height) => {
+      await app.page.setViewportSize({ width: 1280, height: 800 });
+      const wide = await words();
+      expect(wide).toContain('How it works');
+      expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+      const narrow = await words();
+      expect(wide.filter((word) => !narrow.includes(word))).toEqual([]);
+      expect(await cut()).toEqual([]);
+    });
+  });
+}
+
+describe('with reduced motion', LONG, () => {
   test('Track plays on request; without it, it plays by itself', async () => {
     const beat = () => app.page.textContent('[data-frame=beat]');
     await open(app, QUICK.track);
@@ -152,12 +156,10 @@ describe('with reduced motion', () => {
   });
 });
 
-describe('with a screen reader', () => {
-  for (const [address, options] of [
-    ['extract?example=tooth&levels=0', LONG],
-    ['sculpt?example=lava', {}],
-  ] as const) {
-    test(`progress of ${address} is announced now and then, not with each step`, options, async () => {
+describe('with a screen reader', LONG, () => {
+  test.each(['extract?example=tooth&levels=0', 'sculpt?example=lava'])(
+    'progress of %s is announced now and then, not with each step',
+    async (address) => {
       // A clock a hundred times as fast; otherwise the test would take minutes, and the tooth would be done.
       const page = await (app.page.context().browser() as Browser).newPage();
       await page.addInitScript(() => {
@@ -183,6 +185,6 @@ describe('with a screen reader', () => {
       const pauses = times.slice(1).map((time, i) => time - (times[i] ?? 0));
       expect(Math.min(...pauses)).toBeGreaterThan(9000);
       await page.close();
-    });
-  }
+    },
+  );
 });

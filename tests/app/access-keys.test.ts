@@ -76,17 +76,15 @@ async function walk(key: string, controls: string[]): Promise<string[]> {
   return stops;
 }
 
-describe.each(LABS)('the %s lab', (lab) => {
-  beforeAll(async () => {
-    await open(app, QUICK[lab]);
-    await reach(app.page, 'done');
-    await unfold(app.page);
-  });
+for (const lab of LABS) {
+  describe(`the ${lab} lab`, inOneLab(lab), () => {
+    beforeAll(async () => {
+      await open(app, QUICK[lab]);
+      await reach(app.page, 'done');
+      await unfold(app.page);
+    });
 
-  test(
-    'can be traversed with Tab in light and dark mode, with a visible focus at each stop',
-    inOneLab(lab),
-    async () => {
+    test('can be traversed with Tab in light and dark mode, with a visible focus at each stop', async () => {
       const controls = await numberControls(app.page);
       expect(controls.length).toBeGreaterThan(20);
       const all = controls.map((_, i) => String(i));
@@ -98,76 +96,76 @@ describe.each(LABS)('the %s lab', (lab) => {
       await app.page.locator(`[data-number="${controls.length - 1}"]`).focus();
       await app.page.emulateMedia({ colorScheme: 'dark' });
       expect(await walk('Shift+Tab', controls.slice(1))).toEqual(all.slice(0, -1).reverse());
-    },
-  );
+    });
 
-  test('returns the focus when the keyboard shortcuts are closed', async () => {
-    for (const opener of ['#help', 'canvas[tabindex]']) {
-      await app.page.locator(opener).focus();
-      await app.page.keyboard.press(opener === '#help' ? 'Enter' : '?');
-      await app.page.waitForSelector('dialog[open]');
-      expect(await app.page.evaluate(() => document.activeElement?.closest('dialog') !== null)).toBe(true);
-      await app.page.keyboard.press('Escape');
-      await expect.poll(() => app.page.locator('dialog').isVisible()).toBe(false);
-      expect(await app.page.evaluate((one) => document.activeElement?.matches(one), opener)).toBe(true);
-    }
-  });
+    test('returns the focus when the keyboard shortcuts are closed', async () => {
+      for (const opener of ['#help', 'canvas[tabindex]']) {
+        await app.page.locator(opener).focus();
+        await app.page.keyboard.press(opener === '#help' ? 'Enter' : '?');
+        await app.page.waitForSelector('dialog[open]');
+        expect(await app.page.evaluate(() => document.activeElement?.closest('dialog') !== null)).toBe(true);
+        await app.page.keyboard.press('Escape');
+        await expect.poll(() => app.page.locator('dialog').isVisible()).toBe(false);
+        expect(await app.page.evaluate((one) => document.activeElement?.matches(one), opener)).toBe(true);
+      }
+    });
 
-  test('rotates, zooms and resets its view by keys', async () => {
-    const view = app.page.locator('canvas[tabindex]').first();
-    await view.press('Home');
-    const picture = () => view.screenshot();
-    const home = await picture();
-    for (const key of ['ArrowLeft', 'ArrowUp', '+']) {
-      await view.press(key);
-      await changes(app.page, home, picture, 0.02, key);
+    test('rotates, zooms and resets its view by keys', async () => {
+      const view = app.page.locator('canvas[tabindex]').first();
       await view.press('Home');
-      await showsAgain(app.page, home, picture, `Home after ${key}`);
-    }
-  });
+      const picture = () => view.screenshot();
+      const home = await picture();
+      for (const key of ['ArrowLeft', 'ArrowUp', '+']) {
+        await view.press(key);
+        await changes(app.page, home, picture, 0.02, key);
+        await view.press('Home');
+        await showsAgain(app.page, home, picture, `Home after ${key}`);
+      }
+    });
 
-  test.runIf(SLICED.includes(lab))('moves its slices by keys, and announces their positions', async () => {
-    for (const name of ['Axial', 'Coronal', 'Sagittal']) {
-      const slider = app.page.locator('.slice').getByLabel(name, { exact: true });
-      const before = Number(await slider.inputValue());
-      await slider.press('ArrowRight');
-      const picture = app.page.locator(`.slice canvas[aria-label^="${name} slice ${before + 1} of"]`);
-      await expect.poll(() => picture.count()).toBe(1);
-    }
-  });
+    test.runIf(SLICED.includes(lab))('moves its slices by keys, and announces their positions', async () => {
+      for (const name of ['Axial', 'Coronal', 'Sagittal']) {
+        const slider = app.page.locator('.slice').getByLabel(name, { exact: true });
+        const before = Number(await slider.inputValue());
+        await slider.press('ArrowRight');
+        const picture = app.page.locator(`.slice canvas[aria-label^="${name} slice ${before + 1} of"]`);
+        await expect.poll(() => picture.count()).toBe(1);
+      }
+    });
 
-  test.runIf(lab === 'track')('changes the frame by keys, the alternative to clicking the curve', async () => {
-    await app.page.locator('canvas[tabindex]').first().focus();
-    const shown = () => app.page.textContent('[data-frames]');
-    const [before = 0, frames = 0] = ((await shown()) ?? '').split(' of ').map(Number);
-    await app.page.keyboard.press('.');
-    await expect.poll(shown).toBe(`${(before % frames) + 1} of ${frames}`);
-  });
+    test.runIf(lab === 'track')('changes the frame by keys, the alternative to clicking the curve', async () => {
+      await app.page.locator('canvas[tabindex]').first().focus();
+      const shown = () => app.page.textContent('[data-frames]');
+      const [before = 0, frames = 0] = ((await shown()) ?? '').split(' of ').map(Number);
+      await app.page.keyboard.press('.');
+      await expect.poll(shown).toBe(`${(before % frames) + 1} of ${frames}`);
+    });
 
-  test.runIf(lab === 'reconstruct')('adds a point in the centre of the view with Enter', async () => {
-    await app.page.locator('[data-tool=add]').focus();
-    await app.page.keyboard.press(' ');
-    await app.page.locator('canvas[tabindex]').first().press('Enter');
-    await expect.poll(() => app.page.textContent('.edit-tools [role=status]')).toContain('1 point added');
-  });
+    test.runIf(lab === 'reconstruct')('adds a point in the centre of the view with Enter', async () => {
+      await app.page.locator('[data-tool=add]').focus();
+      await app.page.keyboard.press(' ');
+      await app.page.locator('canvas[tabindex]').first().press('Enter');
+      await expect.poll(() => app.page.textContent('.edit-tools [role=status]')).toContain('1 point added');
+    });
 
-  // Segment has no run.
-  test.skipIf(lab === 'segment')('can be run by keys: reset, a step, ten steps', async () => {
-    // The globe has converged after a step.
-    if (lab === 'sculpt') await open(app, 'sculpt?example=lava');
-    await reach(app.page, 'running', 'paused', 'done');
-    await app.page.locator('canvas[tabindex]').first().focus();
-    await app.page.keyboard.press('r');
-    await reach(app.page, 'paused');
-    await app.page.keyboard.press('s');
-    await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
-    await app.page.keyboard.press('d');
-    await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 11');
-  });
+    // Segment has no run.
+    test.skipIf(lab === 'segment')('can be run by keys: reset, a step, ten steps', async () => {
+      // The globe has converged after a step.
+      if (lab === 'sculpt') await open(app, 'sculpt?example=lava');
+      await reach(app.page, 'running', 'paused', 'done');
+      await app.page.locator('canvas[tabindex]').first().focus();
+      await app.page.keyboard.press('r');
+      await reach(app.page, 'paused');
+      await app.page.keyboard.press('s');
+      await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
+      await app.page.keyboard.press('d');
+      await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 11');
+    });
 
-  // A system of equations has no earlier steps to return to, and Segment no steps.
-  test.skipIf(['reconstruct', 'segment'].includes(lab))('undoes steps by keys', async () => {
-    await app.page.keyboard.press('Control+z');
-    await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
+    // A system of equations has no earlier steps to return to, and Segment no steps.
+    test.skipIf(['reconstruct', 'segment'].includes(lab))('undoes steps by keys', async () => {
+      await app.page.keyboard.press('Control+z');
+      await expect.poll(() => app.page.textContent('.iteration')).toBe('Iteration 1');
+    });
   });
-});
+}

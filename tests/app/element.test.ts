@@ -10,6 +10,7 @@ import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { beating } from '../js/beating';
 import { launch } from './browser';
+import { LONG } from './long';
 import { changes, countPixels } from './pixels';
 import { metaImageHeader, ring } from './volumes';
 
@@ -108,7 +109,7 @@ test('pause, step, play and reset work, and every step emits an event', async ()
   expect(await words()).toBe('Ready.');
 });
 
-test('changed attributes restart it', async () => {
+test('changed attributes restart it', LONG, async () => {
   await open('<vesicle-lab src="ring.mha" paused></vesicle-lab>');
   await state('paused');
   const rigidity = () =>
@@ -118,7 +119,7 @@ test('changed attributes restart it', async () => {
   await expect.poll(rigidity).toBe(0.05);
 });
 
-test('the view rotates by keys and is described in words', async () => {
+test('the view rotates by keys and is described in words', LONG, async () => {
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
   await state('done');
   const view = page.getByRole('img', { name: /^The surface\. Arrow keys rotate it/ });
@@ -149,7 +150,7 @@ test('each element with invalid attributes or data shows an error message', asyn
   for (const [i, [body, message]] of INVALID.entries()) expect(messages[i], body).toMatch(message);
 });
 
-test('a missing file', async () => {
+test('a missing file', LONG, async () => {
   await open('<vesicle-lab src="gone.nii"></vesicle-lab>');
   await state('error');
   expect(await words()).toMatch(/gone\.nii: 404/);
@@ -169,7 +170,7 @@ test('points', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('a mesh with ellipsoids, which runs without end', async () => {
+test('a mesh with ellipsoids, which runs without end', LONG, async () => {
   await init();
   await writeFile(join(folder, 'ball.ply'), Mesh.icosphere([0, 0, 0], 1, 0.3).toBytes('ply'));
   const axes = [0, 1, 2].map((axis) => [0, 1, 2].map((other) => (axis === other ? 0.9 : 0)));
@@ -181,7 +182,7 @@ test('a mesh with ellipsoids, which runs without end', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('a volume with frames', async () => {
+test('a volume with frames', LONG, async () => {
   await init();
   await writeFile(join(folder, 'beating.nii'), beating().toNifti());
   await open('<vesicle-lab src="beating.nii" method="tracking" params=\'{ "threshold": 60 }\'></vesicle-lab>');
@@ -189,7 +190,7 @@ test('a volume with frames', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('removed from the page it stops, and inserted again it restarts', async () => {
+test('removed from the page it stops, and inserted again it restarts', LONG, async () => {
   await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR}></vesicle-lab>`);
   await state('done');
   // A run may end before a look at the page finds it running, so the states are recorded.
@@ -208,7 +209,7 @@ test('removed from the page it stops, and inserted again it restarts', async () 
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
-test('without WebGL there are numbers, and a message in place of the view', async () => {
+test('without WebGL there are numbers, and a message in place of the view', LONG, async () => {
   await writeFile(join(folder, 'blind.js'), 'HTMLCanvasElement.prototype.getContext = () => null;');
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>', '<script src="./blind.js"></script>');
   await state('done');

@@ -12,6 +12,7 @@ import {
   reach,
   recordStates,
 } from './browser';
+import { LONG } from './long';
 import { changes, countColors } from './pixels';
 import { ball, metaImageHeader, ring } from './volumes';
 
@@ -226,21 +227,29 @@ describe('the mean edge', () => {
     expect(await measures(app.page)).toEqual(before);
   });
 
-  test('an example brings its own edge length, and a file starts without one and without the previous start', async () => {
-    await app.page.selectOption('.data select', 'linked-rings');
-    await expect.poll(() => edge().inputValue()).toBe('');
-    expect([await complaint().count(), await edge().getAttribute('aria-invalid')]).toEqual([0, null]);
-    await app.page.selectOption('.data select', 'head-bone');
-    await expect.poll(() => edge().inputValue()).toBe('2.2');
-    await reach(app.page, 'running');
-    await app.page.selectOption('.start select', 'sphere');
-    await reach(app.page, 'running');
-    await drop(app.page, [{ name: 'ball.nii', bytes: niftiOf(ball()) }]);
-    await expect.poll(() => edge().inputValue()).toBe('');
-    expect(await app.page.inputValue('.start select')).toBe('contour');
-    await reach(app.page, 'done');
-    expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
-  });
+  test(
+    'an example brings its own edge length, and a file starts without one and without the previous start',
+    LONG,
+    async () => {
+      await reach(app.page, 'running', 'done');
+      await edge().fill('1e9');
+      await edge().press('Enter');
+      await expect.poll(() => complaint().count()).toBe(1);
+      await app.page.selectOption('.data select', 'linked-rings');
+      await expect.poll(() => edge().inputValue()).toBe('');
+      expect([await complaint().count(), await edge().getAttribute('aria-invalid')]).toEqual([0, null]);
+      await app.page.selectOption('.data select', 'head-bone');
+      await expect.poll(() => edge().inputValue()).toBe('2.2');
+      await reach(app.page, 'running');
+      await app.page.selectOption('.start select', 'sphere');
+      await reach(app.page, 'running');
+      await drop(app.page, [{ name: 'ball.nii', bytes: niftiOf(ball()) }]);
+      await expect.poll(() => edge().inputValue()).toBe('');
+      expect(await app.page.inputValue('.start select')).toBe('contour');
+      await reach(app.page, 'done');
+      expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
+    },
+  );
 });
 
 describe('Cancel', () => {
@@ -268,7 +277,7 @@ describe('Cancel', () => {
   });
 });
 
-describe('files that cannot be opened', () => {
+describe('files that cannot be opened', LONG, () => {
   const state = () => app.page.getAttribute('.lab', 'data-state');
 
   /** Opens a text file as soon as the worker has begun to load another volume. */
@@ -290,6 +299,7 @@ describe('files that cannot be opened', () => {
   test('keep the previous volume, even during the loading of another', async () => {
     await app.page.selectOption('.data select', 'tooth');
     await app.page.selectOption('.data select', 'linked-rings');
+    await app.page.locator('.facts', { hasText: 'linked rings' }).waitFor();
     await reach(app.page, 'done');
     const before = await measures(app.page);
     expect(before.components).toBe(2);

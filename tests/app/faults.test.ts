@@ -15,7 +15,7 @@ import {
   reach,
   recordStates,
 } from './browser';
-import { inOneLab } from './long';
+import { inOneLab, LONG } from './long';
 import { countColors, showsAgain } from './pixels';
 import { ball } from './volumes';
 
@@ -74,7 +74,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await countColors(page, await view())).toBeGreaterThan(500);
   });
 
-  test('refuses files with false headers, and keeps the previous data', inOneLab(lab), async () => {
+  test('refuses files with false headers, and keeps the previous data', LONG, async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     const before = await measures(page);
@@ -91,7 +91,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     expect(await states()).not.toContain('running');
   });
 
-  test('survives random key presses and changes of the example', inOneLab(lab), async () => {
+  test('survives random key presses and changes of the example', LONG, async () => {
     await openLab(QUICK[lab]);
     await reach(page, 'done');
     const keys = [' ', 's', 'd', 'r', 'Control+z', 'Control+y', 'Escape', ' ', 'ArrowLeft'];
@@ -124,7 +124,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await reach(page, 'paused');
   });
 
-  test('runs without WebGL 2 and without any storage, and says what is missing', inOneLab(lab), async () => {
+  test('runs without WebGL 2 and without any storage, and says what is missing', LONG, async () => {
     await openLab(QUICK[lab], () => {
       const { getContext } = HTMLCanvasElement.prototype as { getContext: (...given: unknown[]) => unknown };
       Object.assign(HTMLCanvasElement.prototype, {
@@ -193,7 +193,7 @@ describe.each(LABS)('the %s lab', (lab) => {
 
   test.skipIf(lab === 'segment')(
     'continues or pauses in a hidden tab, and shows everything when it becomes visible',
-    inOneLab(lab),
+    LONG,
     async () => {
       await openLab(QUICK[lab], () => {
         // As in a background tab, animation frames stop.

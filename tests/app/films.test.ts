@@ -3,7 +3,7 @@ import { readFile } from 'node:fs/promises';
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, anotherPage, LABS, open, openApp, QUICK, reach } from './browser';
-import { inOneLab } from './long';
+import { LONG } from './long';
 
 let app: App;
 
@@ -77,7 +77,7 @@ describe('a picture', () => {
     await setting('transparent').uncheck();
   });
 
-  test('has a scale bar in proportion to its size', async () => {
+  test('has a scale bar in proportion to its size', LONG, async () => {
     await choose(1000, 1000);
     const large = (await look((await picture()).bytes)).bar;
     await choose(500, 500);
@@ -159,7 +159,8 @@ describe('a film', () => {
     expect(await setting('save').isEnabled()).toBe(true);
   });
 
-  test('of the run needs one, continues it, and ends with it', async () => {
+  test('of the run needs one, continues it, and ends with it', LONG, async () => {
+    await choose(320, 240);
     await setting('film').selectOption('run');
     await record();
     expect(await said()).toContain('Reset');
@@ -170,7 +171,8 @@ describe('a film', () => {
     expect((await play(bytes)).frames).toBeGreaterThan(1);
   });
 
-  test('goes on until the user finishes it', async () => {
+  test('goes on until the user finishes it', LONG, async () => {
+    await choose(320, 240);
     await setting('film').selectOption('open');
     await record();
     await app.page.locator('.scene > canvas').press('ArrowLeft');
@@ -178,7 +180,7 @@ describe('a film', () => {
     expect((await play(bytes)).size).toEqual([320, 240]);
   });
 
-  test('is refused with a message by a browser that cannot record', async () => {
+  test('is refused with a message by a browser that cannot record', LONG, async () => {
     const page = await anotherPage(app, () => {
       Object.assign(window, { MediaRecorder: undefined });
     });
@@ -226,7 +228,7 @@ describe('a plot', () => {
   });
 
   describe.each(LABS.filter((lab) => lab !== 'segment'))('in the %s lab', (lab) => {
-    test('each has a button that saves it', inOneLab(lab), async () => {
+    test('each has a button that saves it', LONG, async () => {
       const page = await anotherPage(app);
       await open({ page, address: app.address }, QUICK[lab]);
       await reach(page, 'done');

@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { type App, measures, open, openApp, QUICK, reach } from './browser';
+import { LONG } from './long';
 
 let app: App;
 
@@ -138,7 +139,7 @@ test('edits end when the run goes on by a single step', async () => {
   expect(Mesh.parse(await saved('[data-export=ply]')).triangleCount).toBe(triangles);
 });
 
-test.each(['reconstruct', 'track'] as const)('surfaces are edited in %s, too', async (lab) => {
+test.each(['reconstruct', 'track'] as const)('surfaces are edited in %s, too', LONG, async (lab) => {
   await open(app, QUICK[lab]);
   await reach(app.page, 'done');
   const { triangles } = await measures(app.page);

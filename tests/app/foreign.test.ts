@@ -4,6 +4,7 @@ import init, { Mesh } from 'vesicle';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { describedIn } from '../../www/src/importers/tiff-description';
 import { type App, measures, openApp, reach } from './browser';
+import { LONG } from './long';
 import { dicomSeries, type Given, tiffStack } from './pictures';
 
 const [WIDE, HIGH, DEEP] = [24, 20, 16];
@@ -79,7 +80,7 @@ describe('DICOM', () => {
     for (const [axis, expected] of [10.325, -10.85, 45].entries()) expect(centroid[axis]).toBeCloseTo(expected, 1);
   });
 
-  test('a segmentation alone opens as a volume of its labels', async () => {
+  test('a segmentation alone opens as a volume of its labels', LONG, async () => {
     const buffer = await readFile('tests/data/volumes/segmentation/binary.dcm');
     await open([{ name: 'binary.dcm', mimeType: 'application/dicom', buffer }], 'binary.dcm');
     expect(await fact('Voxels')).toBe('20 × 16 × 9');
@@ -182,7 +183,7 @@ describe('TIFF', () => {
     await hasVolume(0.5 * 0.5 * 1.25);
   });
 
-  test('one file per slice, in the order of the numbers in their names', async () => {
+  test('one file per slice, in the order of the numbers in their names', LONG, async () => {
     const files = pages().map((page, z) => ({
       ...{ name: `slice${z}.tif`, mimeType: 'image/tiff' },
       buffer: tiffStack([page], [WIDE, HIGH], ''),

@@ -2,6 +2,7 @@
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import { watchPage, watchWorker } from '../../bench/watch.mjs';
 import { type App, iteration, openApp, reach } from './browser';
+import { LONG } from './long';
 
 let app: App;
 /** Names of the scripts that were fetched since the page was opened. */
@@ -49,7 +50,7 @@ test('the code of a lab is fetched when the lab is opened', async () => {
   expect(scripts.filter((name) => /^(reconstruct|track)-/.test(name))).toEqual([]);
 });
 
-test('when several labs are requested in quick succession, only the last one opens', async () => {
+test('when several labs are requested in quick succession, only the last one opens', LONG, async () => {
   await openAt('#extract?example=linked-rings');
   await app.page.evaluate(() => {
     for (const lab of ['track', 'sculpt', 'reconstruct', 'extract', 'sculpt'])
@@ -91,7 +92,7 @@ test('frames of the Sculpt lab are transferred, too', async () => {
   expect((await watched()).copied).toBe(0);
 });
 
-test('the page keeps the displayed surface and returns the previous one', async () => {
+test('the page keeps the displayed surface and returns the previous one', LONG, async () => {
   await openAt('#extract?example=linked-rings');
   await reach(app.page, 'done');
   // Colours are computed from the displayed arrays.
@@ -101,25 +102,29 @@ test('the page keeps the displayed surface and returns the previous one', async 
   await expect.poll(async () => (await watched()).drawn).toBeGreaterThan(1000);
 });
 
-test('with software rendering a large surface is rotated with fewer triangles, and shown at rest with all of them', async () => {
-  await openAt('#extract');
-  await reach(app.page, 'done');
-  const all = Number((await app.page.textContent('[data-measure=triangles]'))?.replace(/\D/g, ''));
-  expect(all).toBeGreaterThan(50_000);
-  await expect.poll(async () => (await watched()).drawn).toBe(all);
-  const { gpu } = await watched();
-  const box = await app.page.locator('.scene > canvas').boundingBox();
-  const [x, y] = [(box?.x ?? 0) + 90, (box?.y ?? 0) + (box?.height ?? 0) - 60];
-  await app.page.mouse.move(x, y);
-  await app.page.mouse.down();
-  await app.page.mouse.move(x + 40, y);
-  await expect.poll(async () => (await watched()).drawn).toBeLessThan(20_000);
-  expect((await watched()).drawn).toBeGreaterThan(4000);
-  await app.page.mouse.up();
-  await expect.poll(async () => (await watched()).drawn).toBe(all);
-  // The temporary buffers have been freed.
-  expect((await watched()).gpu).toBe(gpu);
-});
+test(
+  'with software rendering a large surface is rotated with fewer triangles, and shown at rest with all of them',
+  LONG,
+  async () => {
+    await openAt('#extract');
+    await reach(app.page, 'done');
+    const all = Number((await app.page.textContent('[data-measure=triangles]'))?.replace(/\D/g, ''));
+    expect(all).toBeGreaterThan(50_000);
+    await expect.poll(async () => (await watched()).drawn).toBe(all);
+    const { gpu } = await watched();
+    const box = await app.page.locator('.scene > canvas').boundingBox();
+    const [x, y] = [(box?.x ?? 0) + 90, (box?.y ?? 0) + (box?.height ?? 0) - 60];
+    await app.page.mouse.move(x, y);
+    await app.page.mouse.down();
+    await app.page.mouse.move(x + 40, y);
+    await expect.poll(async () => (await watched()).drawn).toBeLessThan(20_000);
+    expect((await watched()).drawn).toBeGreaterThan(4000);
+    await app.page.mouse.up();
+    await expect.poll(async () => (await watched()).drawn).toBe(all);
+    // The temporary buffers have been freed.
+    expect((await watched()).gpu).toBe(gpu);
+  },
+);
 
 test('slices are rendered by the processor, and the view keeps its size when a run begins', async () => {
   await openAt('#extract?example=linked-rings');

@@ -104,7 +104,8 @@ describe('a figure of the paper', () => {
       expect(Math.abs((forces[i] ?? 0) + (motion[i] ?? 0) - sum)).toBeLessThan(0.02);
   });
 
-  test('compares direct with coarse to fine in a table, and keeps the surface', async () => {
+  test('compares direct with coarse to fine in a table, and keeps the surface', LONG, async () => {
+    await openAt('#extract?example=figure-15-16&v=2');
     const before = await measures(app.page);
     await app.page.click('[data-compare=start]');
     await app.page.waitForFunction(() =>
@@ -141,7 +142,7 @@ describe('a figure of the paper', () => {
     expect(await measures(app.page)).toEqual(before);
   });
 
-  test('a comparison can be cancelled', async () => {
+  test('a comparison can be cancelled', LONG, async () => {
     await app.page.click('[data-compare=start]');
     await app.page.click('[data-compare=cancel]');
     await expect.poll(() => text('.compare [role=status]')).toBe('Cancelled.');
@@ -162,7 +163,7 @@ describe('a figure of the paper', () => {
   });
 });
 
-describe('attractors', () => {
+describe('attractors', LONG, () => {
   const items = () => app.page.locator('.attractors li');
   const pause = async () => {
     await app.page.locator('.scene > canvas').focus();
@@ -236,7 +237,7 @@ describe('attractors', () => {
   });
 });
 
-describe('colour', () => {
+describe('colour', LONG, () => {
   test('by speed has a legend with numbers, and colours the surface', async () => {
     await openAt('#extract?example=figure-7');
     // From here on the list is focused, and its ring is in every picture.
@@ -352,7 +353,7 @@ describe('undo', () => {
     await expect.poll(() => app.page.locator('.pyramid button').count()).toBe(1);
   });
 
-  test('on a volume that was just opened only reverts its run', async () => {
+  test('on a volume that was just opened only reverts its run', LONG, async () => {
     await app.page.selectOption('.data select', 'figure-8');
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('chain'));
     await expect.poll(() => app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Play');
@@ -393,7 +394,7 @@ describe('a link', () => {
     expect(await app.page.locator('.attractors li').count()).toBe(0);
   });
 
-  test('that is invalid shows a message, and the built-in example runs', async () => {
+  test('that is invalid shows a message, and the built-in example runs', LONG, async () => {
     await app.page.goto('about:blank');
     await app.page.goto(`${app.address}#extract?example=nowhere`);
     await app.page.waitForSelector('.banner:not([hidden])');
@@ -402,7 +403,7 @@ describe('a link', () => {
   });
 });
 
-describe('plot data', () => {
+describe('plot data', LONG, () => {
   test('can be saved as CSV', async () => {
     await openAt('#extract?example=figure-7');
     await reach(app.page, 'done');

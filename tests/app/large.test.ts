@@ -5,6 +5,7 @@ import { at } from '../../scripts/shell.mjs';
 import { mayReach, SERVERS } from '../../www/src/ui/large-source';
 import { filesOf } from '../js/zarr-stores';
 import { type App, drop, measures, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
+import { LONG } from './long';
 
 /** A box of a stack of plant cells in two levels, of 26 × 22 × 14 and 13 × 11 × 14 voxels. */
 const IMAGE = 'v3-scaled-zyx';
@@ -68,7 +69,7 @@ test('an address on the own server is read chunk by chunk; one that is missing g
   app.complaints.splice(0);
 });
 
-test('a folder is opened', async () => {
+test('a folder is opened', LONG, async () => {
   await openLab();
   const files = [...(await filesOf(IMAGE))].map(([path, bytes]) => [path.slice(1), [...bytes]] as const);
   // The dialogue of the browser cannot be used here; the origin's private folder has the same handles.
@@ -91,7 +92,7 @@ test('a folder is opened', async () => {
   await expectExtracted(() => app.page.getByRole('button', { name: 'Open a folder…' }).click());
 });
 
-test('in a box around the crosshair only, finer levels are followed', async () => {
+test('in a box around the crosshair only, finer levels are followed', LONG, async () => {
   await openLab();
   const field = app.page.getByLabel('Box around the crosshair');
   expect(await field.isVisible()).toBe(false);
@@ -111,7 +112,7 @@ test('in a box around the crosshair only, finer levels are followed', async () =
   expect((await measures(app.page)).triangles).toBeLessThan(0.8 * triangles);
 });
 
-test('what needs the whole volume is refused with a reason', async () => {
+test('what needs the whole volume is refused with a reason', LONG, async () => {
   await openLab();
   await expectExtracted(async () =>
     drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),
@@ -135,26 +136,32 @@ test('the page names the servers that it may reach, and its policy has the same'
   expect(await app.page.textContent('.large [role=alert]')).toMatch(/^example\.org is not among/);
 });
 
-test.each([
-  [QUICK.extract, 'done'],
-  ['extract?p.timeStep=0.05&v=2', 'running'],
-])('an image that does not answer gives way to the next one at once: after %s, %s', async (before, state) => {
-  await open(app, before);
-  await reach(app.page, state);
-  await unfold(app.page);
-  await app.page.context().route('**/images/silent.zarr/**', () => undefined);
-  const address = app.page.getByLabel('Address');
-  await address.fill(`${app.address}images/silent.zarr`);
-  await address.press('Enter');
-  await reach(app.page, 'loading');
-  await app.page.getByLabel('Example').selectOption('linked-rings');
-  // Its requests are given up after minutes only.
-  await app.page.waitForSelector('[data-state=done]', { timeout: 60_000 });
-  expect(await app.page.textContent('.facts')).not.toContain('silent');
-  expect(await app.page.locator('.banner').isVisible()).toBe(false);
-});
+for (const [before, state, options] of [
+  [QUICK.extract, 'done', LONG],
+  ['extract?p.timeStep=0.05&v=2', 'running', {}],
+] as const) {
+  test(
+    `an image that does not answer gives way to the next one at once: after ${before}, ${state}`,
+    options,
+    async () => {
+      await open(app, before);
+      await reach(app.page, state);
+      await unfold(app.page);
+      await app.page.context().route('**/images/silent.zarr/**', () => undefined);
+      const address = app.page.getByLabel('Address');
+      await address.fill(`${app.address}images/silent.zarr`);
+      await address.press('Enter');
+      await reach(app.page, 'loading');
+      await app.page.getByLabel('Example').selectOption('linked-rings');
+      // Its requests are given up after minutes only.
+      await app.page.waitForSelector('[data-state=done]', { timeout: 60_000 });
+      expect(await app.page.textContent('.facts')).not.toContain('silent');
+      expect(await app.page.locator('.banner').isVisible()).toBe(false);
+    },
+  );
+}
 
-test('single steps wait for the data that they need', async () => {
+test('single steps wait for the data that they need', LONG, async () => {
   await openLab();
   await expectExtracted(async () =>
     drop(app.page, [{ name: 'cells.zip', bytes: await readFile(at(`tests/data/zarr/${IMAGE}.zip`)) }]),

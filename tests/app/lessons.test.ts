@@ -196,8 +196,9 @@ describe('lessons of the user', () => {
     expect(await panel().locator('h2').textContent()).toBe('Mine');
   });
 
-  test('are opened from a ZIP archive with a folder in it', async () => {
+  test('are opened from a ZIP archive with a folder in it', LONG, async () => {
     const entries = files({ id: 'zipped' }).map(({ name, bytes }) => [`folder/${name}`, new Uint8Array(bytes)]);
+    await goTo('?lesson=topology#extract?example=linked-rings&v=2');
     await panel().getByRole('button', { name: 'All lessons' }).click();
     await panel().locator('.lesson-list li').nth(5).waitFor();
     const buffer = Buffer.from(zipSync(Object.fromEntries(entries)));
@@ -206,7 +207,7 @@ describe('lessons of the user', () => {
     expect(await panel().locator('.field-error').textContent()).toBe('');
   });
 
-  test('at an address that has none, the list says so', async () => {
+  test('at an address that has none, the list says so', LONG, async () => {
     await goTo('?lesson=lessons/none/#extract?example=linked-rings&v=2');
     await expect.poll(() => panel().locator('.field-error').textContent()).toContain('404');
     await panel().locator('.lesson-list li').nth(5).waitFor();
@@ -214,7 +215,7 @@ describe('lessons of the user', () => {
   });
 });
 
-describe('in German', () => {
+describe('in German', LONG, () => {
   test('the page, the lab and the lesson are translated; the choice is kept', async () => {
     await goTo('?lesson=topology&lang=de#extract?example=figure-24&v=2');
     await ticked();
@@ -246,7 +247,7 @@ describe('in German', () => {
   });
 });
 
-test('on a phone the panel is above the lab, nothing is wider than the page, and it can be hidden', async () => {
+test('on a phone the panel is above the lab, nothing is wider than the page, and it can be hidden', LONG, async () => {
   for (const language of ['de', 'en']) {
     await goTo(`?lesson=topology&lang=${language}#extract?example=linked-rings&v=2`);
     await step().waitFor();

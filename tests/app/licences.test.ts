@@ -6,6 +6,7 @@ import { buildApp } from '../../scripts/app.mjs';
 import { refuseOthers, writeNotices } from '../../scripts/licences.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { openApp } from './browser';
+import { LONG } from './long';
 
 let crates: string[] = [];
 let notices = '';
@@ -69,7 +70,7 @@ test.each([
   else await expect(asked).resolves.toBeUndefined();
 });
 
-test('the app links to them', async () => {
+test('the app links to them', LONG, async () => {
   const app = await openApp();
   try {
     await app.page.click('#help');

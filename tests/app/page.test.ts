@@ -1,6 +1,7 @@
 import type { Browser } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { type App, LABS, openApp, overflow, reach, unnamedControls } from './browser';
+import { inOneLab } from './long';
 
 let app: App;
 
@@ -52,25 +53,31 @@ test('the help lists the keyboard shortcuts and closes again', async () => {
   expect(await app.page.locator('dialog').isVisible()).toBe(false);
 });
 
-test.each(LABS)('%s links to its documentation, and from its keyboard shortcuts to all other help', async (lab) => {
-  await app.page.click(`[data-lab=${lab}]`);
-  // By then the shortcuts of the previous lab are gone.
-  await expect.poll(async () => (await app.page.title()).toLowerCase()).toBe(`vesicle: ${lab}`);
-  await app.page.waitForSelector('dialog', { state: 'attached' });
-  const hrefs = await app.page
-    .locator('dialog a')
-    .evaluateAll((all) => all.map((one) => (one as HTMLAnchorElement).href));
-  expect(hrefs[0]).toBe(await app.page.locator('#guide').evaluate((one) => (one as HTMLAnchorElement).href));
-  const pages = await Promise.all(hrefs.map(async (href) => (await app.page.request.get(href)).text()));
-  expect(pages[0]).toContain(`index.html#${lab}"`);
-  expect(pages.pop()).toContain('three');
-  expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
-    expect.stringMatching(/^(Surface|Freeform|Segmentation) .* \| Vesicle documentation$/),
-    'Vesicle documentation',
-    'Vesicle: Benchmarks',
-    'Vesicle in other software',
-  ]);
-});
+for (const lab of LABS) {
+  test(
+    `${lab} links to its documentation, and from its keyboard shortcuts to all other help`,
+    inOneLab(lab),
+    async () => {
+      await app.page.click(`[data-lab=${lab}]`);
+      // By then the shortcuts of the previous lab are gone.
+      await expect.poll(async () => (await app.page.title()).toLowerCase()).toBe(`vesicle: ${lab}`);
+      await app.page.waitForSelector('dialog', { state: 'attached' });
+      const hrefs = await app.page
+        .locator('dialog a')
+        .evaluateAll((all) => all.map((one) => (one as HTMLAnchorElement).href));
+      expect(hrefs[0]).toBe(await app.page.locator('#guide').evaluate((one) => (one as HTMLAnchorElement).href));
+      const pages = await Promise.all(hrefs.map(async (href) => (await app.page.request.get(href)).text()));
+      expect(pages[0]).toContain(`index.html#${lab}"`);
+      expect(pages.pop()).toContain('three');
+      expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
+        expect.stringMatching(/^(Surface|Freeform|Segmentation) .* \| Vesicle documentation$/),
+        'Vesicle documentation',
+        'Vesicle: Benchmarks',
+        'Vesicle in other software',
+      ]);
+    },
+  );
+}
 
 test('a requested lab opens, even if the previous one changes its address at the same time', async () => {
   await app.page.click('[data-lab=extract]');

@@ -186,7 +186,7 @@ describe('running', () => {
     await reach(app.page, 'done');
   });
 
-  test('the width of the Gaussian is shown only for the Gaussian', async () => {
+  test('the width of the Gaussian is shown only for the Gaussian', LONG, async () => {
     const shown = (name: string) => app.page.locator(`[data-param=${name}]`).isVisible();
     expect([await shown('sigma'), await shown('delta')]).toEqual([false, true]);
     await afterRun(app.page, () => app.page.selectOption('[data-param=kernel] select', 'gaussian'));
@@ -241,7 +241,9 @@ describe('edits of points', () => {
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     await app.page.check('[data-tool=none]');
   });
+});
 
+describe('many edits of points', LONG, () => {
   test('two clicks at once are two points; each can be undone and redone', async () => {
     await openAt('#reconstruct?example=two-balls', 'done');
     await app.page.check('[data-tool=add]');
@@ -377,7 +379,7 @@ describe('files', () => {
     },
   );
 
-  test('a link to a file waits for it and then applies its settings', async () => {
+  test('a link to a file waits for it and then applies its settings', LONG, async () => {
     await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
     expect(await text('.banner')).toContain('Open balls.xyz from your disk');
     await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
@@ -385,7 +387,7 @@ describe('files', () => {
     expect(await measured()).toMatchObject({ components: 2 });
   });
 
-  test('points given twice count once', async () => {
+  test('points given twice count once', LONG, async () => {
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
     await afterRun(app.page, () => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
@@ -403,7 +405,7 @@ describe('files', () => {
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
   });
 
-  test('photographs with a cameras.json colour the user’s own points', async () => {
+  test('photographs with a cameras.json colour the user’s own points', LONG, async () => {
     const folder = at('www/public/data/spot');
     const list = JSON.parse(await readFile(`${folder}/cameras.json`, 'utf8'));
     const two = { ...list, cameras: [list.cameras[3], list.cameras[8]] };
@@ -422,8 +424,9 @@ describe('files', () => {
 });
 
 describe('passing on to Extract', () => {
-  test('the volume saved as NIfTI is above the level inside', async () => {
-    await openAt('#reconstruct?example=torus', 'done');
+  beforeAll(() => openAt('#reconstruct?example=torus', 'done'));
+
+  test('the volume saved as NIfTI is above the level inside', LONG, async () => {
     const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click('[data-action=volume]')]);
     const volume = Volume.parse(await readFile(await download.path()));
     expect(Math.max(...volume.dims)).toBe(96);
@@ -448,7 +451,7 @@ describe('passing on to Extract', () => {
   });
 });
 
-describe('the timing curve', () => {
+describe('the timing curve', LONG, () => {
   test('is measured point by point, can be cancelled, and keeps the surface', async () => {
     await openAt('#reconstruct?example=two-balls', 'done');
     const before = await measured();
@@ -478,7 +481,7 @@ describe('a link', () => {
     expect((await measured()).surfaceConstraints).toBeLessThanOrEqual(800);
   });
 
-  test("to a figure shows the paper's result; selecting another of its pictures solves again", async () => {
+  test("to a figure shows the paper's result; selecting another of its pictures solves again", LONG, async () => {
     await openAt('#reconstruct?example=figure-7', 'done');
     expect(await text('.figure')).toMatch(
       /Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/,
@@ -502,7 +505,7 @@ describe('a link', () => {
     expect(await text('[data-figure=came]')).toBe('The settings differ from those of the figure.');
   });
 
-  test('that is invalid shows a message, and the first example opens', async () => {
+  test('that is invalid shows a message, and the first example opens', LONG, async () => {
     await openAt('#reconstruct?example=nowhere', 'done');
     expect(await text('.banner')).toContain('no example “nowhere”');
     expect(await measured()).toMatchObject({ components: 1, genus: 0 });
@@ -525,12 +528,12 @@ describe('a link', () => {
     });
   }
 
-  test('warns beside the view if δ is too large for gaps', async () => {
+  test('warns beside the view if δ is too large for gaps', LONG, async () => {
     await openAt('#reconstruct?example=torus&p.delta=30', 'done');
     expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('≥ 25');
   });
 
-  test('without an example, followed in the open page, keeps the open data and its address', async () => {
+  test('without an example, followed in the open page, keeps the open data and its address', LONG, async () => {
     await app.page.evaluate(() => {
       location.hash = '#reconstruct?example=nowhere';
     });
@@ -538,29 +541,21 @@ describe('a link', () => {
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');
   });
 
-  test('that removes missing points, or one twice, removes the existing ones', async () => {
+  test('that removes missing points, or one twice, removes the existing ones', LONG, async () => {
     await openAt('#reconstruct?example=two-balls&remove=1,1,999999,-4,x', 'done');
     expect(await text('.edit-tools [role=status]')).toBe('1 point removed.');
     expect((await measured()).surfaceConstraints).toBe(1599);
   });
 
-  for (const [nonsense, options] of [
-    ['maxPoints=abc', {}],
-    ['add=1,2', LONG],
-    ['photo=99', LONG],
-    ['&&', LONG],
-    ['%E0%A4%A', LONG],
-  ] as const) {
-    test(`ignores ${nonsense}`, options, async () => {
-      await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
-      expect(await app.page.locator('.banner').isVisible()).toBe(false);
-      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
-    });
-  }
+  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('ignores %s', LONG, async (nonsense) => {
+    await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
+    expect(await app.page.locator('.banner').isVisible()).toBe(false);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+  });
 });
 
 describe('the page', () => {
-  test('photographs are one tab stop; arrow keys move between them', async () => {
+  test('photographs are one tab stop; arrow keys move between them', LONG, async () => {
     await openAt('#reconstruct?example=figure-9', 'done');
     const strip = app.page.locator('.strip');
     expect(await strip.locator('button[tabindex="0"]').getAttribute('data-photo')).toBe('3');
@@ -575,7 +570,7 @@ describe('the page', () => {
     expect(await app.page.locator('.photograph').isVisible()).toBe(false);
   });
 
-  test('nothing covers the pictures but the legend', async () => {
+  test('nothing covers the pictures but the legend', LONG, async () => {
     await openAt('#reconstruct?example=figure-2', 'done');
     const box = async (selector: string) => app.page.locator(selector).boundingBox();
     const [bar, scene, legend] = [await box('.view-options'), await box('.scene'), await box('.color-legend:visible')];

@@ -6,6 +6,7 @@ import { ball, moved, turned, withLengths } from '../../www/src/sculpt/ellipsoid
 import type { Film } from '../../www/src/sculpt/film';
 import type { FrameEvent, Pose, PoseMessage, Requests, SavedPose, SceneSource } from '../../www/src/sculpt/protocol';
 import { globeAsObj } from '../../www/src/sculpt/shapes';
+import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
@@ -104,7 +105,7 @@ test('the code of random gestures gives the same surfaces, of a membrane', async
   await expect(worker.request('data', undefined)).rejects.toThrow('no file but those');
 });
 
-test('the code of random gestures gives the same surfaces, of a mesh in a file on a computed base', async () => {
+test('the code of random gestures gives the same surfaces, of a mesh in a file on a computed base', LONG, async () => {
   const bytes = globeAsObj();
   const texture = { type: 'image/png', bytes: PNG } as const;
   const made: Uint8Array[] = [];

@@ -114,7 +114,7 @@ test('undo goes back beyond the opening of a session', LONG, async () => {
   expect(Buffer.compare(await surface(page), before)).toBe(0);
 });
 
-test('a session asks for a file of the user’s, and refuses one with other content', async () => {
+test('a session asks for a file of the user’s, and refuses one with other content', LONG, async () => {
   const { page } = app;
   await open(app, 'extract?example=linked-rings&v=2');
   await reach(page, 'done');
@@ -139,6 +139,9 @@ test('a session asks for a file of the user’s, and refuses one with other cont
 
 test('a session with its data opens anywhere, and one that cannot be read changes nothing', async () => {
   const { page } = app;
+  await open(app, 'extract?example=linked-rings&v=2');
+  await reach(page, 'done');
+  await afterRun(page, () => drop(page, [tooth]));
   await page.check('[data-session=included]');
   const file = await session(page);
   const before = await surface(page);

@@ -2,6 +2,7 @@ import type { Locator } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { type App, afterRun, drop, measures, open, openApp, QUICK, reach, unfold } from './browser';
+import { LONG } from './long';
 import { countPixels } from './pixels';
 
 /** Voxels along each side of the volume. */
@@ -54,7 +55,7 @@ async function greyAt(canvas: Locator, [x, y]: readonly [number, number]): Promi
 
 beforeAll(async () => {
   await init();
-  app = await openApp();
+  app = await openApp(undefined, `#${QUICK.extract}`);
   await reach(app.page, 'done');
   await drop(app.page, [{ name: 'tissue.nii', bytes: tissue() }]);
   await app.page.locator('.facts', { hasText: 'tissue.nii' }).waitFor();
@@ -214,7 +215,7 @@ describe('zoom', () => {
   });
 });
 
-describe('a cut', () => {
+describe('a cut', LONG, () => {
   test('hides half of the surface, along the slice of the crosshair', async () => {
     await open(app, QUICK.extract);
     await reach(app.page, 'done');
@@ -255,6 +256,7 @@ describe('frames of a 4D volume', () => {
     return RADII.findIndex((one) => Math.abs(one - radius) < 0.6);
   };
   const slider = () => app.page.locator('[data-param=frame]').getByRole('slider', { name: 'Frame' });
+  const linkTo = (frame: number) => `extract?file=beating.nii&frame=${frame}&p.iso=128&p.damping=0.7`;
   const dropBeating = () => drop(app.page, [{ name: 'beating.nii', bytes: beating() }]);
 
   test('the first opens, and the slider chooses another, with the settings and the slices as they are', async () => {
@@ -279,18 +281,16 @@ describe('frames of a 4D volume', () => {
     expect(app.page.url()).toContain('frame=2');
   });
 
-  test('a link names the frame, which opens with the file', async () => {
-    const [, hash = ''] = app.page.url().split('#');
-    await open(app, hash);
+  test('a link names the frame, which opens with the file', LONG, async () => {
+    await open(app, linkTo(2));
     await reach(app.page, 'done');
     await afterRun(app.page, dropBeating);
     expect(await app.page.textContent('[data-param=frame] output')).toBe('3 of 3');
     expect(await frameOfSurface()).toBe(2);
   });
 
-  test('a link to a frame that does not exist is refused with a reason, and the first frame opens', async () => {
-    const [, hash = ''] = app.page.url().split('#');
-    await open(app, hash.replace('frame=2', 'frame=7'));
+  test('a link to a frame that does not exist is refused with a reason, and the first frame opens', LONG, async () => {
+    await open(app, linkTo(7));
     await reach(app.page, 'done');
     await dropBeating();
     await expect.poll(() => app.page.textContent('.banner')).toContain('settings were ignored');

@@ -15,6 +15,7 @@ import {
   recordStates,
   unnamedControls,
 } from './browser';
+import { LONG } from './long';
 
 let app: App;
 
@@ -70,8 +71,9 @@ function small(): { film: Uint8Array; frames: Uint8Array[] } {
   return { film: bytes(voxels, frames), frames: Array.from({ length: frames }, (_, t) => frame(t)) };
 }
 
-/** Opens the small image and waits until it is tracked. */
+/** Opens the small image, in the lab, and waits until it is tracked. */
 async function dropSmall(): Promise<void> {
+  if (!app.page.url().includes('#track')) await openAt('#track?example=ventricle', 'running', 'done');
   await drop(app.page, [{ name: 'small.nii', bytes: small().film }]);
   await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('small.nii'));
   await reach(app.page, 'done');
@@ -252,7 +254,7 @@ describe('changes', () => {
     await tracked(4);
   });
 
-  test('to a threshold within the noise show a warning', async () => {
+  test('to a threshold within the noise show a warning', LONG, async () => {
     const warning = () => text('[data-param=threshold] .warning');
     expect(await warning()).toBe('');
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
@@ -276,7 +278,7 @@ describe('changes', () => {
     await tracked(4);
   });
 
-  test('of the box are made by dragging its sides on a slice', async () => {
+  test('of the box are made by dragging its sides on a slice', LONG, async () => {
     const slice = app.page.locator('.slice canvas').first();
     await slice.scrollIntoViewIfNeeded();
     const box = await slice.boundingBox();
@@ -361,13 +363,13 @@ describe('links', () => {
     expect(await app.page.locator('[data-param=threshold] input[type=number]').inputValue()).toBe('70');
   });
 
-  test('with invalid settings are followed without them', async () => {
+  test('with invalid settings are followed without them', LONG, async () => {
     await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
     await expect.poll(() => text('.banner')).toContain('The link’s settings were ignored.');
   });
 });
 
-test('passes the surface of a frame to the Sculpt lab, and is restored on the way back', async () => {
+test('passes the surface of a frame to the Sculpt lab, and is restored on the way back', LONG, async () => {
   await openAt('#track?example=ventricle&binning=2', 'done');
   await app.page.click('[data-action=sculpt]');
   await expect.poll(() => app.page.title()).toBe('Vesicle: Sculpt');

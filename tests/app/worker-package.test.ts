@@ -11,6 +11,7 @@ import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
 import { launch } from './browser';
+import { LONG } from './long';
 
 let browser: Browser;
 let server: Awaited<ReturnType<typeof serve>>;
@@ -144,7 +145,7 @@ test("from another origin the worker starts through a script of the page's own",
   }
 });
 
-test('Vite bundles the worker and the module in it', async () => {
+test('Vite bundles the worker and the module in it', LONG, async () => {
   const folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   const script = `
     import init, { Mesh } from 'vesicle/worker';
