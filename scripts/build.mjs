@@ -105,11 +105,7 @@ async function make(module, sources) {
   await rm(folder(module), { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
-    ...['--', 'bindgen', compiled, '--target', 'web', '--out-dir', folder(module), '--out-name', glueName(module)],
-    // A trap loses the instance; the reset function lets a page start a new one without reloading.
-    '--experimental-reset-state-function',
-    // The face says where the module is, so that a bundler meets only one address of it.
-    ...['--omit-default-module-path', '--remove-producers-section'],
+    ...['--', 'bindgen', compiled, folder(module), glueName(module)],
   ]);
   await optimise(optimised(module));
   await writeFile(stampFile, sources);

@@ -55,7 +55,7 @@ const cargoTests = (args, options) => async () => {
 };
 
 /** Examples in the documentation are small: most of the time is that of compiling the library for them. */
-const UNOPTIMISED = { env: { CARGO_PROFILE_DEV_OPT_LEVEL: '0', CARGO_PROFILE_DEV_DEBUG: '0' } };
+const NO_DEBUG = { env: { CARGO_PROFILE_DEV_DEBUG: '0' } };
 
 /** Arguments that leave out the tests with the tag `long`, or select them. */
 const SHORT = '--tags-filter=!long';
@@ -150,7 +150,7 @@ const LONG = [
       ],
     ],
     [
-      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], UNOPTIMISED), 60],
+      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], NO_DEBUG), 60],
       ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 600],
       ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 900],
     ],

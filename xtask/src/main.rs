@@ -1,38 +1,79 @@
 //! Project tasks in Rust: the generator of the wasm bindings and the runner of the wasm tests.
 //!
-//! Both are the programs of `wasm-bindgen-cli`, called as a library, so that their version is the one in `Cargo.lock`
-//! and nothing has to be installed.
+//! Both call the library of `wasm-bindgen-cli`, so that its version is the one in `Cargo.lock` and nothing has to be
+//! installed.
 //!
 //! ```text
-//! cargo xtask bindgen <arguments of wasm-bindgen>
-//! cargo xtask test-runner <file.wasm> [arguments of wasm-bindgen-test-runner]
+//! cargo xtask bindgen <file.wasm> <folder> <name>
+//! cargo xtask test-runner <file.wasm> [arguments of run-tests.cjs]
 //! ```
 
 use std::env;
-use std::ffi::OsString;
-use std::process::ExitCode;
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, ExitCode, id};
+use wasm_bindgen_cli_support::Bindgen;
 
-const USAGE: &str = "usage: cargo xtask (bindgen | test-runner) <arguments>";
+const USAGE: &str =
+    "usage: cargo xtask (bindgen <file.wasm> <folder> <name> | test-runner <file.wasm> [arguments])";
+
+/// Runs the tests of a module in Node.
+const RUN_TESTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/src/run-tests.cjs");
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = match arguments[..] {
+        ["bindgen", module, folder, name] => bindgen(module, folder, name).map(|()| true),
+        ["test-runner", module, ref others @ ..] => run_tests(module, others),
+        _ => Err(USAGE.into()),
+    };
+    match done {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(problem) => {
-            eprintln!("xtask: {problem}");
+            eprintln!("xtask: {problem:?}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn run() -> Result<(), String> {
-    let mut arguments = env::args_os().skip(1);
-    let task = arguments.next().ok_or(USAGE)?;
-    // Both programs expect their own name as first argument, as on a command line.
-    let arguments: Vec<OsString> = [task.clone()].into_iter().chain(arguments).collect();
-    match task.to_str() {
-        Some("bindgen") => wasm_bindgen_cli::wasm_bindgen::run_cli_with_args(arguments),
-        Some("test-runner") => wasm_bindgen_cli::wasm_bindgen_test_runner::run_cli_with_args(arguments),
-        _ => return Err(format!("unknown task {}; {USAGE}", task.display())),
-    }
-    .map_err(|error| format!("{error:?}"))
+/// Writes a module and its glue, for pages and for Node, to a folder.
+fn bindgen(module: &str, folder: &str, name: &str) -> Result<(), Box<dyn Error>> {
+    Bindgen::new()
+        .input_path(module)
+        .out_name(name)
+        .web(true)?
+        .typescript(true)
+        // The face says where the module is, so that a bundler meets only one address of it.
+        .omit_default_module_path(true)
+        .remove_producers_section(true)
+        // A trap loses the instance; the reset function lets a page start a new one without reloading.
+        .reset_state_function(true)
+        .generate(folder)?;
+    Ok(())
+}
+
+/// Runs the tests of a module as cargo compiles it, and returns whether they pass.
+fn run_tests(module: &str, arguments: &[&str]) -> Result<bool, Box<dyn Error>> {
+    // Outside the project, whose package.json would make the glue a module of another kind.
+    let folder = env::temp_dir().join(format!("vesicle-tests-{}", id()));
+    let passed = run_tests_in(&folder, module, arguments);
+    fs::remove_dir_all(&folder)?;
+    passed
+}
+
+fn run_tests_in(folder: &Path, module: &str, arguments: &[&str]) -> Result<bool, Box<dyn Error>> {
+    // The tests are exports of the module, which the glue has to make available.
+    Bindgen::new()
+        .input_path(module)
+        .out_name("tests")
+        .nodejs(true)?
+        .debug(true)
+        .export_wasm(true)
+        .emit_start(false)
+        .generate(folder)?;
+    let status = Command::new("node").arg(RUN_TESTS).arg(folder.join("tests.js")).args(arguments).status()?;
+    Ok(status.success())
 }
