@@ -104,22 +104,22 @@ const GROUPS = [
       // Shows the tests' measurements in the log.
       ['native', cargoTests(['--lib', '--', '--show-output']), 600],
       // Has one thread only.
-      ['wasm', cargoTests(['--lib', ...WASM]), 900],
+      ['wasm', cargoTests(['--lib', ...WASM]), 400],
     ],
     [
-      ['build', works(() => build({ plain: false })), 700],
+      ['build', works(() => build({ plain: false })), 650],
       ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
-      ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 15],
-      ['types', check(tool('tsc'), ['-p', at('tests/js')]), 15],
+      ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 25],
+      ['types', check(tool('tsc'), ['-p', at('tests/js')]), 20],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
       ['package', vitest('tests/js', SHORT), 200],
-      ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 15],
-      ['app build', works(buildApp), 20],
+      ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 20],
+      ['app build', works(buildApp), 25],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', '--project=together', SHORT), 900],
+      ['app', vitest('tests/app', '--project=together', SHORT), 350],
     ],
   ],
-  [[['app alone', vitest('tests/app', '--project=alone', SHORT), 200]]],
+  [[['app alone', vitest('tests/app', '--project=alone', SHORT), 100]]],
 ];
 
 /** Filters of the core's ignored tests that write files, or need files that are not in the repository. */
@@ -138,7 +138,7 @@ const LONG = [
   [
     [
       ['features', works(checkFeatures), 300],
-      ['whole build', works(build), 400],
+      ['whole build', works(build), 500],
       ['package more', vitest('tests/js', LONG_ONES), 100],
       ['app long', vitest('tests/app', '--project=long'), 600],
       ['app more', vitest('tests/app', '--project=together', LONG_ONES), 900],
@@ -150,12 +150,12 @@ const LONG = [
       ],
     ],
     [
-      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], NO_DEBUG), 60],
-      ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 600],
-      ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 900],
+      ['doc tests', cargoTests(['--doc', '--profile', 'dev'], NO_DEBUG), 80],
+      ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 800],
+      ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 1000],
     ],
   ],
-  [[['app alone more', vitest('tests/app', '--project=alone', LONG_ONES), 200]]],
+  [[['app alone more', vitest('tests/app', '--project=alone', LONG_ONES), 100]]],
 ];
 
 /** Checks that each feature of the bindings compiles alone. */
