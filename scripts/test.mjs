@@ -93,7 +93,9 @@ function atLeastOneFailed(code, { passed, failed }) {
 const GROUPS = [
   [
     [
-      ['format', check('cargo', ['fmt', '--all', '--check']), 5],
+      ['format', check('cargo', ['fmt', '--all', '--check']), 10],
+      ['biome', check(tool('biome'), ['ci', '--colors=off']), 10],
+      ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 25],
       ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY]), 100],
       ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle-bindings', ...WASM, ...DENY]), 100],
       [
@@ -108,10 +110,8 @@ const GROUPS = [
     ],
     [
       ['build', works(() => build({ plain: false })), 650],
-      ['biome', check(tool('biome'), ['ci', '--colors=off']), 5],
-      ['prose', check(process.execPath, [at('scripts/prose.mjs')]), 25],
       ['types', check(tool('tsc'), ['-p', at('tests/js')]), 20],
-      ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 5],
+      ['publint', check(tool('publint'), ['run', '--strict', at('pkg')]), 10],
       ['package', vitest('tests/js', SHORT), 200],
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 20],
       ['app build', works(buildApp), 25],
