@@ -16,8 +16,8 @@ const DENY = ['--', '-D', 'warnings'];
 /** Record of the last run of all tests, which `npm test` prints. */
 const RECORD = 'tests/all.json';
 
-// A fresh clone is compiled once: without what cargo writes for the next time, in fewer pieces, and without line numbers of
-// backtraces, it takes a quarter less.
+// A fresh clone is compiled once: without what cargo writes for the next time, in fewer pieces, and without line numbers
+// of backtraces, it takes a quarter less.
 const ONCE = { CARGO_INCREMENTAL: '0', CARGO_PROFILE_TEST_CODEGEN_UNITS: '4', CARGO_PROFILE_TEST_DEBUG: '0' };
 if (process.env.CI) Object.assign(process.env, ONCE);
 

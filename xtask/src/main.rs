@@ -59,9 +59,9 @@ fn bindgen(module: &str, folder: &str, name: &str) -> Result<(), Box<dyn Error>>
 fn run_tests(module: &str, arguments: &[&str]) -> Result<bool, Box<dyn Error>> {
     // Outside the project, whose package.json would make the glue a module of another kind.
     let folder = env::temp_dir().join(format!("vesicle-tests-{}", id()));
-    let passed = run_tests_in(&folder, module, arguments);
+    let passed = run_tests_in(&folder, module, arguments)?;
     fs::remove_dir_all(&folder)?;
-    passed
+    Ok(passed)
 }
 
 fn run_tests_in(folder: &Path, module: &str, arguments: &[&str]) -> Result<bool, Box<dyn Error>> {

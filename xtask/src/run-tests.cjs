@@ -1,6 +1,6 @@
-// Runs the wasm tests of a module whose glue is for Node, as `wasm-bindgen-test-runner` does, whose names these are:
-// `node run-tests.cjs <glue> [--include-ignored] [--nocapture] [--exact] [--list] [--skip <name>]… [<name>…]`. Names are parts
-// of those of tests, unless they are exact.
+// Runs the wasm tests of a module whose glue is for Node. The options are those of `wasm-bindgen-test-runner`:
+// `node run-tests.cjs <glue> [--include-ignored] [--nocapture] [--exact] [--list] [--skip <name>]… [<name>…]`.
+// Without `--exact`, names are parts of those of tests.
 const { parseArgs } = require('node:util');
 
 const { values, positionals } = parseArgs({
