@@ -1,4 +1,6 @@
-import type { Browser, Page } from 'playwright-core';
+import { writeFile } from 'node:fs/promises';
+import { join } from 'node:path';
+import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import { expect } from 'vitest';
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
@@ -30,6 +32,22 @@ export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
  * page would take longer than drawing the surface. Nothing that is drawn is smoothed along its edges.
  */
 export const launch = () => launchChromium('--disable-gpu-compositing', '--webgl-antialiasing-mode=none');
+
+/** Opens an empty page, which adds its errors, of the console and uncaught, to `complaints`. */
+export async function openPage(browser: Browser, complaints: string[], options?: BrowserContextOptions): Promise<Page> {
+  const page = await browser.newPage(options);
+  page.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
+  page.on('pageerror', (error) => complaints.push(error.message));
+  return page;
+}
+
+/** Writes a page with a content security policy as `index.html` of a folder. */
+export async function writePage(folder: string, policy: string, body: string, head = ''): Promise<void> {
+  const start = `<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="${policy}">`;
+  const all = `${start}<link rel="icon" href="data:,">${head}`;
+  const text = `<!doctype html><html lang="en"><head>${all}</head><body>${body}</body></html>`;
+  await writeFile(join(folder, 'index.html'), text);
+}
 
 /**
  * Opens the built app in a browser of its own, at an address within the app, with few pixels: drawing in software takes

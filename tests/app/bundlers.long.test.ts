@@ -7,7 +7,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import { serve } from '../../scripts/serve.mjs';
 import { at, must } from '../../scripts/shell.mjs';
 import { SPONGE_BITS, spongeBits } from '../js/sponge';
-import { launch } from './browser';
+import { launch, openPage } from './browser';
 
 let browser: Browser;
 /** A project with the packed package installed, and nothing else. */
@@ -52,10 +52,8 @@ afterAll(async () => {
 /** Opens a page in `folder` of the project, at `address`, and asserts its title; console errors fail. */
 async function titleOf(folder: string, address = ''): Promise<void> {
   const server = await serve(join(project, folder), 0);
-  const opened = await browser.newPage();
   const complaints: string[] = [];
-  opened.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
-  opened.on('pageerror', (error) => complaints.push(error.message));
+  const opened = await openPage(browser, complaints);
   try {
     await opened.goto(server.address + address);
     await expect.poll(async () => complaints[0] ?? (await opened.title())).toBe(SPONGE_BITS);

@@ -9,7 +9,7 @@ import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { beating } from '../js/beating';
-import { launch } from './browser';
+import { launch, openPage, writePage } from './browser';
 import { LONG } from './long';
 import { changes, countPixels } from './pixels';
 import { metaImageHeader, ring } from './volumes';
@@ -44,17 +44,9 @@ afterEach(async () => {
 
 /** Opens a page with the element in it and records the element's events. */
 async function open(body: string, before = ''): Promise<void> {
-  page = await browser.newPage();
+  page = await openPage(browser, complaints);
   page.setDefaultTimeout(120_000);
-  page.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
-  page.on('pageerror', (error) => complaints.push(error.message));
-  const policy = `<meta http-equiv="Content-Security-Policy" content="${POLICY}">`;
-  const script = '<script type="module" src="./vesicle/element.js"></script>';
-  const head = `<meta charset="utf-8">${policy}<link rel="icon" href="data:,">${before}${script}`;
-  await writeFile(
-    join(folder, 'index.html'),
-    `<!doctype html><html lang="en"><head>${head}</head><body>${body}</body></html>`,
-  );
+  await writePage(folder, POLICY, body, `${before}<script type="module" src="./vesicle/element.js"></script>`);
   await page.goto(server.address);
 }
 

@@ -1,5 +1,5 @@
 // The browser side of the notebook widget, with a fake notebook: traits, and events when they change.
-import { cp, mkdtemp, rm, writeFile } from 'node:fs/promises';
+import { cp, mkdtemp, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type { Browser, Page } from 'playwright-core';
@@ -8,7 +8,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest
 import type { Traits } from '../../examples/notebook/surface';
 import { makeNotebook, WIDGET } from '../../scripts/notebook.mjs';
 import { serve } from '../../scripts/serve.mjs';
-import { launch } from './browser';
+import { launch, openPage, writePage } from './browser';
 import { countPixels } from './pixels';
 
 /** A notebook's restrictions on widgets: no files beside it, no network. */
@@ -78,12 +78,7 @@ beforeAll(async () => {
   await Promise.all([init(), makeNotebook()]);
   folder = await mkdtemp(join(tmpdir(), 'vesicle-notebook-'));
   await cp(WIDGET, join(folder, 'surface.js'));
-  const head = `<meta charset="utf-8"><meta http-equiv="Content-Security-Policy" content="${POLICY}"><link rel="icon" href="data:,">`;
-  const body = `<script type="module">${SCRIPT}</script>`;
-  await writeFile(
-    join(folder, 'index.html'),
-    `<!doctype html><html lang="en"><head>${head}</head><body>${body}</body></html>`,
-  );
+  await writePage(folder, POLICY, `<script type="module">${SCRIPT}</script>`);
   server = await serve(folder, 0);
   browser = await launch();
 });
@@ -94,9 +89,7 @@ afterAll(async () => {
 });
 
 beforeEach(async () => {
-  page = await browser.newPage();
-  page.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
-  page.on('pageerror', (error) => complaints.push(error.message));
+  page = await openPage(browser, complaints);
   await page.goto(server.address);
   await expect.poll(async () => complaints[0] ?? (await page.title())).toBe('ready');
 });

@@ -9,7 +9,7 @@ import { build, createServer, preview } from 'vite';
 import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest';
 import { serve } from '../../scripts/serve.mjs';
 import { at, must } from '../../scripts/shell.mjs';
-import { launch } from './browser';
+import { launch, openPage } from './browser';
 import { countPixels } from './pixels';
 
 let home = '';
@@ -40,10 +40,8 @@ afterAll(async () => {
 });
 
 beforeEach(async () => {
-  page = await browser.newPage({ viewport: { width: 600, height: 400 } });
+  page = await openPage(browser, complaints, { viewport: { width: 600, height: 400 } });
   page.setDefaultTimeout(120_000);
-  page.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
-  page.on('pageerror', (error) => complaints.push(error.message));
 });
 afterEach(async () => {
   await page.close();
