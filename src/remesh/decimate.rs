@@ -46,6 +46,9 @@ const WORK_AT_LEAST: u64 = 10_000_000;
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
 /// intersection. The vertex that remains after a collapse has the mean attributes of both ends.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
+    if mesh.triangle_count() <= target_triangles {
+        return 0;
+    }
     run(mesh, target_triangles, Box::new(Unconditional))
 }
 
@@ -66,14 +69,14 @@ pub fn decimate_within(
         let problem = format!("must be at least 0, got {max_distance}");
         return Err(MeshError::InvalidArgument { parameter: "max_distance", problem });
     }
+    if mesh.triangle_count() <= target_triangles {
+        return Ok(0);
+    }
     let deviation = Deviation::new(mesh, max_distance)?;
     Ok(run(mesh, target_triangles, Box::new(deviation)))
 }
 
 fn run(mesh: &mut Mesh, target_triangles: usize, condition: Box<dyn Condition>) -> usize {
-    if mesh.triangle_count() <= target_triangles {
-        return 0;
-    }
     let before = mesh.vertex_count();
     let mut decimation = Decimation::new(mesh, target_triangles, condition);
     for _ in 0..ROUNDS {

@@ -46,8 +46,8 @@ impl Cell {
 
     fn set_corners(&mut self, corners: [u16; 8]) {
         self.corners = corners;
-        let loops = self.numbers().map(|number| cube_loops()[self.case(number)].count);
-        let (surfaces, most) = loops.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
+        let counts = self.numbers().map(|number| self.vertices_of(number));
+        let (surfaces, most) = counts.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
         self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
         self.is_saddle = surfaces >= 2 && self.has_edge_without_gap();
         self.has_diagonal =
@@ -78,6 +78,11 @@ impl Cell {
         let corners = &self.corners;
         let is_new = |&i: &usize| corners[i] != BACKGROUND && !corners[..i].contains(&corners[i]);
         (0..8).filter(is_new).map(|i| corners[i])
+    }
+
+    /// Returns the number of vertices of the label `number` in the cell.
+    pub fn vertices_of(&self, number: u16) -> usize {
+        cube_loops()[self.case(number)].count.into()
     }
 
     /// Returns the corners that have the label `number`, as bits.

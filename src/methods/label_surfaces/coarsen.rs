@@ -11,7 +11,6 @@
 //! the result depends on what is nearby only; after a change, the tiles there are coarsened anew.
 
 use super::cells::CellBox;
-use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
 use super::nets::{Crossing, NetVertex, Nets};
 use super::untangle::{Piece, surely_apart};
@@ -367,7 +366,7 @@ impl<'a> Tile<'a> {
 
     fn add_node(&mut self, slot: u32) {
         let cell = self.nets.cells.get(slot);
-        let is_once = |number| cube_loops()[cell.case(number)].count == 1;
+        let is_once = |number| cell.vertices_of(number) == 1;
         let steps = [0, 1, 2].map(|axis| cell.at[axis] as f32 - self.area.low[axis] as f32);
         self.nodes.push(Node {
             slot,

@@ -117,7 +117,7 @@ impl BlockComponents {
 
 /// Returns the number of vertices in a cell.
 fn vertices_in(cell: &Cell) -> usize {
-    cell.numbers().map(|number| usize::from(cube_loops()[cell.case(number)].count)).sum()
+    cell.numbers().map(|number| cell.vertices_of(number)).sum()
 }
 
 /// Returns, of the vertices in a cell, numbered from 0 label by label, that of each polygon edge that passes through a
@@ -136,7 +136,6 @@ fn passing_face(cell: &Cell, axis: usize, far: bool) -> impl Iterator<Item = usi
 /// Returns which of the vertices in a cell is that of a label at an edge that is crossed.
 fn vertex_of(cell: &Cell, number: u16, edge: usize) -> usize {
     let before = cell.numbers().take_while(|&other| other != number);
-    let loops = |number| &cube_loops()[cell.case(number)];
-    before.map(|number| usize::from(loops(number).count)).sum::<usize>()
-        + usize::from(loops(number).of_edge[edge])
+    before.map(|other| cell.vertices_of(other)).sum::<usize>()
+        + usize::from(cube_loops()[cell.case(number)].of_edge[edge])
 }

@@ -1,7 +1,6 @@
 //! The numbers of vertices and triangles of the surfaces.
 
-use super::cells::{Cell, CellBox};
-use super::cube_loops::cube_loops;
+use super::cells::CellBox;
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
 use std::collections::BTreeSet;
@@ -47,7 +46,7 @@ impl Nets {
         for slot in self.cells.within(area) {
             let cell = self.cells.get(slot);
             cell.numbers()
-                .for_each(|number| add(number, Counts { vertices: loops_of(cell, number), triangles: 0 }));
+                .for_each(|number| add(number, Counts { vertices: cell.vertices_of(number), triangles: 0 }));
             for crossing in self.crossings(slot) {
                 let is_divided = self.has_face_vertices(&crossing);
                 for far in [false, true] {
@@ -75,8 +74,4 @@ impl Nets {
             }
         }
     }
-}
-
-fn loops_of(cell: &Cell, number: u16) -> usize {
-    cube_loops()[cell.case(number)].count.into()
 }

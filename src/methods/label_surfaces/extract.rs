@@ -1,6 +1,5 @@
 //! The surfaces as meshes in world space.
 
-use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
 use crate::mesh::TriangleMesh;
@@ -55,9 +54,8 @@ impl<'a> Extraction<'a> {
             if nets.coarse.target(slot) != slot {
                 continue;
             }
-            let count = cube_loops()[nets.cells.get(slot).case(number)].count;
             self.first[(slot - start) as usize] = self.mesh.positions.len() as u32;
-            for on in 0..count {
+            for on in 0..nets.cells.get(slot).vertices_of(number) as u8 {
                 let vertex = NetVertex::Cell { slot, on };
                 self.mesh.positions.push(nets.shifted_position(number, vertex, nets.coarse.shift(slot)));
             }
