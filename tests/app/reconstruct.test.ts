@@ -346,6 +346,25 @@ describe('files', () => {
     expect(await text('.facts')).toContain('balls.xyz');
   });
 
+  test('a parameter changed while they are loaded is not theirs, and its field shows so', async () => {
+    await app.page.evaluate(() => {
+      const lab = document.querySelector<HTMLElement>('[data-state]');
+      const field = document.querySelector<HTMLInputElement>('[data-param=lambdaSurface] input[type=number]');
+      const changeInEachFrame = () => {
+        if (!field || lab?.dataset.state !== 'loading') return;
+        watch.disconnect();
+        field.value = '0.05';
+        field.dispatchEvent(new Event('change', { bubbles: true }));
+        requestAnimationFrame(changeInEachFrame);
+      };
+      const watch = new MutationObserver(changeInEachFrame);
+      if (lab) watch.observe(lab, { attributeFilter: ['data-state'] });
+    });
+    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await app.page.inputValue('[data-param=lambdaSurface] input[type=number]')).toBe('0.001');
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+  });
+
   test.each([
     ['notes.txt', 'no points at all'],
     ['few.xyz', '0 0 0\n1 0 0\n0 1 0\n'],

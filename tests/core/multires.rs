@@ -327,6 +327,17 @@ fn edges_grow_to_forty_times_their_length_within_a_few_frames() {
     assert!(model.base_mesh().vertex_count() < 100);
 }
 
+/// Edges are within the bounds already, far from the mean edge that these correspond to.
+#[test]
+fn a_higher_bound_alone_is_met_at_once() {
+    let mut model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.2));
+    settle(&mut model, 20);
+    let edge_max = 4.0 * model.params().edge_max;
+    model.set_params(MultiresParams { edge_max, ..model.params().clone() }).unwrap();
+    settle(&mut model, 20);
+    assert_held(&model);
+}
+
 #[test]
 fn parameters_apply_to_the_running_model() {
     let mut model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.2));

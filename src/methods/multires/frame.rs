@@ -45,6 +45,13 @@ impl MultiresolutionModel {
         MultiresParams { edge_min, edge_max, ..self.params.clone() }
     }
 
+    /// Returns whether no further frame would remesh the membrane towards the edge bounds. Wide bounds may be met by
+    /// edges far from the target edge.
+    pub(super) fn has_edges_as_wanted(&self) -> bool {
+        let now = self.params_now();
+        now == self.params || edges_within_bounds(&self.surface, now.bounds())
+    }
+
     /// Advances the model by one frame, adds the duration of each part to `times`, and returns the edits made. If it
     /// fails, nothing has changed.
     pub(super) fn frame(&mut self, times: &mut Times) -> Result<Changes, MethodError> {

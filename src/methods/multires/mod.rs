@@ -316,7 +316,7 @@ impl MultiresolutionModel {
 
     fn is_done(&self) -> bool {
         let has_converged =
-            self.residual <= TOLERANCE && self.refreshed_frames == 0 && self.params == self.params_now();
+            self.residual <= TOLERANCE && self.refreshed_frames == 0 && self.has_edges_as_wanted();
         // A membrane that encloses no ellipsoid shrinks until it has no vertices.
         self.surface.vertex_count() == 0 || self.ellipsoids.have_arrived() && has_converged
     }

@@ -139,7 +139,10 @@ export class ReconstructSettings {
   }
 
   async #setParam(name: string, value: unknown): Promise<void> {
-    if (!this.#cloud) return;
+    if (!this.#states.canChange) {
+      this.#onParams(this.#params);
+      return;
+    }
     const before = this.#now;
     try {
       const params = await this.#client.request('setParams', { [name]: value });
