@@ -360,7 +360,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
 
   #setParam(name: string, value: unknown): Promise<void> {
     return this.states.enqueue(async () => {
-      if (!this.states.canChange) return;
+      if (!this.states.canChange) return this.ui.showParams(this.#params);
       try {
         const params = await this.client.request('setParams', { [name]: value });
         this.#params = params;

@@ -129,7 +129,7 @@ export class TrackSettings {
    */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.enqueue(async () => {
-      if (!this.#states.canChange) return;
+      if (!this.#states.canChange) return this.#onChange();
       // A value entered again changes nothing, and the surfaces tracked with it remain.
       if (Object.entries(values).every(([name, value]) => Object.is(this.params[name], value))) {
         this.#onChange();
