@@ -92,7 +92,8 @@ const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
  * After Kobbelt, Bareuther and Seidel, "Multiresolution shape deformations for meshes with dynamic vertex
  * connectivity". A step is one frame: the ellipsoids move towards their targets as far as the low-frequency surface can
  * follow, that surface is solved for, and the detail is reconstructed on it. The model is done when the ellipsoids have
- * reached their targets and the surface has settled.
+ * reached their targets and the surface has settled, or has not done so in 100 frames, as where components that must not
+ * join press on each other; the report's `residual` is then above its `tolerance`.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link MultiresolutionModel.free}.
  */

@@ -69,6 +69,7 @@ impl MultiresolutionModel {
             None => self.solve(&prediction, &mut lap)?,
         };
         moving.drop_vanished();
+        self.frames_at_rest = if prediction.moves() { 0 } else { self.frames_at_rest.saturating_add(1) };
         self.ellipsoids = moving;
         self.residual = self.residual_of(&self.surface, &self.ellipsoids.now());
         lap.end("residual");

@@ -68,6 +68,10 @@ pub struct MultiresOptions {
 /// most this share of the target edge, as a root mean square.
 const TOLERANCE: f64 = 0.01;
 
+/// The largest number of frames in which ellipsoids at rest wait for the membrane to converge. It takes fewer than ten,
+/// seldom up to forty; where components that must not join press on each other, it may never do so.
+const MAX_FRAMES_AT_REST: u32 = 100;
+
 /// The largest number of vertices of the deformed base; a larger one is rejected with [`MethodError::TooManyVertices`].
 const MAX_VERTICES: usize = 200_000;
 
@@ -89,6 +93,8 @@ pub struct MultiresolutionModel {
     /// Number of frames in a row that refreshed the membrane on the finest level only, 0 after a solve on all levels;
     /// at least 1 if such a solve is due once the ellipsoids stop.
     refreshed_frames: u32,
+    /// Number of frames since the ellipsoids arrived or the parameters changed; see [`MAX_FRAMES_AT_REST`].
+    frames_at_rest: u32,
     residual: f64,
     clock: fn() -> f64,
 }
@@ -158,6 +164,7 @@ impl MultiresolutionModel {
             guard,
             iteration: 0,
             refreshed_frames: 0,
+            frames_at_rest: 0,
             residual: f64::NAN,
             clock: || 0.0,
         };
@@ -246,8 +253,14 @@ impl MultiresolutionModel {
         if self.params == (MultiresParams { supersample, ..before.clone() }) {
             self.reconstruct_detail();
         } else {
-            self.residual = f64::NAN;
+            self.solve_again();
         }
+    }
+
+    /// Ends convergence: the next steps solve the membrane again.
+    fn solve_again(&mut self) {
+        self.residual = f64::NAN;
+        self.frames_at_rest = 0;
     }
 
     /// Sets new target ellipsoids, matched by index to the current ones, which move towards them step by step. An
@@ -264,7 +277,7 @@ impl MultiresolutionModel {
         let surface = &self.surface;
         self.ellipsoids
             .set_targets(given, |target| contains_centres(surface, std::slice::from_ref(target))[0]);
-        self.residual = f64::NAN;
+        self.solve_again();
         Ok(())
     }
 
@@ -299,7 +312,8 @@ impl MultiresolutionModel {
     }
 
     /// Advances the model by one frame: moves the ellipsoids towards their targets as far as the membrane can follow,
-    /// and updates the membrane and its detail. Does nothing once the model has converged.
+    /// and updates the membrane and its detail. Does nothing once the model is done: it has converged, or has not done so
+    /// in 100 frames of ellipsoids at rest, as where components that must not join press on each other.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`] if the membrane would grow too large for its edge bounds; [`MethodError::Mesh`]
@@ -317,8 +331,9 @@ impl MultiresolutionModel {
     fn is_done(&self) -> bool {
         let has_converged =
             self.residual <= TOLERANCE && self.refreshed_frames == 0 && self.has_edges_as_wanted();
+        let has_settled = has_converged || self.frames_at_rest >= MAX_FRAMES_AT_REST;
         // A membrane that encloses no ellipsoid shrinks until it has no vertices.
-        self.surface.vertex_count() == 0 || self.ellipsoids.have_arrived() && has_converged
+        self.surface.vertex_count() == 0 || self.ellipsoids.have_arrived() && has_settled
     }
 
     /// Reconstructs the detail on the deformed base, after a change of the base or of the parameters for the detail.

@@ -10,7 +10,7 @@ use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLMRS\x02";
+const MAGIC: Magic = *b"VSCLMRS\x03";
 
 /// The saved state: everything of a run but the decomposition of its input surfaces.
 #[derive(Serialize, Deserialize)]
@@ -23,6 +23,7 @@ struct State {
     correspondence: Vec<(u32, Vec3)>,
     iteration: u32,
     passing: u32,
+    at_rest: u32,
     components: u32,
     residual: f64,
 }
@@ -40,6 +41,7 @@ impl MultiresolutionModel {
                 correspondence: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
                 iteration: self.iteration,
                 passing: self.refreshed_frames,
+                at_rest: self.frames_at_rest,
                 components: self.components,
                 residual: self.residual,
             },
@@ -72,6 +74,7 @@ impl MultiresolutionModel {
         let replaced = std::mem::replace(&mut self.surface, state.surface);
         self.surface.advance_versions_past(&replaced);
         (self.iteration, self.refreshed_frames) = (state.iteration, state.passing);
+        self.frames_at_rest = state.at_rest;
         (self.components, self.residual) = (state.components, state.residual);
         self.reconstruct_detail();
         Ok(())

@@ -94,14 +94,13 @@ export class SculptResults {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return text('labs.running');
     if (!last) return text('labs.ready');
-    const { vertices, components } = last;
+    const { vertices, components, residual, tolerance } = last;
     const what = text('labs.surfaceSize', {
       vertices: plural('counts.vertex', vertices),
       components: plural('counts.component', components),
     });
-    return state === 'done'
-      ? text('sculpt.converged', { surface: what })
-      : text('sculpt.pausedAt', { iteration: count(last.iteration), surface: what });
+    if (state !== 'done') return text('sculpt.pausedAt', { iteration: count(last.iteration), surface: what });
+    return text(residual > tolerance ? 'sculpt.notConverged' : 'sculpt.converged', { surface: what });
   }
 
   /** Requests and displays the undeformed meshes, if the layout of the view includes them. */
