@@ -175,6 +175,23 @@ fn a_run_that_does_not_converge_ends() {
     assert!(model.step().unwrap().done);
 }
 
+/// Regression: with an upper edge bound far above the lower one, contacts were refined to the lower one, and came into
+/// contact again, until the mesh had a hundred times as many vertices.
+#[test]
+fn components_join_under_wide_edge_bounds() {
+    let topology = Topology::SplitAndJoin;
+    let start = MultiresParams { edge_min: 0.164, edge_max: 0.395, topology, ..Default::default() };
+    let still = ellipsoid([-0.685, 0.032, 0.032], [0.612, 0.553, 0.519]);
+    let moving = ellipsoid([0.803, -0.015, 0.028], [0.738, 0.465, 0.528]);
+    let mut model = lamp(&[still, moving], start.clone());
+    assert_eq!(settle(&mut model, 20).components, 2);
+    model.set_params(MultiresParams { edge_min: 0.044, ..start }).unwrap();
+    model.set_ellipsoids(&[still, ellipsoid([-0.151, 0.057, 0.26], [0.552, 0.668, 0.964])]).unwrap();
+    let report = settle(&mut model, 30);
+    assert_eq!(report.components, 1);
+    assert!(report.vertices < 2000, "{} vertices", report.vertices);
+}
+
 #[test]
 fn without_topology_changes_a_thread_remains() {
     let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];

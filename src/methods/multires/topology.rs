@@ -73,11 +73,15 @@ fn resolve(
     resolver.resolve(mesh, sampling(params.bounds()), active)
 }
 
-/// Returns the edge lengths that the resolver restores around topology changes, from ε_min to 2.5 ε_min: the upper
-/// bound is slightly higher than the default ε_max, 2.23 ε_min.
+/// Returns the edge lengths that the resolver restores around topology changes: from ε_min to 2.5 ε_min, slightly more
+/// than the default ε_max, 2.23 ε_min; with a higher ε_max up to that, since finer parts would be refined until they are
+/// in contact everywhere.
 fn sampling(bounds: EdgeBounds) -> Sampling {
-    Sampling::new(bounds.min)
+    Sampling::new(bounds.min.max(bounds.max / RESOLVED_RATIO))
 }
+
+/// Ratio of the longest to the shortest edge that the resolver restores.
+const RESOLVED_RATIO: f32 = 2.5;
 
 /// Returns the vertices of edges that are shorter than ε_min and cannot be collapsed, because they are on a neck or on
 /// an isolated tetrahedron. Topology changes are tried around them.
