@@ -27,6 +27,11 @@ impl Sampling {
         Self { delta, sizes: None }
     }
 
+    /// Creates a uniform sampling whose upper bound of the edge length is `longest`, a positive length.
+    pub fn up_to(longest: f32) -> Self {
+        Self::new(longest / LONGEST)
+    }
+
     /// Returns this sampling with a local δ at each vertex: δ times 1 + the scalar attribute `sizes`, which must be
     /// above −1. Also where the local δ is larger, small components are measured by δ itself, and contacts are found
     /// only up to the contact distance of δ itself.

@@ -146,6 +146,7 @@ fn components_that_must_not_join_press_on_each_other() {
 }
 
 /// Two components that must not join cannot pass through each other.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_run_that_does_not_converge_ends() {
     let at = |x: f64| [ball(x, 0.0, 0.0, 0.8), ball(-x, 0.0, 0.0, 0.8)];
@@ -155,17 +156,8 @@ fn a_run_that_does_not_converge_ends() {
     assert_eq!(settle(&mut model, 50).components, 2);
     model.set_params(MultiresParams { topology: Topology::Never, ..model.params().clone() }).unwrap();
     model.set_ellipsoids(&at(-0.5)).unwrap();
-    let mut frames = 0;
-    let report = loop {
-        let report = model.step().unwrap();
-        frames += 1;
-        if report.done {
-            break report;
-        }
-        assert!(frames < 200, "it does not end");
-    };
-    assert_sound(&model, &report);
-    assert!(report.residual > report.tolerance, "{} after {frames}", report.residual);
+    let report = settle(&mut model, 200);
+    assert!(report.residual > report.tolerance, "{}", report.residual);
     assert_eq!(model.step().unwrap().iteration, report.iteration);
     // A saved state tells that it is over, and another target begins again.
     let saved = model.save();

@@ -77,11 +77,9 @@ fn resolve(
 /// than the default ε_max, 2.23 ε_min; with a higher ε_max up to that, since finer parts would be refined until they are
 /// in contact everywhere.
 fn sampling(bounds: EdgeBounds) -> Sampling {
-    Sampling::new(bounds.min.max(bounds.max / RESOLVED_RATIO))
+    let usual = Sampling::new(bounds.min);
+    if bounds.max > usual.longest() { Sampling::up_to(bounds.max) } else { usual }
 }
-
-/// Ratio of the longest to the shortest edge that the resolver restores.
-const RESOLVED_RATIO: f32 = 2.5;
 
 /// Returns the vertices of edges that are shorter than ε_min and cannot be collapsed, because they are on a neck or on
 /// an isolated tetrahedron. Topology changes are tried around them.
