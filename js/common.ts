@@ -32,6 +32,7 @@ export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
 export { Volume, type VolumeFormat } from './volume.js';
+export type { Warning, WarningCode } from './warning.js';
 
 /** Returns the version of the package. */
 export function version(): string {

@@ -28,6 +28,13 @@ export type ErrorCode =
    * {@link NeedsDataError}, which reads them.
    */
   | 'needs-data'
+  /**
+   * Positions so far from the origin, or edges so short, that the numbers of the result cannot hold them; the message
+   * says what can.
+   */
+  | 'precision'
+  /** Work that stopped because its last round changed nothing for the better; nothing has changed. */
+  | 'no-progress'
   /** More memory needed than there is, or more vertices than are allowed; the message says how much. */
   | 'too-large'
   /**

@@ -2,6 +2,7 @@ import { checkProperties, integer, invalid, positive } from './check.js';
 import type { DataOptions } from './data.js';
 import { NeedsDataError } from './error.js';
 import type { Mesh } from './mesh.js';
+import type { Warning } from './warning.js';
 
 /** State of a model after one step, or several together, and the events during them. */
 export interface StepReport {
@@ -42,6 +43,8 @@ export interface StepReport {
   };
   /** Durations of the parts of the last step by name (forces, motion, normals, topology, and so on), milliseconds. */
   times: Record<string, number>;
+  /** What to know about the result so far before relying on it; empty if there is nothing. */
+  warnings: Warning[];
 }
 
 /** Options of {@link Stepper.run}. */

@@ -18,6 +18,7 @@ import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
+import type { Warning } from './warning.js';
 
 const INIT = [
   ...['data', 'dims', 'affine', 'spacing', 'origin'],
@@ -163,6 +164,11 @@ export class Volume {
   /** Orientation of the world axes. */
   get space(): Space {
     return this.#handle.use((raw) => raw.space() as Space);
+  }
+
+  /** What to know about the volume before relying on it; empty if there is nothing. */
+  get warnings(): Warning[] {
+    return this.#handle.use((raw) => raw.warnings() as Warning[]);
   }
 
   /** Smallest and largest finite intensity of all frames, after slope and intercept. */

@@ -78,6 +78,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     affine: 'value',
     space: 'value',
     range: 'value',
+    warnings: 'value',
     toNifti: 'method',
     toBytes: 'method',
     histogram: 'method',

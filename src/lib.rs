@@ -2,7 +2,7 @@
 //! to a volume.
 //!
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
-//! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial.
+//! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial. All may use `warning`.
 //!
 //! The JavaScript bindings are a crate of their own, `src/bindings`, with a Cargo feature for each method, so that a
 //! WebAssembly module can have one of them.
@@ -15,6 +15,7 @@ pub mod remesh;
 pub mod spatial;
 pub mod volume;
 pub mod voxelise;
+pub mod warning;
 
 // The tests in `tests/core` use the library by its name, as others do, but are of one program with those beside the code:
 // two would be compiled with the library twice.

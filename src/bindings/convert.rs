@@ -123,7 +123,7 @@ pub fn unit_named(name: &str) -> LengthUnit {
 }
 
 /// Converts a serialisable value to plain objects and arrays, in which `None` is `undefined`.
-pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
+pub fn to_js<T: Serialize + ?Sized>(value: &T) -> Result<JsValue, Failure> {
     value
         .serialize(&Serializer::new().serialize_maps_as_objects(true))
         .map_err(|error| Failure::invalid("result", &error.to_string()))

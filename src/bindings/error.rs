@@ -52,6 +52,8 @@ impl From<MeshError> for Failure {
             MeshError::InvalidArgument { .. } => "invalid-argument",
             MeshError::NotClosed { .. } => "not-closed",
             MeshError::SelfIntersecting { .. } | MeshError::CannotCut => "self-intersecting",
+            MeshError::Precision { .. } => "precision",
+            MeshError::NoProgress { .. } => "no-progress",
             MeshError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())

@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{columns, copy_array, point, space_name, unit_named};
+use super::convert::{columns, copy_array, point, space_name, to_js, unit_named};
 use super::error::Failure;
 use vesicle::io::write_nifti;
 use vesicle::math::DAffine3;
@@ -81,6 +81,11 @@ impl RawVolume {
     /// (left, posterior, superior).
     pub fn space(&self) -> String {
         space_name(self.0.space()).to_owned()
+    }
+
+    /// Returns what a user should know about the volume, as an array of `Warning`.
+    pub fn warnings(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(self.0.warnings())?)
     }
 
     /// Returns the smallest and the largest finite intensity of all frames.

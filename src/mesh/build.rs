@@ -31,7 +31,7 @@ impl Mesh {
             }
         }
         rings.iter_mut().for_each(|ring| ring.renumber(|v| new_ids[v.index()]));
-        Ok(Self::from_rings(rings, positions))
+        Ok(Self { origin: mesh.origin, ..Self::from_rings(rings, positions) })
     }
 
     fn from_rings(rings: Vec<Ring>, positions: Vec<Vec3>) -> Self {
@@ -97,7 +97,8 @@ impl Mesh {
             normals.push(self.unit_normal(v));
         }
         let triangles = self.triangles().map(|corners| corners.map(|v| new_ids[v.index()])).collect();
-        TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
+        let origin = self.origin;
+        TriangleMesh { positions, origin, triangles, normals: Some(normals), ..TriangleMesh::default() }
     }
 
     /// Adds a copy of `other`, which must not touch this mesh, as further connected components, and returns the ids of

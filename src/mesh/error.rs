@@ -31,6 +31,18 @@ pub enum MeshError {
         "the mesh cannot be cut there: it intersects itself at the plane, or parts of it are too near each other"
     )]
     CannotCut,
+    /// Coordinates are so large, or lengths so small, that single precision can't represent the result.
+    #[error("{problem}")]
+    Precision {
+        /// The lengths concerned, as text for the user.
+        problem: String,
+    },
+    /// A loop that has to make progress in every round made none; the mesh is unmodified.
+    #[error("no progress: {problem}")]
+    NoProgress {
+        /// The work that did not progress, and what may help, as text for the user.
+        problem: String,
+    },
     /// The mesh needs more memory, or more vertices, than are available.
     #[error("the mesh needs {bytes} bytes, more than is available")]
     TooLarge {

@@ -62,7 +62,7 @@ pub use texture::{ImageKind, Texture};
 pub use transform::invertible_map;
 pub use triangles::TriangleMesh;
 
-use crate::math::{Vec3, make_room};
+use crate::math::{DVec3, Vec3, make_room};
 use attributes::Attributes;
 use journal::Journal;
 use serde::{Deserialize, Serialize};
@@ -76,6 +76,8 @@ pub struct Mesh {
     free: Vec<VertexId>,
     half_edges: usize,
     euler: i64,
+    #[serde(skip)]
+    origin: DVec3,
     #[serde(skip)]
     journal: Journal,
     #[serde(skip)]
@@ -133,6 +135,19 @@ impl Mesh {
     #[inline]
     pub fn geometry_version(&self) -> u32 {
         self.geometry_version
+    }
+
+    /// Returns the origin of the mesh in world space: that of a vertex is its position plus this. See
+    /// [`TriangleMesh::origin`]. Methods compute in spaces of their own, where it is 0; it is no part of a saved state.
+    #[inline]
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Sets the origin, which moves the mesh in world space; positions stay as they are.
+    pub fn set_origin(&mut self, origin: DVec3) {
+        self.origin = origin;
+        self.geometry_version = self.geometry_version.wrapping_add(1);
     }
 
     /// Returns the numbers of vertices and triangles.

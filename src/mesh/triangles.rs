@@ -13,8 +13,11 @@ use std::sync::Arc;
 /// position, except `corner_uvs`, which has one per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// The positions of the vertices.
+    /// The positions of the vertices, relative to `origin`.
     pub positions: Vec<Vec3>,
+    /// The origin in world space: a vertex is at its position plus this. It is 0 unless the mesh is far from the world's
+    /// origin for its size, where positions in single precision would be too coarse.
+    pub origin: DVec3,
     /// The indices of the corners of each triangle, into `positions`.
     pub triangles: Vec<[u32; 3]>,
     /// Unit normals per vertex.
@@ -170,6 +173,7 @@ impl TriangleMesh {
     pub(super) fn vertex_subset(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
+            origin: self.origin,
             triangles: Vec::new(),
             normals: self.normals.as_ref().map(|all| gather(all, vertices)),
             uvs: self.uvs.as_ref().map(|all| gather(all, vertices)),

@@ -1,6 +1,7 @@
 //! The stepping interface common to all methods: the report that each step returns.
 
 use crate::remesh::Changes;
+use crate::warning::Warning;
 use serde::Serialize;
 
 /// The result of one step: the state of convergence, the size and topology of the mesh, and the edits made.
@@ -31,6 +32,8 @@ pub struct StepReport {
     pub events: Changes,
     /// The time spent in each part of the step, in milliseconds; all 0 if the model has no clock.
     pub times: Times,
+    /// What a user should know about the result so far; empty if it can be relied on.
+    pub warnings: Vec<Warning>,
 }
 
 /// Durations in milliseconds of named parts of a step, for its report, in the order in which they first ran.

@@ -70,6 +70,7 @@ pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 
 use crate::math::{DAffine3, DVec3};
+use crate::warning::Warning;
 use error::reserve;
 use std::sync::Arc;
 use voxels::each;
@@ -143,6 +144,7 @@ pub struct Volume {
     space: Space,
     unit: LengthUnit,
     range: [f64; 2],
+    warnings: Vec<Warning>,
 }
 
 impl Volume {
@@ -172,6 +174,7 @@ impl Volume {
             space: init.space,
             unit: LengthUnit::Unknown,
             range,
+            warnings: Vec::new(),
         })
     }
 
@@ -191,6 +194,18 @@ impl Volume {
     pub fn with_unit(mut self, unit: LengthUnit) -> Volume {
         self.unit = unit;
         self
+    }
+
+    /// Returns the volume with `warning` added to its warnings.
+    #[must_use]
+    pub fn with_warning(mut self, warning: Warning) -> Volume {
+        self.warnings.push(warning);
+        self
+    }
+
+    /// Returns what a user should know about the volume before relying on it.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 
     /// Returns the number of voxels along x, y and z.

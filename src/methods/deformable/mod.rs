@@ -504,6 +504,7 @@ impl DeformableModel {
             euler: self.mesh.euler() as i32,
             events,
             times,
+            warnings: Vec::new(),
         }
     }
 

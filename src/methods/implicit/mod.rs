@@ -316,6 +316,7 @@ impl ImplicitSurface {
             euler: self.euler as i32,
             events: Changes::default(),
             times,
+            warnings: Vec::new(),
         }
     }
 

@@ -339,6 +339,7 @@ impl LabelSurfaces {
             euler: self.counts.euler() as i32,
             events: Changes::default(),
             times,
+            warnings: Vec::new(),
         }
     }
 }

@@ -364,6 +364,7 @@ impl MultiresolutionModel {
             euler: mesh.euler() as i32,
             events,
             times,
+            warnings: Vec::new(),
         }
     }
 }

@@ -471,6 +471,7 @@ impl SurfaceTracker {
             euler: self.mesh.euler() as i32,
             events,
             times,
+            warnings: Vec::new(),
         }
     }
 }

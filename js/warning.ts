@@ -1,0 +1,24 @@
+/** The kinds of {@link Warning}. */
+export type WarningCode =
+  /** A part of the surface ends in this frame: the image has no object there from here on. */
+  | 'ends-in-frame'
+  /** A part of the surface begins in this frame: the image had no object there before. */
+  | 'begins-in-frame'
+  /** A label so thin that the volume of its surface is not that of its voxels. */
+  | 'thin-label'
+  /** Positions or intensities that had to be rounded more than the result should suffer. */
+  | 'precision'
+  /** A surface that was moved towards the origin, since where it is it could not be represented. */
+  | 'recentred'
+  /** Voxels so much longer along one axis that the shape between the slices is a guess. */
+  | 'anisotropic';
+
+/** Something to know about a volume or a result before relying on it. */
+export interface Warning {
+  /** The kind of warning, by which programs can distinguish them. */
+  code: WarningCode;
+  /** The warning in words: what was found, what was done, and what can be done about it. */
+  text: string;
+  /** The part of the data that is concerned, if it is not all of it: a frame, the value of a label, or a point. */
+  where?: { frame: number } | { label: number } | { point: [number, number, number] };
+}
