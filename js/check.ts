@@ -1,5 +1,6 @@
 // Validation of arguments. Each function returns the value, or throws `invalid-argument` naming the parameter and what
 // is accepted.
+import type { PointArray } from './data.js';
 import { VesicleError } from './error.js';
 
 /** Returns the `invalid-argument` error whose message names the parameter and its problem; the caller throws it. */
@@ -117,6 +118,18 @@ export function finite(parameter: string, value: unknown, stride: number): Float
   const wrong = array.findIndex((entry) => !Number.isFinite(entry));
   if (wrong < 0) return array;
   throw invalid(parameter, `all numbers must be finite, got ${array[wrong]} at index ${wrong}`);
+}
+
+/**
+ * Returns `value` if it is a `Float32Array` or `Float64Array` of finite points, packed xyz, within the range of single
+ * precision, else throws `invalid-argument`.
+ */
+export function pointArray(parameter: string, value: unknown): PointArray {
+  if (!(value instanceof Float64Array)) return finite(parameter, value, 3);
+  const array = typedArray(parameter, value, Float64Array, 3);
+  const wrong = array.findIndex((entry) => !Number.isFinite(Math.fround(entry)));
+  if (wrong < 0) return array;
+  throw invalid(parameter, `all numbers must be finite and within ±3.4e38, got ${array[wrong]} at index ${wrong}`);
 }
 
 /**

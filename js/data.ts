@@ -3,6 +3,12 @@
 /** Three numbers: a point, a direction, or one number for each of x, y and z. */
 export type Vec3 = [number, number, number];
 
+/**
+ * Points in world space, packed xyz. In double precision where single is too coarse: far from the origin for their extent,
+ * as surveyed coordinates are.
+ */
+export type PointArray = Float32Array | Float64Array;
+
 /** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
 export type VoxelArray =
   | Uint8Array
@@ -106,15 +112,16 @@ export interface MeshExtra {
 
 /** The content of a mesh file: the arguments of `Mesh.fromArrays`. */
 export interface MeshData extends MeshExtra {
-  /** Position of each vertex, packed xyz. */
-  positions: Float32Array;
+  /** Position of each vertex, packed xyz; in double precision if the mesh is far from the origin for its size. */
+  positions: PointArray;
   /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
   indices: Uint32Array;
 }
 
 /** The content of a point file, as packed arrays: xyz, xyz and rgb of each point in turn. */
 export interface PointData {
-  points: Float32Array;
+  /** In double precision if the points are far from the origin for their extent. */
+  points: PointArray;
   /** Unit normals, if the file has them. */
   normals?: Float32Array;
   /** Colours, 0..1, if the file has them. */

@@ -1,5 +1,5 @@
-import { checkProperties, denseCopy, finite, integer, numbers, shallowCopy, typedArray } from './check.js';
-import type { Vec3 } from './data.js';
+import { checkProperties, denseCopy, finite, integer, numbers, pointArray, shallowCopy, typedArray } from './check.js';
+import type { PointArray, Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -70,7 +70,7 @@ export interface Camera {
 /** Constructor options of an {@link ImplicitSurface}. Everything is copied. */
 export interface ImplicitOptions {
   /** Packed xyz of noisy points near the closed surface: at least four, not in one plane. */
-  points: Float32Array;
+  points: PointArray;
   /** Packed outward normals of the points; they need not have unit length. */
   normals?: Float32Array;
   /**
@@ -85,7 +85,7 @@ export interface ImplicitOptions {
    * the cameras, or without cameras along the normals, given or estimated. Points on a sphere around all points are
    * always added.
    */
-  exterior?: Float32Array;
+  exterior?: PointArray;
   /**
    * The cameras from which the points were reconstructed: exterior points are made towards them, and their images
    * colour the mesh.
@@ -102,14 +102,14 @@ export interface ImplicitOptions {
 /** Manual edits of the points of an {@link ImplicitSurface}, for {@link ImplicitSurface.setEdits}. */
 export interface PointEdits {
   /** Packed points near the surface that are used in addition to the original ones. */
-  added?: Float32Array;
+  added?: PointArray;
   /**
    * Points to leave out, by their zero-based index in the original points; others at the same positions are left out,
    * too.
    */
   removed?: Uint32Array;
   /** Packed points known to be outside the surface, used in addition to the other exterior points. */
-  exterior?: Float32Array;
+  exterior?: PointArray;
 }
 
 /**
@@ -267,9 +267,9 @@ export class ImplicitSurface implements Stepper {
   /** Current manual edits of the points; a copy. */
   get edits(): Required<PointEdits> {
     return this.#handle.use((raw) => ({
-      added: raw.added(),
+      added: raw.added() as PointArray,
       removed: raw.removed(),
-      exterior: raw.exterior(),
+      exterior: raw.exterior() as PointArray,
     }));
   }
 
@@ -287,8 +287,8 @@ export class ImplicitSurface implements Stepper {
   setEdits(edits: PointEdits): void {
     const known = checkProperties('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
     const { added = new Float32Array(), removed = new Uint32Array(), exterior = new Float32Array() } = known;
-    finite('added', added, 3);
-    finite('exterior', exterior, 3);
+    pointArray('added', added);
+    pointArray('exterior', exterior);
     typedArray('removed', removed, Uint32Array);
     this.#handle.use((raw) => raw.setEdits(added, removed, exterior));
   }
@@ -299,8 +299,8 @@ export class ImplicitSurface implements Stepper {
    *
    * @throws {@link VesicleError} `invalid-argument` before the system is solved.
    */
-  evaluate(points: Float32Array): Float32Array {
-    finite('points', points, 3);
+  evaluate(points: PointArray): Float32Array {
+    pointArray('points', points);
     return this.#handle.use((raw) => raw.evaluate(points));
   }
 
@@ -308,17 +308,18 @@ export class ImplicitSurface implements Stepper {
    * Evaluates the gradient of f, ∇f, at packed points, as packed vectors per unit of length of the points; on the
    * surface they point inwards. Throws as {@link ImplicitSurface.evaluate}.
    */
-  gradient(points: Float32Array): Float32Array {
-    finite('points', points, 3);
+  gradient(points: PointArray): Float32Array {
+    pointArray('points', points);
     return this.#handle.use((raw) => raw.gradient(points));
   }
 
   /**
    * Returns the surface constraints (the points used) and the exterior constraints, packed; empty until they are
-   * chosen.
+   * chosen. In double precision where the points need it.
    */
-  constraints(): { surface: Float32Array; exterior: Float32Array } {
-    return this.#handle.use((raw) => ({ surface: raw.constraints(0), exterior: raw.constraints(1) }));
+  constraints(): { surface: PointArray; exterior: PointArray } {
+    const [surface, exterior] = this.#handle.use((raw) => [raw.constraints(0), raw.constraints(1)]);
+    return { surface: surface as PointArray, exterior: exterior as PointArray };
   }
 
   /**
@@ -394,11 +395,11 @@ export class ImplicitSurface implements Stepper {
 
 function checked(given: ImplicitOptions): ImplicitOptions {
   const known = checkProperties('options', given, OPTIONS) as ImplicitOptions;
-  finite('points', known.points, 3);
+  pointArray('points', known.points);
   if (known.normals !== undefined) finite('normals', known.normals, 3);
   if (known.confidence !== undefined) finite('confidence', known.confidence, 1);
   if (known.colors !== undefined) finite('colors', known.colors, 3);
-  if (known.exterior !== undefined) finite('exterior', known.exterior, 3);
+  if (known.exterior !== undefined) pointArray('exterior', known.exterior);
   if (known.maxPoints !== undefined) integer('maxPoints', known.maxPoints);
   if (known.keepComponents !== undefined) integer('keepComponents', known.keepComponents, { min: 1 });
   return { ...known, cameras: checkedCameras(known.cameras ?? []), params: shallowCopy('params', known.params ?? {}) };

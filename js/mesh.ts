@@ -1,4 +1,5 @@
 import {
+  boolean,
   checkProperties,
   choice,
   denseCopy,
@@ -7,12 +8,13 @@ import {
   invalid,
   number,
   numbers,
+  pointArray,
   positive,
   shallowCopy,
   typedArray,
   vec3,
 } from './check.js';
-import type { MeshExtra, MeshTexture, Vec3 } from './data.js';
+import type { MeshExtra, MeshTexture, PointArray, Vec3 } from './data.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
@@ -20,8 +22,10 @@ import { type Volume, volumeHandle, wrapVolume } from './volume.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
-  /** Position of each vertex, packed xyz. */
+  /** Position of each vertex, packed xyz; in world space, or relative to `origin` if that was asked for. */
   positions: Float32Array;
+  /** The origin in world space that `positions` are relative to; set with `relative` only. */
+  origin?: Vec3;
   /** Unit outward normal of each vertex, packed xyz. */
   normals: Float32Array;
   /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
@@ -84,6 +88,15 @@ export interface MeshReport {
    * Number of pairs of triangles that intersect beyond their common corners and edges, tested with exact predicates.
    */
   selfIntersections: number;
+}
+
+/** Options of what returns positions in single precision, such as {@link Mesh.arrays}. */
+export interface PositionOptions {
+  /**
+   * Whether positions are relative to {@link Mesh.origin}, which keeps their precision however far the mesh is from the
+   * origin of world space. Default false: in world space.
+   */
+  relative?: boolean;
 }
 
 /** File formats that {@link Mesh.toBytes} writes. */
@@ -208,14 +221,14 @@ export class Mesh {
   /**
    * Creates a mesh from packed arrays, which are copied unchanged.
    *
-   * @param positions - xyz of each vertex.
+   * @param positions - xyz of each vertex; a `Float64Array` where single precision would be too coarse.
    * @param indices - abc of each triangle, counter-clockwise seen from outside.
    * @param extra - What else the mesh has.
    * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index out of
    *   range, a texture without texture coordinates, bytes that are no image of the stated type.
    */
-  static fromArrays(positions: Float32Array, indices: Uint32Array, extra: MeshExtra = {}): Mesh {
-    const vertices = finite('positions', positions, 3).length / 3;
+  static fromArrays(positions: PointArray, indices: Uint32Array, extra: MeshExtra = {}): Mesh {
+    const vertices = pointArray('positions', positions).length / 3;
     checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
     const given = checkExtra(extra, vertices, indices.length / 3);
     const { normals, uvs, cornerUvs, colors, texture } = given;
@@ -295,25 +308,43 @@ export class Mesh {
     return raw && call(() => textureOf(raw));
   }
 
-  /** Returns the mesh in its present state as newly allocated arrays. */
-  arrays(): MeshArrays {
+  /**
+   * The point of world space that the mesh keeps its positions relative to, in double precision: `[0, 0, 0]`, unless the
+   * mesh is more than 16 times its size away from that, as surveyed coordinates are.
+   */
+  get origin(): Vec3 {
+    return this.#handle.use((raw) => triple(raw.origin()));
+  }
+
+  /**
+   * Returns the mesh in its present state as newly allocated arrays.
+   *
+   * @throws {@link VesicleError} `precision` if single precision in world space would change an edge by more than a
+   *   thousandth; not if positions are `relative`. Edges of less than a tenth of the mean count as that long.
+   */
+  arrays(options?: PositionOptions): MeshArrays {
     const arrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
-    this.copyTo(arrays);
+    this.copyTo(arrays, options);
     return arrays;
   }
 
   /**
    * Copies the mesh into the caller's arrays, which are replaced only when too small; returns the numbers of vertices
-   * and triangles written. `uvs` and `colors` are set if the mesh has them, and deleted otherwise.
+   * and triangles written. `uvs`, `colors` and `origin` are set if the mesh has them, or positions are `relative`, and
+   * deleted otherwise.
    *
-   * @throws {@link VesicleError} `invalid-argument` if `out` is no such object.
+   * @throws {@link VesicleError} `invalid-argument` if `out` is no such object; `precision` as {@link Mesh.arrays}.
    */
-  copyTo(out: MeshArrays): { vertices: number; triangles: number } {
+  copyTo(out: MeshArrays, options?: PositionOptions): { vertices: number; triangles: number } {
     if (out === undefined) throw invalid('out', 'must be an object with positions, normals and indices, got undefined');
-    checkProperties('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
-    const arrays = this.#handle.use((raw) => raw.arrays());
+    checkProperties('out', out, ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors']);
+    const relative = isRelative(options);
+    const arrays = this.#handle.use((raw) => raw.arrays(relative));
     try {
-      return call(() => copyArrays(arrays, out));
+      const counts = call(() => copyArrays(arrays, out));
+      if (relative) out.origin = this.origin;
+      else delete out.origin;
+      return counts;
     } finally {
       arrays.free();
     }
@@ -532,8 +563,8 @@ export class Mesh {
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`: a length that is no multiple of 3, or a number that
    *   is not finite.
    */
-  contains(points: Float32Array): Uint8Array {
-    const array = finite('points', points, 3);
+  contains(points: PointArray): Uint8Array {
+    const array = pointArray('points', points);
     return this.#handle.use((raw) => raw.contains(array));
   }
 
@@ -625,13 +656,15 @@ export class Mesh {
    * Computes the cross-section of the surface with the plane through `origin` as line segments: pairs of points, six
    * numbers a segment.
    *
+   * @param origin - A point of the plane in world space, whatever the options.
    * @param normal - Any length but 0.
-   * @throws {@link VesicleError} `invalid-argument`.
+   * @throws {@link VesicleError} `invalid-argument`; `precision` as {@link Mesh.arrays}.
    */
-  crossSection(origin: Vec3, normal: Vec3): Float32Array {
+  crossSection(origin: Vec3, normal: Vec3, options?: PositionOptions): Float32Array {
     const point = vec3('origin', origin);
     const across = nonZero('normal', vec3('normal', normal));
-    return this.#handle.use((raw) => raw.crossSection(point, across));
+    const relative = isRelative(options);
+    return this.#handle.use((raw) => raw.crossSection(point, across, relative));
   }
 
   /**
@@ -639,11 +672,18 @@ export class Mesh {
    * contains the texture; obj, ply and vtp of a mesh with a texture contain its coordinates with the usual orientation
    * of those formats, 1 - v.
    *
-   * @throws {@link VesicleError} `invalid-argument`: no such format.
+   * Where the mesh has an {@link Mesh.origin} of its own, ply and vtp have positions in double precision, and a glb a
+   * node at the origin. stl and mz3 have single precision only.
+   *
+   * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
+   * @throws {@link VesicleError} `invalid-argument`: no such format; `precision` for stl and mz3, as {@link Mesh.arrays},
+   *   unless it is recentred.
    */
-  toBytes(format: MeshFormat): Uint8Array {
+  toBytes(format: MeshFormat, options: { recentre?: boolean } = {}): Uint8Array {
     choice('format', format, FORMATS);
-    return this.#handle.use((raw) => raw.toBytes(format));
+    const { recentre = false } = checkProperties('options', options, ['recentre']);
+    boolean('recentre', recentre);
+    return this.#handle.use((raw) => raw.toBytes(format, recentre));
   }
 
   /** Returns an independent copy; for a model's live mesh, of its present state. */
@@ -663,6 +703,14 @@ export class Mesh {
   [Symbol.dispose](): void {
     this.free();
   }
+}
+
+function isRelative(options: PositionOptions | undefined): boolean {
+  return boolean('relative', checkProperties('options', options, ['relative']).relative ?? false);
+}
+
+function triple(numbers: Float64Array): Vec3 {
+  return Array.from(numbers) as Vec3;
 }
 
 function edgeBounds(edge: { min: number; max: number }): [number, number] {

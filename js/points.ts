@@ -1,5 +1,5 @@
 import { typedArray } from './check.js';
-import type { PointData } from './data.js';
+import type { PointArray, PointData } from './data.js';
 import { call } from './runtime.js';
 import { RawPoints } from './vesicle.js';
 
@@ -13,7 +13,7 @@ export function parsePoints(bytes: Uint8Array): PointData {
   typedArray('bytes', bytes, Uint8Array);
   return call(() => {
     const raw = RawPoints.parse(bytes);
-    const [points, normals, colors] = [raw.points(), raw.normals(), raw.colors()];
+    const [points, normals, colors] = [raw.points() as PointArray, raw.normals(), raw.colors()];
     raw.free();
     return { points, ...(normals && { normals }), ...(colors && { colors }) };
   });

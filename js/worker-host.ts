@@ -18,7 +18,7 @@ import init, {
   Volume,
   version,
 } from './index.js';
-import type { MeshArrays } from './mesh.js';
+import type { MeshArrays, PositionOptions } from './mesh.js';
 import {
   ABORTABLE,
   type Failure,
@@ -135,8 +135,8 @@ class Host {
    */
   #copyTo({ on, args }: Call): unknown {
     const { target } = this.#find(on, 'copyTo');
-    const [arrays] = this.#incoming(args) as [MeshArrays];
-    return { counts: (target as unknown as Mesh).copyTo(arrays), arrays };
+    const [arrays, options] = this.#incoming(args) as [MeshArrays, PositionOptions?];
+    return { counts: (target as unknown as Mesh).copyTo(arrays, options), arrays };
   }
 
   async #abortable(id: number, { on, name, args: [options], reports }: Call): Promise<unknown> {

@@ -103,6 +103,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     topologyVersion: 'value',
     geometryVersion: 'value',
     texture: 'value',
+    origin: 'value',
     arrays: 'method',
     copyTo: 'method',
     info: 'method',

@@ -2,7 +2,7 @@
 import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
-import type { MeshArrays } from './mesh.js';
+import type { MeshArrays, PositionOptions } from './mesh.js';
 import { checkedRun, type RunOptions } from './stepper.js';
 import {
   type ABORTABLE,
@@ -246,15 +246,16 @@ function notify(listener: Listener, report: Report, stop: AbortController): void
 }
 
 /** Implements `Mesh.copyTo`: the buffers of `out` are transferred to the worker and back. */
-async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
-  const { uvs, colors, ...given } = checkProperties('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
+async function copyTo(remote: Remote, out: MeshArrays, options?: PositionOptions): Promise<unknown> {
+  const known = ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors'];
+  const { uvs, colors, origin: _, ...given } = checkProperties('out', out, known);
   const session = sessionOf(remote);
-  const sent = serialize([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) })]);
+  const sent = serialize([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) }), options]);
   const task: Task = { type: 'call', on: referenceOf(remote), name: 'copyTo', args: sent.args };
   const { answer } = session.post(task, { ...sent, target: remote });
   // Transferred arrays cannot be sent again until they are back.
   Object.assign(out, { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() });
-  for (const name of ['uvs', 'colors'] as const) delete out[name];
+  for (const name of ['uvs', 'colors', 'origin'] as const) delete out[name];
   const { counts, arrays } = (await answer) as { counts: unknown; arrays: MeshArrays };
   Object.assign(out, arrays);
   return counts;

@@ -238,7 +238,7 @@ fn cloud(bytes: &mut Choices) -> Cloud {
     let normals = bytes.chance(3).then(|| points.iter().map(|p| p.normalize_or_zero()).collect());
     let confidence = bytes.chance(4).then(|| (0..count).map(|_| bytes.within(-0.1, 1.1) as f32).collect());
     let colors = bytes.chance(4).then(|| vec![Vec3::splat(0.5); count]);
-    Cloud { points, normals, confidence, colors }
+    Cloud { points, normals, confidence, colors, ..Cloud::default() }
 }
 
 fn camera(bytes: &mut Choices) -> Option<Camera> {

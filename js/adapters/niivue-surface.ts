@@ -1,7 +1,8 @@
 // Shows a surface in NiiVue that follows a mesh.
-import { invalid, number } from '../check.js';
-import type { Space } from '../data.js';
+import { boolean, invalid, number } from '../check.js';
+import type { Space, Vec3 } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
+import type { Warning } from '../warning.js';
 import { Outline, type Outlines, outlinesOf } from './niivue-outline.js';
 import { bounds, MeshReader, type MeshSource, type SurfaceArrays } from './source.js';
 
@@ -39,6 +40,11 @@ export interface NiivueSurfaceOptions {
    * the mesh that is within `meshThicknessOn2D` of the slice.
    */
   outline?: number;
+  /**
+   * Whether a mesh that is far from the origin for its size is shown at the origin, with a warning. NiiVue draws positions
+   * in world space in single precision, in which such a mesh would jitter. Default false: `update` throws `precision`.
+   */
+  recentre?: boolean;
 }
 
 /**
@@ -54,6 +60,7 @@ export class NiivueSurface {
   readonly #adapter: MeshAdapter;
   readonly #outline: Outline | undefined;
   readonly #outlines: Outlines | undefined;
+  #origin: Vec3 = [0, 0, 0];
 
   /**
    * Creates a surface that NiiVue shows from the first update on.
@@ -66,7 +73,7 @@ export class NiivueSurface {
     if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'must be a Niivue');
     const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View10 };
     if (!gl && !view) throw invalid('nv', 'has no canvas yet; attach one first');
-    this.#reader = new MeshReader(space, 'RAS');
+    this.#reader = new MeshReader(space, 'RAS', boolean('recentre', options.recentre ?? false));
     if (number('outline', outline, { min: 0 }) > 0) {
       this.#outlines = outlinesOf(nv);
       this.#outline = new Outline(color, outline);
@@ -82,6 +89,13 @@ export class NiivueSurface {
     return this.#adapter.mesh;
   }
 
+  /** What to know about the surface as it is shown: `recentred` if it is not where the mesh is; empty otherwise. */
+  get warnings(): Warning[] {
+    if (this.#origin.every((coordinate) => coordinate === 0)) return [];
+    const text = `The surface is shown at the origin, and is at ${this.#origin.join(', ')}: too far for NiiVue to draw it.`;
+    return [{ code: 'recentred', text, where: { point: this.#origin } }];
+  }
+
   /**
    * Updates NiiVue's mesh if `mesh` has changed since the last call; draw to show it. Resolves with whether `mesh` had
    * changed.
@@ -89,11 +103,13 @@ export class NiivueSurface {
    * The work is done synchronously and the promise resolves at once, except in 1.0 on the first call, and with WebGPU
    * possibly on each: there NiiVue uploads its volumes again, too.
    *
-   * @throws `VesicleError` `invalid-argument`: no mesh.
+   * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
+   *   is too coarse there, unless it may be recentred.
    */
   async update(mesh: MeshSource): Promise<boolean> {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
+    this.#origin = frame.origin;
     // NiiVue keeps the arrays for later use, so they are copied.
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
     this.#outline?.set(positions, indices);

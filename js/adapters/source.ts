@@ -1,7 +1,7 @@
 // Shared by the adapters: reads a mesh when it has changed, and validates the host's volumes.
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
-import type { MeshArrays } from '../mesh.js';
+import type { MeshArrays, PositionOptions } from '../mesh.js';
 
 /**
  * A changing surface that an adapter can show: a `Mesh`, the `mesh` of a model, or arrays of your own with two
@@ -12,13 +12,16 @@ export interface MeshSource {
   readonly topologyVersion: number;
   /** Counter that increases when any vertex moves, so that adapters know when to update the positions. */
   readonly geometryVersion: number;
-  /** Returns the surface in its present state. */
-  arrays(): MeshArrays;
+  /**
+   * Returns the surface in its present state; if positions are to be `relative`, they may be so to the `origin` that is
+   * returned with them.
+   */
+  arrays(options?: PositionOptions): MeshArrays;
   /**
    * Copies the surface into the arrays of `out`, replacing those that are too small, and returns the numbers of
    * vertices and triangles written; used instead of `arrays` if present.
    */
-  copyTo?(out: MeshArrays): { vertices: number; triangles: number };
+  copyTo?(out: MeshArrays, options?: PositionOptions): { vertices: number; triangles: number };
 }
 
 /**
@@ -26,6 +29,8 @@ export interface MeshSource {
  * the next {@link MeshReader.read}.
  */
 export interface SurfaceArrays extends MeshArrays {
+  /** The origin in the world space of the host that positions are relative to. */
+  origin: Vec3;
   /** Whether the connectivity has changed since the last read, or no or another mesh was read then. */
   topology: boolean;
 }
@@ -36,6 +41,7 @@ export interface SurfaceArrays extends MeshArrays {
  */
 export class MeshReader {
   readonly #rotated: boolean;
+  readonly #relative: boolean;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
   #mesh: MeshSource | undefined;
   #topology = 0;
@@ -43,28 +49,35 @@ export class MeshReader {
 
   /**
    * Sets the space of the mesh and that of the host. If both are given and differ, each surface read is rotated by 180°
-   * about z, which maps RAS to LPS and back and preserves orientation.
+   * about z, which maps RAS to LPS and back and preserves orientation. Positions are `relative` to an origin if the host
+   * can put the surface there; else they are in world space, in single precision, where that suffices.
    */
-  constructor(space: Space | undefined, host: Space | undefined) {
+  constructor(space: Space | undefined, host: Space | undefined, relative = false) {
+    this.#relative = relative;
     const spaces = [space, host].filter((one) => one !== undefined);
     for (const one of spaces) choice('space', one, ['RAS', 'LPS']);
     this.#rotated = spaces[0] !== spaces.at(-1);
   }
 
-  /** Returns the surface in the host's space, or undefined if it has not changed since the last read. */
+  /**
+   * Returns the surface in the host's space, or undefined if it has not changed since the last read; throws `precision`
+   * if single precision in world space does not suffice.
+   */
   read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
     const frame = this.#take(mesh);
     [this.#mesh, this.#topology, this.#geometry] = [mesh, mesh.topologyVersion, mesh.geometryVersion];
-    if (this.#rotated) for (const values of [frame.positions, frame.normals]) rotate180(values);
-    return { ...frame, topology };
+    const origin: Vec3 = [...(frame.origin ?? ([0, 0, 0] as const))];
+    if (this.#rotated) for (const values of [frame.positions, frame.normals, origin]) rotate180(values);
+    return { ...frame, origin, topology };
   }
 
   #take(mesh: MeshSource): MeshArrays {
-    if (!mesh.copyTo) return copied(mesh.arrays());
-    const { vertices, triangles } = mesh.copyTo(this.#arrays);
+    const options = { relative: this.#relative };
+    if (!mesh.copyTo) return copied(mesh.arrays(options));
+    const { vertices, triangles } = mesh.copyTo(this.#arrays, options);
     return usedPart(this.#arrays, vertices, triangles);
   }
 
@@ -87,7 +100,7 @@ function copied({ positions, normals, ...rest }: MeshArrays): MeshArrays {
 
 /** Returns views of the used part of the arrays, which may be longer than the mesh needs. */
 function usedPart(
-  { positions, normals, indices, uvs, colors }: MeshArrays,
+  { positions, normals, indices, uvs, colors, origin }: MeshArrays,
   vertices: number,
   triangles: number,
 ): MeshArrays {
@@ -97,10 +110,11 @@ function usedPart(
     indices: indices.subarray(0, 3 * triangles),
     ...(uvs && { uvs: uvs.subarray(0, 2 * vertices) }),
     ...(colors && { colors: colors.subarray(0, 3 * vertices) }),
+    ...(origin && { origin }),
   };
 }
 
-function rotate180(vectors: Float32Array): void {
+function rotate180(vectors: Float32Array | number[]): void {
   for (let i = 0; i < vectors.length; i += 3) {
     vectors[i] = -(vectors[i] as number);
     vectors[i + 1] = -(vectors[i + 1] as number);

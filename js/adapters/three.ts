@@ -6,7 +6,7 @@
  * @module vesicle/three
  */
 import { choice, invalid } from '../check.js';
-import type { Space, VolumeInit } from '../data.js';
+import type { Space, Vec3, VolumeInit } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
 import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
@@ -131,6 +131,8 @@ export interface ThreeClasses {
 /** An object to which {@link ThreeSurface} gives its geometry, usually a `Mesh` of three.js. */
 export interface ThreeObject {
   geometry: Geometry;
+  /** Receives the origin of a mesh that is far from that of world space for its size. */
+  position?: Vector;
 }
 
 /** Arrays of a mesh with values per vertex, each with its attribute name in three.js and its numbers per vertex. */
@@ -155,13 +157,15 @@ const CAPACITY_FACTOR = 1.5;
  *
  * The object's `geometry` is replaced by the first update, and whenever its buffers have to grow or the mesh gains or
  * loses colours or texture coordinates; material and transform in the scene are the caller's. Positions are those of
- * the mesh, in its volume's world space unless `worldSpace` is another one.
+ * the mesh, in its volume's world space unless `worldSpace` is another one. Of a mesh that is far from the origin for its
+ * size, they are relative to `mesh.origin`, which becomes the `position` of the object: so it is drawn without jitter.
  */
 export class ThreeSurface {
   readonly #three: ThreeClasses;
   readonly #object: ThreeObject;
   readonly #reader: MeshReader;
   #buffers: Buffers | undefined;
+  #moved = false;
 
   /**
    * Creates a surface whose geometry `object` receives at the first update.
@@ -179,21 +183,30 @@ export class ThreeSurface {
     if (!Object(object).geometry) throw invalid('object', 'must be an object with a geometry, such as a THREE.Mesh');
     this.#three = three;
     this.#object = object;
-    this.#reader = new MeshReader(options.space, options.worldSpace);
+    this.#reader = new MeshReader(options.space, options.worldSpace, typeof object.position?.set === 'function');
   }
 
   /**
    * Updates the geometry if `mesh` has changed since the last call; the next rendering uploads it. Returns whether
    * `mesh` had changed.
    *
-   * @throws `VesicleError` `invalid-argument`: no mesh.
+   * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
+   *   is too coarse there, and an object without a `position`.
    */
   update(mesh: MeshSource): boolean {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
+    this.#move(frame.origin);
     if (!this.#buffers?.fit(frame)) this.#grow(frame);
     this.#buffers?.write(frame);
     return true;
+  }
+
+  // A position that is the caller's stays as it is: near the origin, that of the mesh is 0.
+  #move([x, y, z]: Vec3): void {
+    const moved = x !== 0 || y !== 0 || z !== 0;
+    if (moved || this.#moved) this.#object.position?.set(x, y, z);
+    this.#moved = moved;
   }
 
   #grow(frame: SurfaceArrays): void {

@@ -16,6 +16,11 @@ export interface VtkPolyData {
   delete(): void;
 }
 
+/** The method of a `vtkActor` of vtk.js that {@link VtkSurface} calls. */
+export interface VtkActor {
+  setPosition(x: number, y: number, z: number): unknown;
+}
+
 /** The classes of vtk.js that {@link VtkSurface} needs: `{ vtkPolyData, vtkDataArray }`. */
 export interface VtkClasses<P extends VtkPolyData> {
   vtkPolyData: { newInstance(): P };
@@ -32,27 +37,31 @@ export interface VtkClasses<P extends VtkPolyData> {
  * ```
  *
  * Points are those of the mesh, in its volume's world space unless `worldSpace` is another one; they have outward
- * normals.
+ * normals. Those of a mesh that is far from the origin for its size need an `actor`: they are relative to `mesh.origin`,
+ * which becomes its position.
  */
 export class VtkSurface<P extends VtkPolyData> {
   /** The surface as input of a `vtkMapper`; the same object from start to end. */
   readonly polyData: P;
   readonly #normals: DataArray;
   readonly #reader: MeshReader;
+  readonly #actor: VtkActor | undefined;
+  #moved = false;
 
   /**
    * Creates a surface that is empty before the first update.
    *
    * @param vtk - The classes of vtk.js.
    * @param options - `space` of the mesh and `worldSpace` of the view: if both are given and differ, the signs of x and
-   *   y are flipped.
+   *   y are flipped. `actor`: the `vtkActor` that shows the poly data.
    * @throws `VesicleError` `invalid-argument`: classes that are missing, or no such space.
    */
-  constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space } = {}) {
+  constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space; actor?: VtkActor } = {}) {
     for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {
       if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
     }
-    this.#reader = new MeshReader(options.space, options.worldSpace);
+    this.#actor = options.actor;
+    this.#reader = new MeshReader(options.space, options.worldSpace, this.#actor !== undefined);
     this.polyData = vtk.vtkPolyData.newInstance();
     this.#normals = vtk.vtkDataArray.newInstance({
       name: 'Normals',
@@ -66,11 +75,15 @@ export class VtkSurface<P extends VtkPolyData> {
    * Updates the poly data if `mesh` has changed since the last call; the next rendering uploads it. Returns whether
    * `mesh` had changed.
    *
-   * @throws `VesicleError` `invalid-argument`: no mesh.
+   * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
+   *   is too coarse there, without an `actor`.
    */
   update(mesh: MeshSource): boolean {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
+    const moved = frame.origin.some((coordinate) => coordinate !== 0);
+    if (moved || this.#moved) this.#actor?.setPosition(...frame.origin);
+    this.#moved = moved;
     // vtk.js keeps the arrays, so they are copied.
     this.polyData.getPoints().setData(frame.positions.slice(), 3);
     this.#normals.setData(frame.normals.slice(), 3);

@@ -10,4 +10,4 @@ export type { LabelClasses } from './label-map.js';
 export type { MeshSource } from './source.js';
 export { type ItkImage, type VtkImage, volumeFromItk, volumeFromVtk } from './vtk-image.js';
 export { type VtkImageClasses, VtkLabelSurfaces, type VtkLabelSurfacesOptions, vtkFromVolume } from './vtk-labels.js';
-export { type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
+export { type VtkActor, type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';

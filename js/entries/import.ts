@@ -7,7 +7,7 @@
  * @module vesicle/import
  */
 import { checkProperties, typedArray } from '../check.js';
-import type { LengthUnit, MeshData, MeshTexture, PointData, Space, VolumeInit, VoxelArray } from '../data.js';
+import type { LengthUnit, MeshData, MeshTexture, PointArray, PointData, Space, VolumeInit, VoxelArray } from '../data.js';
 import { MeshFile, VolumeFile } from '../files.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
@@ -96,7 +96,7 @@ function meshData(file: MeshFile): MeshData {
   const [normals, uvs, cornerUvs, colors] = [file.normals(), file.uvs(), file.cornerUvs(), file.colors()];
   const texture = file.texture();
   return {
-    positions: file.positions(),
+    positions: file.positions() as PointArray,
     indices: file.indices(),
     ...(normals && { normals }),
     ...(uvs && { uvs }),

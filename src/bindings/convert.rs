@@ -9,6 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};
+use vesicle::mesh::WorldPositions;
 use vesicle::methods::{ParamInput, ParamSpec, Parameters};
 use vesicle::volume::{LengthUnit, Space};
 
@@ -49,6 +50,40 @@ pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
 /// the TypeScript side has checked the length.
 pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
     Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
+}
+
+/// Converts an array of coordinates in world space, in single or double precision, to positions and the origin that they
+/// are relative to.
+pub fn located(array: &JsValue) -> Result<(Vec<Vec3>, DVec3), Failure> {
+    let world: WorldPositions = match array.dyn_ref::<Float32Array>() {
+        Some(array) => points(array)?.iter().map(|p| p.as_dvec3()).collect(),
+        None => double_points(array)?.into_iter().collect(),
+    };
+    Ok(world.relative())
+}
+
+/// Converts an array of coordinates in world space, in single or double precision, to positions relative to `origin`.
+pub fn relative(array: &JsValue, origin: DVec3) -> Result<Vec<Vec3>, Failure> {
+    match array.dyn_ref::<Float32Array>() {
+        Some(array) if origin == DVec3::ZERO => points(array),
+        Some(array) => Ok(points(array)?.iter().map(|p| (p.as_dvec3() - origin).as_vec3()).collect()),
+        None => Ok(double_points(array)?.iter().map(|&p| (p - origin).as_vec3()).collect()),
+    }
+}
+
+/// Converts positions relative to `origin` to an array of x, y and z of each in world space, in double precision if the
+/// origin is not 0.
+pub fn in_world(positions: &[Vec3], origin: DVec3) -> JsValue {
+    if origin == DVec3::ZERO {
+        return Float32Array::from(packed(positions).as_slice()).into();
+    }
+    let world: Vec<f64> = positions.iter().flat_map(|p| (p.as_dvec3() + origin).to_array()).collect();
+    Float64Array::from(world.as_slice()).into()
+}
+
+fn double_points(array: &JsValue) -> Result<Vec<DVec3>, Failure> {
+    let numbers = doubles(array.unchecked_ref())?;
+    Ok(numbers.chunks_exact(3).map(DVec3::from_slice).collect())
 }
 
 /// Converts an array of u and v of each vertex in turn to texture coordinates; an incomplete last pair is dropped.

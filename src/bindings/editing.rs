@@ -14,8 +14,9 @@ use vesicle::spatial::outer_components;
 impl RawMesh {
     /// Cuts the mesh by a plane, and closes it; see [`cut_by_plane`].
     pub fn cut(&mut self, origin: &[f64], normal: &[f64]) -> Result<(), JsValue> {
-        let plane = Plane { origin: point(origin)?, normal: point(normal)? };
-        Ok(cut_by_plane(self.editable()?, plane).map_err(Failure::from)?)
+        let mesh = self.editable()?;
+        let plane = Plane { origin: point(origin)? - mesh.origin(), normal: point(normal)? };
+        Ok(cut_by_plane(mesh, plane).map_err(Failure::from)?)
     }
 
     /// Removes all connected components but those of the given indices.

@@ -5,7 +5,7 @@ use js_sys::{
 };
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{columns, flat, packed, space_name, unit_name};
+use super::convert::{columns, flat, in_world, packed, space_name, unit_name};
 use super::readers::{read_mesh, read_volume};
 use super::texture::RawTexture;
 use vesicle::mesh::TriangleMesh;
@@ -92,9 +92,9 @@ impl MeshFile {
         Ok(MeshFile(read_mesh(file, texture)?))
     }
 
-    /// Returns the positions of the vertices as packed xyz.
-    pub fn positions(&self) -> Vec<f32> {
-        packed(&self.0.positions)
+    /// Returns the positions of the vertices as packed xyz, in double precision if the mesh is far away for its size.
+    pub fn positions(&self) -> JsValue {
+        in_world(&self.0.positions, self.0.origin)
     }
 
     /// Returns the triangles as three vertex indices each.

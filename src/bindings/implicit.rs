@@ -7,7 +7,7 @@ use js_sys::{Float32Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, floats, packed, points, to_js, with_overrides};
+use super::convert::{bytes, floats, in_world, located, points, relative, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{RawMesh, triangle_list};
 use super::method::{method_bindings, shared};
@@ -65,25 +65,27 @@ impl RawImplicit {
         reason = "the TypeScript class names them; an object would have to be unpacked here"
     )]
     pub fn new(
-        positions: &Float32Array,
+        positions: &JsValue,
         normals: Option<Float32Array>,
         confidence: Option<Float32Array>,
         colors: Option<Float32Array>,
-        exterior: Option<Float32Array>,
+        exterior: &JsValue,
         cameras: RawCameras,
         max_points: Option<usize>,
         keep_components: Option<usize>,
         params: &JsValue,
     ) -> Result<RawImplicit, JsValue> {
+        let (positions, origin) = located(positions)?;
         let cloud = Cloud {
-            points: points(positions)?,
+            points: positions,
+            origin,
             normals: normals.as_ref().map(points).transpose()?,
             confidence: confidence.as_ref().map(floats).transpose()?,
             colors: colors.as_ref().map(points).transpose()?,
         };
         let defaults = ImplicitOptions::default();
         let options = ImplicitOptions {
-            exterior: exterior.as_ref().map(points).transpose()?,
+            exterior: (!exterior.is_undefined()).then(|| relative(exterior, origin)).transpose()?,
             cameras: cameras.0,
             max_points: max_points.unwrap_or(defaults.max_points),
             keep_components,
@@ -107,20 +109,16 @@ impl RawImplicit {
     /// Replaces all manual edits of the input points: the positions of added points and of exterior points (known to be
     /// outside), x, y and z of each in turn, and the indices of the input points to leave out.
     #[wasm_bindgen(js_name = setEdits)]
-    pub fn set_edits(
-        &self,
-        added: &Float32Array,
-        removed: Vec<u32>,
-        exterior: &Float32Array,
-    ) -> Result<(), JsValue> {
-        let edits = PointEdits { added: points(added)?, removed, exterior: points(exterior)? };
+    pub fn set_edits(&self, added: &JsValue, removed: Vec<u32>, exterior: &JsValue) -> Result<(), JsValue> {
+        let [added, exterior] = [self.relative(added)?, self.relative(exterior)?];
+        let edits = PointEdits { added, removed, exterior };
         self.0.borrow_mut().set_edits(edits).map_err(Failure::from)?;
         Ok(())
     }
 
     /// Returns the points that were added manually, as packed xyz.
-    pub fn added(&self) -> Vec<f32> {
-        packed(&self.0.borrow().edits().added)
+    pub fn added(&self) -> JsValue {
+        self.in_world(&self.0.borrow().edits().added)
     }
 
     /// Returns the indices of the input points that were removed manually.
@@ -129,28 +127,29 @@ impl RawImplicit {
     }
 
     /// Returns the exterior points (known to be outside) that were set manually, as packed xyz.
-    pub fn exterior(&self) -> Vec<f32> {
-        packed(&self.0.borrow().edits().exterior)
+    pub fn exterior(&self) -> JsValue {
+        self.in_world(&self.0.borrow().edits().exterior)
     }
 
     /// Returns the values of the implicit function f minus its iso-value at packed points in world space: positive
     /// inside, 0 on the surface, negative outside.
-    pub fn evaluate(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
-        let values = self.0.borrow().evaluate(&points(at)?).map_err(Failure::from)?;
+    pub fn evaluate(&self, at: &JsValue) -> Result<Vec<f32>, JsValue> {
+        let values = self.0.borrow().evaluate(&self.relative(at)?).map_err(Failure::from)?;
         Ok(values.into_iter().map(|value| value as f32).collect())
     }
 
     /// Returns the gradients of the implicit function, ∇f, at packed points, x, y and z of each in turn, per world
     /// unit; on the surface they point inwards.
-    pub fn gradient(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
-        let gradients = self.0.borrow().gradient(&points(at)?).map_err(Failure::from)?;
+    pub fn gradient(&self, at: &JsValue) -> Result<Vec<f32>, JsValue> {
+        let gradients = self.0.borrow().gradient(&self.relative(at)?).map_err(Failure::from)?;
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
     }
 
     /// Returns the positions of the constraints of the implicit function: the surface constraints (`which` 0) or the
     /// exterior constraints (1), as packed xyz in world space.
-    pub fn constraints(&self, which: usize) -> Vec<f32> {
-        self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
+    pub fn constraints(&self, which: usize) -> JsValue {
+        let [surface, exterior] = self.0.borrow().constraints();
+        self.in_world(if which == 0 { &surface } else { &exterior })
     }
 
     /// Returns how well the surface fits the input points, as edited manually, as a `Fitness` object: their distances
@@ -187,6 +186,16 @@ impl RawImplicit {
             spurious_components: surface.spurious_components(),
             warning: surface.params().warning(),
         })?)
+    }
+}
+
+impl RawImplicit {
+    fn relative(&self, positions: &JsValue) -> Result<Vec<Vec3>, Failure> {
+        relative(positions, self.0.borrow().origin())
+    }
+
+    fn in_world(&self, positions: &[Vec3]) -> JsValue {
+        in_world(positions, self.0.borrow().origin())
     }
 }
 

@@ -11,6 +11,7 @@ use super::labels::region;
 use super::mesh::RawMesh;
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
+use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::LiveSurface;
 use vesicle::methods::label_surfaces::{LabelParams, LabelSurfaces};
@@ -63,6 +64,10 @@ impl LiveSurface for LabelMesh {
     fn surface(&self) -> TriangleMesh {
         // A label never loses its surface, which is empty while the label has no voxels.
         self.surfaces.borrow().mesh(self.label).unwrap_or_default()
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.surfaces.borrow().origin()
     }
 
     fn counts(&self) -> [usize; 2] {

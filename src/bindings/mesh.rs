@@ -7,14 +7,16 @@ use js_sys::{Float32Array, Reflect, Uint32Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{coordinates, corner_coordinates, flat, packed, point, points, to_js, triangles};
+use super::convert::{
+    coordinates, corner_coordinates, flat, located, packed, point, points, to_js, triangles,
+};
 use super::error::Failure;
 use super::texture::RawTexture;
 use super::volume::RawVolume;
 use vesicle::io::{MeshFormat, write_mesh};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{
-    Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report,
+    Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report, world_origin,
 };
 use vesicle::methods::LiveSurface;
 use vesicle::remesh::{
@@ -81,19 +83,22 @@ impl RawMesh {
 impl RawMesh {
     /// Creates a sphere of nearly equilateral triangles with edges of at most `max_edge`, in world units.
     pub fn icosphere(center: &[f64], radius: f64, max_edge: f64) -> Result<RawMesh, JsValue> {
-        let mesh = Mesh::icosphere(point(center)?.as_vec3(), radius as f32, max_edge as f32);
-        Ok(RawMesh(MeshKind::Surface(Box::new(mesh.map_err(Failure::from)?))))
+        let center = point(center)?;
+        let origin = world_origin(center - radius, center + radius);
+        let mesh = Mesh::icosphere((center - origin).as_vec3(), radius as f32, max_edge as f32);
+        Ok(RawMesh(MeshKind::Surface(Box::new(mesh.map_err(Failure::from)?.with_origin(origin)))))
     }
 
-    /// Creates a triangle list from copies of arrays: x, y and z of each vertex in turn, three vertex indices per
-    /// triangle, and what else is given.
+    /// Creates a triangle list from copies of arrays: x, y and z of each vertex in turn, in single or double precision, three
+    /// vertex indices per triangle, and what else is given.
     #[wasm_bindgen(js_name = fromArrays)]
     pub fn from_arrays(
-        positions: &Float32Array,
+        positions: &JsValue,
         indices: &Uint32Array,
         extra: RawExtra,
     ) -> Result<RawMesh, JsValue> {
-        let mesh = TriangleMesh { positions: points(positions)?, triangles: triangles(indices)?, ..extra.0 };
+        let (positions, origin) = located(positions)?;
+        let mesh = TriangleMesh { positions, origin, triangles: triangles(indices)?, ..extra.0 };
         Ok(RawMesh(triangle_list(mesh)))
     }
 
@@ -145,15 +150,31 @@ impl RawMesh {
         }
     }
 
-    /// Returns a snapshot of positions, triangles, vertex normals and other attributes of the mesh. A vertex on a
-    /// texture seam, which has several texture coordinates, has only one of them.
-    pub fn arrays(&self) -> RawArrays {
+    /// Returns the origin in world space that the positions of the mesh are relative to.
+    pub fn origin(&self) -> Vec<f64> {
+        let origin = match &self.0 {
+            MeshKind::Surface(mesh) => mesh.origin(),
+            MeshKind::Triangles(mesh, _) => mesh.origin,
+            MeshKind::Live(model) => model.borrow().origin(),
+        };
+        origin.to_array().to_vec()
+    }
+
+    /// Returns a snapshot of positions, relative to the origin of the mesh or in world space, triangles, vertex normals and
+    /// other attributes of the mesh. A vertex on a texture seam, which has several texture coordinates, has only one of
+    /// them.
+    pub fn arrays(&self, is_relative: bool) -> Result<RawArrays, JsValue> {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
             let uvs = mesh.uvs_ignoring_seams();
             Rc::make_mut(&mut mesh).uvs = uvs;
         }
-        RawArrays(mesh)
+        if !is_relative && mesh.origin != DVec3::ZERO {
+            let positions = mesh.world_positions().map_err(Failure::from)?;
+            let mesh = Rc::make_mut(&mut mesh);
+            (mesh.positions, mesh.origin) = (positions, DVec3::ZERO);
+        }
+        Ok(RawArrays(mesh))
     }
 
     /// Returns the measures of the mesh, such as area, enclosed volume and edge lengths, as a `MeshInfo`.
@@ -263,26 +284,45 @@ impl RawMesh {
 
     /// Returns the first intersection of a ray with the mesh as a `MeshHit`; undefined if there is none.
     pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
-        let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
-        let hit = tree.ray_hit(point(origin)?.as_vec3(), direction_of(direction)?);
-        Ok(to_js(&hit.map(Hit::from))?)
+        let mesh = self.triangles();
+        let tree = TriangleTree::new(&mesh).map_err(Failure::from)?;
+        let hit = tree.ray_hit((point(origin)? - mesh.origin).as_vec3(), direction_of(direction)?);
+        Ok(to_js(&hit.map(|hit| Hit::new(hit, mesh.origin)))?)
     }
 
     /// Returns the line segments in which the plane through `origin` with the given normal cuts the surface: six
-    /// numbers each, x, y and z of both ends.
+    /// numbers each, x, y and z of both ends, relative to the origin of the mesh or in world space.
     #[wasm_bindgen(js_name = crossSection)]
-    pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
-        let (origin, normal) = (point(origin)?.as_vec3(), direction_of(normal)?);
-        let segments = cross_section(&self.triangles(), origin, normal);
+    pub fn cross_section(
+        &self,
+        origin: &[f64],
+        normal: &[f64],
+        is_relative: bool,
+    ) -> Result<Vec<f32>, JsValue> {
+        let mesh = self.triangles();
+        if !is_relative {
+            mesh.world_positions().map_err(Failure::from)?;
+        }
+        let (start, normal) = ((point(origin)? - mesh.origin).as_vec3(), direction_of(normal)?);
+        let mut segments = cross_section(&mesh, start, normal);
+        if !is_relative && mesh.origin != DVec3::ZERO {
+            let in_world = |p: &mut Vec3| *p = (p.as_dvec3() + mesh.origin).as_vec3();
+            segments.as_flattened_mut().iter_mut().for_each(in_world);
+        }
         Ok(packed(segments.as_flattened()))
     }
 
-    /// Returns the mesh as the bytes of a file; `format` is glb, ply, stl, obj, vtp or mz3.
+    /// Returns the mesh as the bytes of a file; `format` is glb, ply, stl, obj, vtp or mz3. If it `is_recentred`, positions
+    /// are those relative to the origin of the mesh.
     #[wasm_bindgen(js_name = toBytes)]
-    pub fn to_bytes(&self, format: &str) -> Result<Vec<u8>, JsValue> {
+    pub fn to_bytes(&self, format: &str, is_recentred: bool) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
             .ok_or_else(|| Failure::invalid("format", "must be one of glb, ply, stl, obj, vtp, mz3"))?;
-        Ok(write_mesh(&self.with_normals(), format).map_err(Failure::from)?)
+        let mut mesh = self.with_normals();
+        if is_recentred && mesh.origin != DVec3::ZERO {
+            Rc::make_mut(&mut mesh).origin = DVec3::ZERO;
+        }
+        Ok(write_mesh(&mesh, format).map_err(Failure::from)?)
     }
 
     /// Returns an independent copy; that of a live mesh no longer changes with its model.
@@ -420,16 +460,17 @@ impl From<&SurfaceDistance> for Summaries {
 struct Hit {
     triangle: u32,
     barycentric: [f32; 3],
-    point: [f32; 3],
+    point: [f64; 3],
     distance: f64,
 }
 
-impl From<SurfacePoint> for Hit {
-    fn from(hit: SurfacePoint) -> Self {
+impl Hit {
+    /// Converts a point on a mesh with the given origin.
+    fn new(hit: SurfacePoint, origin: DVec3) -> Self {
         Self {
             triangle: hit.triangle,
             barycentric: hit.barycentric.to_array(),
-            point: hit.point.to_array(),
+            point: (hit.point.as_dvec3() + origin).to_array(),
             distance: hit.distance,
         }
     }

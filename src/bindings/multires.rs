@@ -11,6 +11,7 @@ use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
+use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::LiveSurface;
 use vesicle::methods::multires::{ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel};
@@ -33,7 +34,11 @@ struct BaseView {
 impl LiveSurface for BaseView {
     fn surface(&self) -> TriangleMesh {
         let model = self.model.borrow();
-        if self.is_link { model.link_mesh() } else { model.base_mesh().to_triangles() }
+        if self.is_link { model.link_mesh() } else { model.base_surface() }
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.model.borrow().origin()
     }
 
     fn counts(&self) -> [usize; 2] {

@@ -3,7 +3,7 @@
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, packed};
+use super::convert::{bytes, in_world, packed};
 use super::error::Failure;
 use super::texture::RawTexture;
 use vesicle::io::{PointCloud, parse_mesh, parse_points, parse_textured_mesh, parse_volume};
@@ -37,9 +37,9 @@ impl RawPoints {
         Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
     }
 
-    /// Returns the positions of the points as packed xyz.
-    pub fn points(&self) -> Vec<f32> {
-        packed(&self.0.points)
+    /// Returns the positions of the points as packed xyz, in double precision if they are far away for their extent.
+    pub fn points(&self) -> JsValue {
+        in_world(&self.0.points, self.0.origin)
     }
 
     /// Returns the normals as packed xyz, if the file has them.

@@ -2,10 +2,9 @@
 
 use std::rc::Rc;
 
-use js_sys::Float32Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::points;
+use super::convert::relative;
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
 use super::volume::RawVolume;
@@ -30,8 +29,9 @@ impl RawMesh {
     }
 
     /// Returns 1 for each point inside the mesh, and 0 for each outside; the points are x, y and z in turn.
-    pub fn contains(&self, at: &Float32Array) -> Result<Vec<u8>, JsValue> {
-        let inside = contains(&self.triangles(), &points(at)?).map_err(Failure::from)?;
+    pub fn contains(&self, at: &JsValue) -> Result<Vec<u8>, JsValue> {
+        let mesh = self.triangles();
+        let inside = contains(&mesh, &relative(at, mesh.origin)?).map_err(Failure::from)?;
         Ok(inside.into_iter().map(u8::from).collect())
     }
 

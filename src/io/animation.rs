@@ -3,8 +3,8 @@
 //! Meshes of different connectivity cannot be morphed into one another. Each mesh is therefore a node of its own, whose
 //! scale is 1 during its frames and 0 before and after. A viewer that plays no animations shows the first mesh.
 
-use super::glb_writer::{DocumentBuilder, json_array_member};
-use crate::math::Vec3;
+use super::glb_writer::{DocumentBuilder, json_array_member, translation};
+use crate::math::{DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 use std::borrow::Borrow;
 
@@ -39,6 +39,8 @@ pub struct AnimationWriter {
     parts: DocumentBuilder,
     /// For each mesh stored in the file, the index of the first animation frame that shows it.
     starts: Vec<usize>,
+    /// The origin of each mesh stored in the file.
+    origins: Vec<DVec3>,
     frames: usize,
     last: Option<TriangleMesh>,
 }
@@ -56,6 +58,7 @@ impl AnimationWriter {
         if self.last.as_ref() != Some(mesh) {
             self.parts.mesh(mesh)?;
             self.starts.push(self.frames);
+            self.origins.push(mesh.origin);
             self.last = Some(mesh.clone());
         }
         self.frames += 1;
@@ -82,7 +85,7 @@ impl AnimationWriter {
             let output = self.parts.vectors(sizes.iter().map(|&size| Vec3::splat(size)), None, "");
             samplers.push(format!(r#"{{"input":{input},"output":{output},"interpolation":"STEP"}}"#));
             channels.push(format!(r#"{{"sampler":{mesh},"target":{{"node":{mesh},"path":"scale"}}}}"#));
-            self.parts.nodes.push(node(mesh));
+            self.parts.nodes.push(node(mesh, self.origins[mesh]));
         }
         let tracks =
             [json_array_member("samplers", &samplers), json_array_member("channels", &channels)].concat();
@@ -107,9 +110,9 @@ impl AnimationWriter {
 
 /// Returns the JSON of the glTF node of mesh number `mesh`. Without animation, all nodes but the first have scale 0, so
 /// that a viewer that plays no animations shows only the first mesh.
-fn node(mesh: usize) -> String {
+fn node(mesh: usize, origin: DVec3) -> String {
     let scale = if mesh == 0 { "" } else { r#","scale":[0,0,0]"# };
-    format!(r#"{{"mesh":{mesh}{scale}}}"#)
+    format!(r#"{{"mesh":{mesh}{scale}{}}}"#, translation(origin))
 }
 
 fn invalid_argument(parameter: &'static str, problem: String) -> MeshError {

@@ -2,7 +2,7 @@
 
 use super::glb::container;
 use super::mesh_file::push_floats;
-use crate::math::{Bounds, Vec2, Vec3};
+use crate::math::{Bounds, DVec3, Vec2, Vec3};
 use crate::mesh::{ImageKind, MeshError, Texture, TriangleMesh};
 use std::sync::Arc;
 
@@ -21,10 +21,18 @@ pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
-        format!(r#"{{"mesh":{}}}"#, parts.mesh(mesh)?)
+        format!(r#"{{"mesh":{}{}}}"#, parts.mesh(mesh)?, translation(mesh.origin))
     };
     parts.nodes.push(node);
     parts.finish("")
+}
+
+/// Returns the member of a node's JSON that moves its mesh to its origin, after a comma; empty for that of the world.
+pub(super) fn translation(origin: DVec3) -> String {
+    if origin == DVec3::ZERO {
+        return String::new();
+    }
+    format!(r#","translation":[{},{},{}]"#, origin.x, origin.y, origin.z)
 }
 
 /// A glTF document under construction: its buffer and the entries of its JSON arrays.

@@ -8,7 +8,7 @@ use super::FormatError;
 use super::glb::FORMAT;
 use super::gltf_material::BaseColor;
 use crate::math::{DAffine3, DVec3, Vec2, Vec3};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, WorldPositions};
 use glam::{DMat4, DQuat};
 use serde_json::Value;
 use std::sync::Arc;
@@ -40,8 +40,11 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     document.check_extensions()?;
     let parts = document.parts()?;
     let mut mesh: Option<TriangleMesh> = None;
+    let mut positions = WorldPositions::default();
     for part in &parts {
-        let read = part.primitive.read()?.transformed(&part.to_world);
+        let read = part.primitive.read()?;
+        positions.extend(read.positions.iter().map(|p| part.to_world.transform_point3(p.as_dvec3())));
+        let read = read.transformed(&part.to_world);
         mesh = Some(match mesh {
             Some(before) => merged(before, read),
             None => read,
@@ -49,6 +52,7 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     }
     let mut mesh =
         mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
+    (mesh.positions, mesh.origin) = positions.relative();
     let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
     if let Some(base_color) = base_color.filter(|_| mesh.has_uvs()) {
         mesh.texture = base_color.texture(&document)?.map(Arc::new);

@@ -156,8 +156,11 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
 /// Only GLB stores the texture. In PLY, OBJ and VTP, where v points up, the texture coordinates of a mesh with a
 /// texture are written with v as 1 − v.
 ///
+/// A mesh with an origin keeps its precision: PLY and VTP then have positions in double precision, GLB moves the node.
+///
 /// # Errors
-/// [`MeshError::InvalidArgument`] for a mesh that is not valid; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
+/// [`MeshError::InvalidArgument`] for a mesh that is not valid; [`MeshError::Precision`] for STL and MZ3, which have
+/// single precision only, where that is too coarse for the mesh; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
 /// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
@@ -171,10 +174,10 @@ pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, Me
     Ok(match format {
         MeshFormat::Glb => glb_writer::write(mesh)?,
         MeshFormat::Ply => ply::write(mesh),
-        MeshFormat::Stl => stl::write(mesh),
+        MeshFormat::Stl => stl::write(mesh)?,
         MeshFormat::Obj => obj::write(mesh),
         MeshFormat::Vtp => vtp::write(mesh),
-        MeshFormat::Mz3 => mz3::write(mesh),
+        MeshFormat::Mz3 => mz3::write(mesh)?,
     })
 }
 

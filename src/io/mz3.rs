@@ -1,7 +1,7 @@
 //! Writer of MZ3, the compact mesh format of Surfice and NiiVue, without compression.
 
 use super::mesh_file::{color_bytes, push_floats};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{MeshError, TriangleMesh};
 
 const HAS_FACES: u16 = 1;
 const HAS_VERTICES: u16 = 2;
@@ -9,7 +9,11 @@ const HAS_COLORS: u16 = 4;
 
 /// Returns the bytes of an MZ3 file of the mesh. Layout, little-endian: "MZ", flags for what the file holds, counts of
 /// faces and vertices, number of bytes to skip (0); faces, vertices, then colours (rgba) if the mesh has them.
-pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+///
+/// # Errors
+/// [`MeshError::Precision`] if single precision is too coarse for the mesh where it is in world space.
+pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
+    let positions = mesh.world_positions()?;
     let colors = if mesh.colors.is_some() { HAS_COLORS } else { 0 };
     let mut out = Vec::with_capacity(16 + 12 * mesh.triangles.len() + 16 * mesh.positions.len());
     out.extend(b"MZ");
@@ -18,10 +22,10 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
         out.extend(count.to_le_bytes());
     }
     mesh.triangles.as_flattened().iter().for_each(|v| out.extend(v.to_le_bytes()));
-    mesh.positions.iter().for_each(|p| push_floats(&mut out, &p.to_array()));
+    positions.iter().for_each(|p| push_floats(&mut out, &p.to_array()));
     for &color in mesh.colors.iter().flatten() {
         let [r, g, b] = color_bytes(color);
         out.extend([r, g, b, 255]);
     }
-    out
+    Ok(out)
 }

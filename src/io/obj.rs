@@ -3,9 +3,9 @@
 use super::mesh_file::is_text;
 use super::text::numbered_lines;
 use super::{FormatError, PointCloud};
-use crate::math::{Vec2, Vec3};
-use crate::mesh::TriangleMesh;
-use std::fmt::Write;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::mesh::{TriangleMesh, WorldPositions};
+use std::fmt::{Display, Write};
 use std::mem;
 
 pub(super) const FORMAT: &str = "OBJ";
@@ -66,7 +66,7 @@ struct Corner {
 /// The content of an OBJ file read so far, with faces as triangles.
 #[derive(Default)]
 struct Reader {
-    positions: Vec<Vec3>,
+    positions: WorldPositions,
     colors: Vec<Vec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
@@ -82,9 +82,9 @@ impl Reader {
             Some(b"v") => self.vertex(&numbers(words, number, 3)?),
             Some(b"vt") => {
                 let uv = numbers(words, number, 1)?;
-                self.uvs.push(Vec2::new(uv[0], uv.get(1).copied().unwrap_or(0.0)));
+                self.uvs.push(Vec2::new(uv[0] as f32, uv.get(1).map_or(0.0, |&v| v as f32)));
             }
-            Some(b"vn") => self.normals.push(Vec3::from_slice(&numbers(words, number, 3)?)),
+            Some(b"vn") => self.normals.push(DVec3::from_slice(&numbers(words, number, 3)?).as_vec3()),
             Some(b"f") => self.face(words, number)?,
             _ => {}
         }
@@ -93,10 +93,10 @@ impl Reader {
 
     /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. A fourth
     /// number alone, or before the colour, is a weight, which is ignored.
-    fn vertex(&mut self, numbers: &[f32]) {
-        self.positions.push(Vec3::from_slice(numbers));
+    fn vertex(&mut self, numbers: &[f64]) {
+        self.positions.push(DVec3::from_slice(numbers));
         match numbers {
-            [_, _, _, r, g, b] | [_, _, _, _, r, g, b] => self.colors.push(Vec3::new(*r, *g, *b)),
+            [_, _, _, r, g, b] | [_, _, _, _, r, g, b] => self.colors.push(DVec3::new(*r, *g, *b).as_vec3()),
             _ => {}
         }
     }
@@ -138,14 +138,8 @@ impl Reader {
             sums.into_iter().map(|n| n.normalize_or_zero()).collect()
         });
         let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
-        TriangleMesh {
-            positions: self.positions,
-            triangles,
-            normals,
-            corner_uvs,
-            colors,
-            ..Default::default()
-        }
+        let (positions, origin) = self.positions.relative();
+        TriangleMesh { positions, origin, triangles, normals, corner_uvs, colors, ..Default::default() }
     }
 
     fn into_points(mut self) -> PointCloud {
@@ -155,6 +149,7 @@ impl Reader {
         let mesh = self.into_mesh();
         PointCloud {
             points: mesh.positions,
+            origin: mesh.origin,
             normals: own.or(mesh.normals.filter(|_| named)),
             colors: mesh.colors,
         }
@@ -190,9 +185,9 @@ fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
     min_count: usize,
-) -> Result<Vec<f32>, FormatError> {
-    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
-    let found: Option<Vec<f32>> = words.map(number).collect();
+) -> Result<Vec<f64>, FormatError> {
+    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f64>().ok();
+    let found: Option<Vec<f64>> = words.map(number).collect();
     found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
         FormatError::invalid(
             FORMAT,
@@ -206,7 +201,11 @@ fn numbers<'a>(
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut text = String::from("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
-        line(&mut text, "v", &[p.x, p.y, p.z]);
+        if mesh.origin == DVec3::ZERO {
+            line(&mut text, "v", &p.to_array());
+        } else {
+            line(&mut text, "v", &mesh.world_position(i).to_array());
+        }
         if let Some(c) = mesh.colors.as_ref().map(|colors| colors[i]) {
             text.pop();
             line(&mut text, "", &[c.x, c.y, c.z]);
@@ -223,7 +222,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     text.into_bytes()
 }
 
-fn line(text: &mut String, keyword: &str, numbers: &[f32]) {
+fn line(text: &mut String, keyword: &str, numbers: &[impl Display]) {
     text.push_str(keyword);
     for x in numbers {
         // Writing to a string cannot fail.

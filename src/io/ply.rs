@@ -3,8 +3,8 @@
 
 use super::FormatError;
 use super::mesh_file::{color_bytes, push_floats};
-use crate::math::{Vec2, Vec3};
-use crate::mesh::TriangleMesh;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::mesh::{TriangleMesh, WorldPositions};
 
 pub(super) const FORMAT: &str = "PLY";
 
@@ -333,6 +333,7 @@ fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
 #[derive(Default)]
 struct Reader {
     mesh: TriangleMesh,
+    positions: WorldPositions,
     corner_uvs: Vec<[Vec2; 3]>,
 }
 
@@ -352,7 +353,7 @@ impl Reader {
                 *slot = values.first().copied().unwrap_or(0.0);
             }
             let vector = |at: [usize; 3]| Vec3::from_array(at.map(|i| record[i] as f32));
-            self.mesh.positions.push(vector(position));
+            self.positions.push(DVec3::from_array(position.map(|i| record[i])));
             if let Some(at) = normal {
                 self.mesh.normals.get_or_insert_default().push(vector(at));
             }
@@ -392,7 +393,7 @@ impl Reader {
     /// Adds a polygon as a fan of triangles; `face` is its index, for error messages.
     fn fan(&mut self, indices: &[f64], uvs: &[f64], face: usize) -> Result<(), FormatError> {
         let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
-        let limit = self.mesh.positions.len() as f64;
+        let limit = self.positions.len() as f64;
         if let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) {
             return invalid(format!("vertex index {bad} is out of range; must be an integer in 0..{limit}"));
         }
@@ -410,18 +411,24 @@ impl Reader {
     }
 
     /// Returns the mesh that was read; texture coordinates per corner are kept if every face has them.
-    fn finish(mut self) -> Result<TriangleMesh, FormatError> {
+    fn finish(self) -> Result<TriangleMesh, FormatError> {
         let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
-        self.mesh.corner_uvs = per_corner.then_some(self.corner_uvs);
-        Ok(self.mesh)
+        let (positions, origin) = self.positions.relative();
+        let corner_uvs = per_corner.then_some(self.corner_uvs);
+        Ok(TriangleMesh { positions, origin, corner_uvs, ..self.mesh })
     }
 }
 
-/// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits.
+/// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits, and positions in double
+/// precision if the mesh has an origin.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = header(mesh).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {
-        push_floats(&mut out, &p.to_array());
+        if is_double(mesh) {
+            mesh.world_position(i).to_array().iter().for_each(|x| out.extend(x.to_le_bytes()));
+        } else {
+            push_floats(&mut out, &p.to_array());
+        }
         if let Some(normals) = &mesh.normals {
             push_floats(&mut out, &normals[i].to_array());
         }
@@ -443,13 +450,18 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     out
 }
 
+/// Returns whether positions need double precision.
+fn is_double(mesh: &TriangleMesh) -> bool {
+    mesh.origin != DVec3::ZERO
+}
+
 fn header(mesh: &TriangleMesh) -> String {
     let mut lines = vec!["ply".into(), "format binary_little_endian 1.0".into()];
     let properties = |lines: &mut Vec<String>, kind: &str, names: &[&str]| {
         lines.extend(names.iter().map(|name| format!("property {kind} {name}")));
     };
     lines.push(format!("element vertex {}", mesh.positions.len()));
-    properties(&mut lines, "float", &["x", "y", "z"]);
+    properties(&mut lines, if is_double(mesh) { "double" } else { "float" }, &["x", "y", "z"]);
     if mesh.normals.is_some() {
         properties(&mut lines, "float", &["nx", "ny", "nz"]);
     }

@@ -3,7 +3,8 @@
 
 use super::text::{Field, numbered_lines};
 use super::{FormatError, PointCloud, points::full_channel};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
+use crate::mesh::WorldPositions;
 use std::borrow::Cow;
 use std::iter::Peekable;
 
@@ -38,10 +39,10 @@ impl Line<'_> {
     }
 
     /// Parses a cell of the line as a finite number.
-    fn number(&self, format: &'static str, cell: &str) -> Result<f32, FormatError> {
+    fn number(&self, format: &'static str, cell: &str) -> Result<f64, FormatError> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
-        match cell.parse::<f32>() {
-            Ok(number) if number.is_finite() => Ok(number),
+        match cell.parse::<f64>() {
+            Ok(number) if (number as f32).is_finite() => Ok(number),
             Ok(_) => invalid("must be finite and within ±3.4e38"),
             Err(_) => invalid("must be a number with a decimal point, not a comma"),
         }
@@ -216,7 +217,7 @@ fn columns(count: usize) -> String {
 /// The numbers of a text file of points in the columns that are read, line by line.
 struct Table {
     columns: Columns,
-    numbers: Vec<f32>,
+    numbers: Vec<f64>,
 }
 
 impl Table {
@@ -246,13 +247,13 @@ impl Table {
         Ok(())
     }
 
-    fn rows(&self) -> impl ExactSizeIterator<Item = &[f32]> + Clone {
+    fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> + Clone {
         self.numbers.chunks_exact(self.columns.read.len())
     }
 
     /// Returns the vector in three columns from `at`, counted among those that are read, for every line.
     fn vectors(&self, at: usize) -> impl Iterator<Item = Vec3> + Clone {
-        self.rows().map(move |row| Vec3::from_slice(&row[at..]))
+        self.rows().map(move |row| DVec3::from_slice(&row[at..]).as_vec3())
     }
 
     fn into_points(self) -> Result<PointCloud, FormatError> {
@@ -261,7 +262,10 @@ impl Table {
             None => &self.guessed_extras()?,
         };
         let all = |at: usize| self.vectors(at).collect();
-        Ok(PointCloud { points: all(0), normals: extras.normals.map(all), colors: extras.colors.map(all) })
+        let world = self.rows().map(DVec3::from_slice).collect::<WorldPositions>();
+        let (points, origin) = world.relative();
+        let (normals, colors) = (extras.normals.map(all), extras.colors.map(all));
+        Ok(PointCloud { points, origin, normals, colors })
     }
 
     /// Returns which columns of a file without column names hold normals and colours. Normals are recognised by their
@@ -307,20 +311,21 @@ pub(super) fn has_keywords(bytes: &[u8]) -> bool {
 /// Reads points from lines `p x y z`. Colours (`d`, `s`) and gloss (`g`), which apply to all points that follow, are
 /// ignored.
 pub(super) fn parse_keyword_lines(bytes: &[u8]) -> Result<PointCloud, FormatError> {
-    let mut points = Vec::new();
+    let mut points = WorldPositions::default();
     for line in content(bytes) {
         // One word more than a point has is enough to detect too many.
         let words: Vec<&str> = line.text.split_whitespace().take(5).collect();
         match words.as_slice() {
             ["p", x, y, z] => {
                 let number = |word| line.number(KEYWORD_FORMAT, word);
-                points.push(Vec3::new(number(x)?, number(y)?, number(z)?));
+                points.push(DVec3::new(number(x)?, number(y)?, number(z)?));
             }
             ["d" | "s" | "g", ..] => {}
             _ => return Err(line.invalid(KEYWORD_FORMAT, "must be p and three numbers, or d, s or g")),
         }
     }
-    Ok(PointCloud { points, ..PointCloud::default() })
+    let (points, origin) = points.relative();
+    Ok(PointCloud { points, origin, ..PointCloud::default() })
 }
 
 #[cfg(test)]
@@ -395,10 +400,13 @@ mod tests {
         let cloud = read("Red,Green,Blue,nz,ny,nx,x,y,z\n255,0,51,3,2,1,1,-2.5,0.03\n0,0,0,6,5,4,4,5,6\n");
         let normals = Some(vec![Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
         let colors = Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO]);
-        assert_eq!(cloud, PointCloud { points: two(), normals, colors: colors.clone() });
+        assert_eq!(
+            cloud,
+            PointCloud { points: two(), normals, colors: colors.clone(), ..PointCloud::default() }
+        );
         // As CloudCompare writes it; without the names, the column of the intensity would be ambiguous.
         let cloud = read("//X Y Z R G B Intensity\n2\n1 -2.5 0.03 255 0 51 9\n4 5 6 0 0 0 7\n");
-        assert_eq!(cloud, PointCloud { points: two(), normals: None, colors });
+        assert_eq!(cloud, PointCloud { points: two(), colors, ..PointCloud::default() });
         let partial = read("x,y,z,nx,ny,r,red\n1,-2.5,0.03,0,1,8,9\n4,5,6,0,1,8,9\n");
         assert_eq!(partial, PointCloud { points: two(), ..PointCloud::default() });
     }

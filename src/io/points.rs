@@ -2,14 +2,16 @@
 
 use super::mesh_file::is_text;
 use super::{FormatError, obj, ply, point_text, stl};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
 /// A point cloud, in the order of the file. Each optional array has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
-    /// Positions, in the file's own units.
+    /// Positions, in the file's own units, relative to `origin`.
     pub points: Vec<Vec3>,
+    /// The origin of the points in world space; 0 unless they are far away for their extent.
+    pub origin: DVec3,
     /// Normals as in the file, expected to be of unit length; zero for a point without one.
     pub normals: Option<Vec<Vec3>>,
     /// Colours, rgb in 0..1.
@@ -96,7 +98,8 @@ fn unsupported_format(bytes: &[u8]) -> Option<&'static str> {
 }
 
 fn vertices(mesh: TriangleMesh) -> PointCloud {
-    PointCloud { points: mesh.positions, normals: mesh.normals, colors: mesh.colors }
+    let TriangleMesh { positions, origin, normals, colors, .. } = mesh;
+    PointCloud { points: positions, origin, normals, colors }
 }
 
 /// Returns a point cloud with its colours scaled to 0..1, after checking that it has points, finite numbers, and a
@@ -164,6 +167,7 @@ mod tests {
     fn sample_cloud() -> PointCloud {
         let p = Vec3::new(0.1, -2.5, 1e10);
         PointCloud {
+            origin: DVec3::ZERO,
             points: vec![p, Vec3::new(4.0, 5.0, 6.0), p],
             normals: Some(vec![Vec3::X, Vec3::NEG_Z, Vec3::new(0.6, 0.0, 0.8)]),
             colors: Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO, Vec3::new(0.4, 0.6, 0.8)]),

@@ -2,8 +2,8 @@
 
 use super::FormatError;
 use super::mesh_file::{is_text, push_floats};
-use crate::math::{Vec3, triangle};
-use crate::mesh::TriangleMesh;
+use crate::math::{DVec3, Vec3, triangle};
+use crate::mesh::{MeshError, TriangleMesh, WorldPositions};
 
 const FORMAT: &str = "STL";
 
@@ -41,9 +41,8 @@ pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
 /// Reads the triangles of a binary STL file.
 pub(super) fn parse_binary(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let records = bytes.get(HEADER..).ok_or_else(|| wrong_length(bytes))?;
-    Ok(from_corners(
-        records.chunks_exact(RECORD).flat_map(|r| [12, 24, 36].map(|at| point(&r[at..at + 12]))).collect(),
-    ))
+    let corners = records.chunks_exact(RECORD).flat_map(|r| [12, 24, 36].map(|at| point(&r[at..at + 12])));
+    Ok(from_corners(corners.collect()).located())
 }
 
 fn point(bytes: &[u8]) -> Vec3 {
@@ -67,7 +66,7 @@ pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
 
 /// Reads the triangles of a text STL file.
 pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    let mut corners = Vec::new();
+    let mut corners = WorldPositions::default();
     let mut ended = false;
     for (number, line) in (1..).zip(bytes.split(|&b| b == b'\n' || b == b'\r')) {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
@@ -83,32 +82,37 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     if !ended || corners.len() % 3 != 0 {
         return Err(FormatError::invalid(FORMAT, "endsolid", "is missing: the file ends too early"));
     }
-    Ok(from_corners(corners))
+    let (positions, origin) = corners.relative();
+    Ok(TriangleMesh { origin, ..from_corners(positions) })
 }
 
 /// Parses the three coordinates on a `vertex` line of a text STL file; `line` is its number, for the error message.
-fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<Vec3, FormatError> {
-    let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f32>().ok());
+fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<DVec3, FormatError> {
+    let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f64>().ok());
     let mut next = || numbers.next().flatten();
     match (next(), next(), next()) {
-        (Some(x), Some(y), Some(z)) => Ok(Vec3::new(x, y, z)),
+        (Some(x), Some(y), Some(z)) => Ok(DVec3::new(x, y, z)),
         _ => Err(FormatError::invalid(FORMAT, format!("line {line}"), "a vertex has three numbers")),
     }
 }
 
 /// Returns the bytes of a binary STL file of the mesh, with the unit normals of the triangles, 0 for a triangle without
 /// area.
-pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+///
+/// # Errors
+/// [`MeshError::Precision`] if single precision is too coarse for the mesh where it is in world space.
+pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
+    let positions = mesh.world_positions()?;
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.
     out.extend(b"binary STL");
     out.resize(80, b' ');
     out.extend((mesh.triangles.len() as u32).to_le_bytes());
-    for corners in mesh.corners() {
+    for (corners, indices) in mesh.corners().zip(&mesh.triangles) {
         let normal = triangle::area_vector(corners).normalize_or_zero().as_vec3();
         push_floats(&mut out, &normal.to_array());
-        corners.iter().for_each(|p| push_floats(&mut out, &p.to_array()));
+        indices.iter().for_each(|&v| push_floats(&mut out, &positions[v as usize].to_array()));
         out.extend([0, 0]);
     }
-    out
+    Ok(out)
 }

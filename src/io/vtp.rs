@@ -2,7 +2,7 @@
 
 use super::base64;
 use super::mesh_file::{color_bytes, push_floats};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
 /// Returns the text of a VTP file of the mesh with points and triangles; normals, texture coordinates and colours are
@@ -23,7 +23,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
         mesh.triangles.len()
     );
     xml += &point_data(mesh);
-    xml += &format!("<Points>\n{}</Points>\n", vectors("Points", &mesh.positions));
+    xml += &format!("<Points>\n{}</Points>\n", points(mesh));
     let offsets = (1..=mesh.triangles.len() as u32).flat_map(|t| (3 * t).to_le_bytes()).collect();
     let connectivity = mesh.triangles.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
     xml += "<Polys>\n";
@@ -52,6 +52,15 @@ fn point_data(mesh: &TriangleMesh) -> String {
         arrays += &data_array("UInt8", "Colors", 3, colors.iter().copied().flat_map(color_bytes).collect());
     }
     format!("<PointData{active}>\n{arrays}</PointData>\n")
+}
+
+/// Returns the VTP element of the positions, in double precision if the mesh has an origin.
+fn points(mesh: &TriangleMesh) -> String {
+    if mesh.origin == DVec3::ZERO {
+        return vectors("Points", &mesh.positions);
+    }
+    let world = (0..mesh.positions.len()).flat_map(|v| mesh.world_position(v).to_array());
+    data_array("Float64", "Points", 3, world.flat_map(f64::to_le_bytes).collect())
 }
 
 /// Returns the VTP element of an array of 3D vectors.

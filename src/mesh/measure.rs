@@ -70,14 +70,14 @@ pub fn measure(mesh: &TriangleMesh) -> Measures {
         genus: (2 * components as i64 - euler).div_euclid(2),
         area: solid.area,
         volume: solid.volume,
-        centroid: solid.centroid,
+        centroid: solid.centroid + mesh.origin,
         inertia: solid.moments.to_cols_array(),
         edge_min: edges.min,
         edge_mean: edges.mean,
         edge_max: edges.max,
         min_angle_degrees,
         max_angle_degrees,
-        bounds,
+        bounds: bounds.map(|corner| corner + mesh.origin),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Affine transforms of meshes, refused if they would damage the surface.
 
-use super::{Mesh, MeshError, TriangleMesh};
+use super::{Mesh, MeshError, TriangleMesh, VertexId, WorldPositions};
 use crate::math::{DAffine3, DMat3, Vec3};
 
 /// The smallest accepted volume of the parallelepiped spanned by the normalised columns of a map: below this, it
@@ -59,7 +59,7 @@ impl TriangleMesh {
     /// # Errors
     /// [`MeshError::InvalidArgument`] (parameter `matrix`).
     pub fn checked_transformed(&self, map: &DAffine3) -> Result<Self, MeshError> {
-        let moved = self.transformed(map);
+        let moved = self.mapped(map);
         check_positions(&moved.positions)?;
         Ok(moved)
     }
@@ -73,13 +73,13 @@ impl Mesh {
     /// [`MeshError::InvalidArgument`] (parameter `matrix`) if a position would not be finite; the mesh is then
     /// unchanged.
     pub fn transform(&mut self, map: &DAffine3) -> Result<(), MeshError> {
-        let mut moved = self.positions.clone();
-        for v in self.vertices() {
-            let p = &mut moved[v.index()];
-            *p = map.transform_point3(p.as_dvec3()).as_vec3();
-        }
+        let world = |v: &VertexId| map.transform_point3(self.position(*v).as_dvec3() + self.origin);
+        let vertices: Vec<VertexId> = self.vertices().collect();
+        let (moved, origin) = vertices.iter().map(world).collect::<WorldPositions>().relative();
         check_positions(&moved)?;
-        self.positions_mut().copy_from_slice(&moved);
+        self.set_origin(origin);
+        let positions = self.positions_mut();
+        vertices.iter().zip(moved).for_each(|(v, p)| positions[v.index()] = p);
         if map.matrix3.determinant() < 0.0 {
             self.rings.iter_mut().for_each(super::Ring::reverse);
             self.topology_changed();

@@ -87,11 +87,12 @@ impl TriangleMesh {
         self.triangles.iter().map(|t| t.map(|v| self.positions[v as usize]))
     }
 
-    /// Returns the mesh transformed by `map`. Normals are transformed by the cofactor matrix, and a reflection reverses
-    /// the triangles, so that they still face outwards.
+    /// Returns the mesh transformed by `map` from world space to another one, in which its origin is 0. Normals are
+    /// transformed by the cofactor matrix, and a reflection reverses the triangles, so that they still face outwards.
     pub fn transformed(&self, map: &DAffine3) -> Self {
-        let mut moved = self.clone();
-        moved.positions.iter_mut().for_each(|p| *p = map.transform_point3(p.as_dvec3()).as_vec3());
+        let mut moved = Self { origin: DVec3::ZERO, ..self.clone() };
+        let mapped = |p: Vec3| map.transform_point3(p.as_dvec3() + self.origin).as_vec3();
+        moved.positions.iter_mut().for_each(|p| *p = mapped(*p));
         let mirrors = map.matrix3.determinant() < 0.0;
         if mirrors {
             moved.triangles.iter_mut().for_each(|t| t.swap(1, 2));

@@ -1,12 +1,16 @@
 //! The interface common to all methods, by which bindings and tests treat them alike.
 
 use super::{MethodError, Parameters, StepReport};
+use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
 
 /// A surface that changes while a method runs.
 pub trait LiveSurface {
     /// Returns a copy of the current surface, in world coordinates.
     fn surface(&self) -> TriangleMesh;
+
+    /// Returns the origin of the surface in world space, see [`TriangleMesh::origin`].
+    fn origin(&self) -> DVec3;
 
     /// Returns the numbers of vertices and triangles of the current surface.
     fn counts(&self) -> [usize; 2];

@@ -101,7 +101,12 @@ impl Clusters {
 
     fn merge(&self, mesh: &TriangleMesh) -> TriangleMesh {
         let triangles = mesh.triangles.iter().map(|&t| self.of(t)).filter(is_triangle).collect();
-        TriangleMesh { positions: self.means(mesh), triangles, ..TriangleMesh::default() }
+        TriangleMesh {
+            positions: self.means(mesh),
+            origin: mesh.origin,
+            triangles,
+            ..TriangleMesh::default()
+        }
     }
 
     /// Dissolves the clusters that must not be merged: those at edges of more than two triangles of the result

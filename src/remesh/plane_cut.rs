@@ -116,7 +116,7 @@ impl OpenPart {
     fn new(mesh: &Mesh, heights: &[f64]) -> Self {
         let is_kept = |v: VertexId| heights[v.index()] < 0.0;
         let mut index = vec![u32::MAX; mesh.slots()];
-        let mut surface = TriangleMesh::default();
+        let mut surface = TriangleMesh { origin: mesh.origin(), ..TriangleMesh::default() };
         for v in mesh.vertices().filter(|&v| is_kept(v)) {
             index[v.index()] = surface.positions.len() as u32;
             surface.positions.push(mesh.position(v));

@@ -39,6 +39,9 @@ pub struct SurfaceDistance {
 pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
     not_empty("mesh", mesh)?;
     not_empty("other", other)?;
+    // Compared in coordinates of the first mesh.
+    let moved = (mesh.origin != other.origin).then(|| other.relative_to(mesh.origin));
+    let other = moved.as_ref().unwrap_or(other);
     let per_vertex = one_way(mesh, &TriangleTree::new(other)?);
     let back = one_way(other, &TriangleTree::new(mesh)?);
     let [there, back] = [Summary::of(mesh, &per_vertex), Summary::of(other, &back)];

@@ -8,7 +8,7 @@ use super::cube_cases::{Case, EDGES, FAR_EDGES, cases};
 use super::error::VolumeError;
 use super::{Grid, Volume};
 use crate::math::{DAffine3, Vec3};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, grid_origin};
 use std::collections::TryReserveError;
 
 /// Smallest distance of an iso-surface vertex from the ends of the grid edge on which it lies, in voxels: vertices that
@@ -25,7 +25,7 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
 pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
     let mut mesh = marching_cubes(&volume.grid(frame)?, iso as f32)?;
-    to_world(&mut mesh, &volume.affine());
+    to_world(&mut mesh, &volume.affine(), volume.dims());
     Ok(mesh)
 }
 
@@ -59,11 +59,12 @@ fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError
     vector.try_reserve_exact(if additional > quarter { additional } else { quarter })
 }
 
-/// Maps a mesh from index to world coordinates, and reverses its triangles if the map is a reflection, so that they
-/// still face outwards.
-fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3) {
+/// Maps a mesh from the index coordinates of a grid of `dims` voxels to world coordinates, relative to the origin for that
+/// grid, and reverses its triangles if the map is a reflection, so that they still face outwards.
+fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3, dims: [usize; 3]) {
+    mesh.origin = grid_origin(affine, dims);
     for p in &mut mesh.positions {
-        *p = affine.transform_point3(p.as_dvec3()).as_vec3();
+        *p = (affine.transform_point3(p.as_dvec3()) - mesh.origin).as_vec3();
     }
     if affine.matrix3.determinant() < 0.0 {
         for triangle in &mut mesh.triangles {
@@ -386,7 +387,11 @@ mod tests {
                 DVec3::new(-1.6, 1.2, 0.0),
                 DVec3::new(-1.44, -1.92, 1.8),
             );
-            to_world(&mut mesh, &DAffine3::from_mat3_translation(axes, DVec3::new(-120.0, 90.0, 300.0)));
+            to_world(
+                &mut mesh,
+                &DAffine3::from_mat3_translation(axes, DVec3::new(-120.0, 90.0, 300.0)),
+                grid.dims,
+            );
             assert_eq!(count_self_intersections(&mesh), 0, "seed {seed}, in world coordinates");
         }
     }

@@ -13,7 +13,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3};
 use crate::mesh::{MeshError, TriangleMesh};
 use crate::spatial::lattice_distances;
 use crate::volume::{FillRule, Volume, VolumeError, Voxels, coverage, filled, for_each_inside};
@@ -69,7 +69,7 @@ pub fn voxelise(mesh: &TriangleMesh, like: &Volume, kind: VoxelKind) -> Result<V
 /// Returns the positions of a mesh in continuous voxel indices.
 fn in_voxels(mesh: &TriangleMesh, like: &Volume) -> Vec<DVec3> {
     let map = like.inverse_affine();
-    mesh.positions.iter().map(|p| map.transform_point3(p.as_dvec3())).collect()
+    (0..mesh.positions.len()).map(|v| map.transform_point3(mesh.world_position(v))).collect()
 }
 
 /// Returns voxels of intensity `value` inside a surface, and 0 outside, in the smallest unsigned type that holds
@@ -104,7 +104,8 @@ fn signed_distances(
 ) -> Result<Vec<f32>, VoxeliseError> {
     let dims = like.dims();
     let mut distances = filled(dims.iter().product(), 0.0)?;
-    lattice_distances(mesh, &like.affine(), dims, &mut distances)?;
+    let to_mesh = DAffine3::from_translation(-mesh.origin) * like.affine();
+    lattice_distances(mesh, &to_mesh, dims, &mut distances)?;
     for_each_inside(surface, dims, FillRule::NonZero, |run| {
         // A difference, so that a distance of 0 does not become −0.
         distances[run].iter_mut().for_each(|d| *d = 0.0 - *d);
@@ -116,7 +117,7 @@ fn signed_distances(
 mod tests {
     use super::*;
     use crate::core_tests::common::seeds;
-    use crate::math::{DAffine3, DMat3, Random, Vec3, triangle};
+    use crate::math::{DMat3, Random, Vec3, triangle};
     use crate::mesh::shapes::{cuboid, joined, torus};
     use crate::mesh::{Mesh, measure};
     use crate::spatial::contains;

@@ -81,6 +81,7 @@ fn cloud(random: &mut Random) -> Cloud {
         }),
         colors: (random.below(4) == 0).then(|| vec![Vec3::ONE * 0.5; count]),
         points,
+        ..Cloud::default()
     }
 }
 

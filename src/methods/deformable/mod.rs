@@ -70,7 +70,7 @@ pub use start::Start;
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
+use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId, grid_origin};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
 use contour::ObjectIs;
@@ -217,6 +217,10 @@ method!(DeformableModel, DeformableParams);
 impl LiveSurface for DeformableModel {
     fn surface(&self) -> TriangleMesh {
         self.surface()
+    }
+
+    fn origin(&self) -> DVec3 {
+        self.world_origin()
     }
 
     fn counts(&self) -> [usize; 2] {
@@ -468,7 +472,7 @@ impl DeformableModel {
     /// Makes collision handling also prevent self-intersections that arise when the surface is mapped to world space
     /// and rounded to single precision, except where rounding is too coarse for that.
     fn watch_output(&mut self) {
-        self.resolver.watch_output(self.to_world, &self.domain.bounds);
+        self.resolver.watch_output(self.to_surface(), &self.domain.bounds);
     }
 
     fn reorder(&mut self) {
@@ -614,7 +618,18 @@ impl DeformableModel {
 
     /// Returns the surface in world space with normals, its triangles counter-clockwise seen from outside.
     pub fn surface(&self) -> TriangleMesh {
-        self.mesh.to_triangles().transformed(&self.to_world)
+        let surface = self.mesh.to_triangles().transformed(&self.to_surface());
+        TriangleMesh { origin: self.world_origin(), ..surface }
+    }
+
+    /// Returns the origin of the surface in world space, see [`TriangleMesh::origin`].
+    fn world_origin(&self) -> DVec3 {
+        grid_origin(&self.to_world, self.pyramid.dims())
+    }
+
+    /// Returns the map from model space to positions of the surface, relative to its origin.
+    fn to_surface(&self) -> DAffine3 {
+        DAffine3::from_translation(-self.world_origin()) * self.to_world
     }
 
     /// Returns the speed of each vertex of [`Self::surface`] along its outward normal, negative inwards, in world units

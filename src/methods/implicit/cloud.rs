@@ -8,8 +8,13 @@ use crate::methods::MethodError;
 /// A point cloud near a surface, with optional normals, confidences and colours; the input of an implicit surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
-    /// Positions of the points near the surface, in world units; in units of the normalised box after `mapped`.
+    /// Positions of the points near the surface, in world units relative to `origin`; in units of the normalised box after
+    /// `mapped`.
     pub points: Vec<Vec3>,
+    /// The origin of the points in world space, 0 unless they are far away for their extent; see
+    /// [`WorldPositions::relative`](crate::mesh::WorldPositions::relative). All other positions that the surface is given,
+    /// and those that it returns, are relative to it; its meshes have it.
+    pub origin: DVec3,
     /// Outward normal of each point, of any length, which shows on which side the outside is; estimated where needed if
     /// `None`.
     pub normals: Option<Vec<Vec3>>,
@@ -74,6 +79,7 @@ impl Cloud {
         }
         Self {
             points: gather(&self.points, indices),
+            origin: self.origin,
             normals: self.normals.as_ref().map(|all| gather(all, indices)),
             confidence: self.confidence.as_ref().map(|all| gather(all, indices)),
             colors: self.colors.as_ref().map(|all| gather(all, indices)),
@@ -353,6 +359,7 @@ pub mod tests {
     fn of_equal_points_the_first_stays_with_all_that_belongs_to_it() {
         let (a, b, c) = (Vec3::X, Vec3::Y, Vec3::Z);
         let cloud = Cloud {
+            origin: DVec3::ZERO,
             points: vec![a, b, Vec3::ZERO, a, c, -Vec3::ZERO, b],
             normals: Some((0..7).map(|i| Vec3::splat(i as f32)).collect()),
             confidence: Some(vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]),

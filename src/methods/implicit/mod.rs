@@ -60,7 +60,7 @@ pub use params::{ImplicitParams, IsoValue, KernelKind};
 
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
-use crate::math::{PositionIndex, Vec3};
+use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
@@ -113,6 +113,8 @@ const SEED: u64 = 1;
 
 /// Reconstruction of an implicit surface from points, step by step, up to a coloured mesh.
 pub struct ImplicitSurface {
+    /// The origin of all positions in world space; see [`Cloud::origin`].
+    origin: DVec3,
     /// The input points, in world units.
     original: Vec<Vec3>,
     /// The input points without duplicates, mapped into the normalised box.
@@ -199,6 +201,10 @@ impl LiveSurface for ImplicitSurface {
         self.surface().clone()
     }
 
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     fn counts(&self) -> [usize; 2] {
         [self.mesh.positions.len(), self.mesh.triangles.len()]
     }
@@ -214,10 +220,11 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the array, option or parameter that cannot be used, and what is
     /// accepted.
-    pub fn new(points: Cloud, options: ImplicitOptions) -> Result<Self, MethodError> {
+    pub fn new(points: Cloud, mut options: ImplicitOptions) -> Result<Self, MethodError> {
         options.params.validate()?;
         check_options(&options)?;
         points.validate()?;
+        options.cameras = cameras_at(points.origin, options.cameras);
         let original = points.points.clone();
         let cloud = points.distinct();
         cloud.check_count()?;
@@ -232,6 +239,7 @@ impl ImplicitSurface {
 
     fn from_parts(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
         Self {
+            origin: cloud.origin,
             original,
             cloud,
             map,
@@ -471,7 +479,7 @@ impl ImplicitSurface {
     fn take_mesh(&mut self, mesh: TriangleMesh) {
         let measures = measure_mesh(&mesh);
         (self.components, self.euler) = (measures.components as u32, measures.euler);
-        self.mesh = mesh;
+        self.mesh = TriangleMesh { origin: self.origin, ..mesh };
         self.version = self.version.wrapping_add(1);
     }
 
@@ -577,11 +585,17 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn preview(&self) -> Result<TriangleMesh, MethodError> {
-        match &self.stage {
-            Stage::Extract(extraction) => extraction.preview(),
-            Stage::Color(state) => Ok(state.mesh.clone()),
-            _ => Ok(TriangleMesh::default()),
-        }
+        let mesh = match &self.stage {
+            Stage::Extract(extraction) => extraction.preview()?,
+            Stage::Color(state) => state.mesh.clone(),
+            _ => TriangleMesh::default(),
+        };
+        Ok(TriangleMesh { origin: self.origin, ..mesh })
+    }
+
+    /// Returns the origin of all positions in world space; see [`Cloud::origin`].
+    pub fn origin(&self) -> DVec3 {
+        self.origin
     }
 
     /// Returns the number of connected components of the last finished surface that no surface constraint is near, and
@@ -624,6 +638,15 @@ impl Stage {
             Self::Done => 1.0,
         }
     }
+}
+
+/// Returns the cameras for positions relative to `origin`.
+fn cameras_at(origin: DVec3, cameras: Vec<Camera>) -> Vec<Camera> {
+    if origin == DVec3::ZERO {
+        return cameras;
+    }
+    let to_relative = DAffine3::from_translation(-origin);
+    cameras.into_iter().map(|camera| camera.transformed(&to_relative)).collect()
 }
 
 fn first_stage(options: &ImplicitOptions) -> Stage {

@@ -4,7 +4,7 @@
 use super::camera::Camera;
 use super::fast::FastField;
 use super::measure::Fitness;
-use super::{ImplicitSurface, Solved, color};
+use super::{ImplicitSurface, Solved, cameras_at, color};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, VolumeError, VolumeInit, Voxels};
@@ -87,7 +87,7 @@ impl ImplicitSurface {
             row.iter_mut().for_each(|value| *value -= level);
         })?;
         Ok(Volume::new(VolumeInit {
-            affine: map,
+            affine: DAffine3::from_translation(self.origin) * map,
             ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], 1])
         })?)
     }
@@ -116,7 +116,8 @@ impl ImplicitSurface {
         if !cameras.iter().any(Camera::has_image) {
             return Err(MethodError::invalid("cameras", "at least one must have an image"));
         }
-        if let Some(colors) = color::colors(&self.mesh, cameras) {
+        let cameras = cameras_at(self.origin, cameras.to_vec());
+        if let Some(colors) = color::colors(&self.mesh, &cameras) {
             self.mesh.colors = Some(colors);
             self.version = self.version.wrapping_add(1);
         }

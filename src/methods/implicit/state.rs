@@ -7,7 +7,7 @@
 use super::kernel::Kernel;
 use super::solve::{Solution, SolverPosition};
 use super::{ImplicitParams, ImplicitSurface, PointEdits, Solved, Stage};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Magic, decode, encode};
@@ -115,7 +115,8 @@ impl ImplicitSurface {
         }
         state.params.validate()?;
         let Surface { positions, triangles, normals, colors } = state.surface;
-        let mesh = TriangleMesh { positions, triangles, normals, colors, ..TriangleMesh::default() };
+        let origin = self.origin;
+        let mesh = TriangleMesh { positions, origin, triangles, normals, colors, ..TriangleMesh::default() };
         mesh.validate()?;
         if state.saved_stage.needs_solution() && state.solved.is_none() {
             return bad("solution", "missing");
@@ -146,6 +147,9 @@ impl ImplicitSurface {
     /// another hash.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
+        if self.origin != DVec3::ZERO {
+            self.origin.to_array().iter().for_each(|x| hash.mix(x.to_bits()));
+        }
         let mut mix = |points: &[Vec3]| {
             hash.mix(points.len() as u64);
             points.iter().flat_map(|p| p.to_array()).for_each(|x| hash.mix(u64::from(x.to_bits())));

@@ -37,7 +37,8 @@ impl Nets {
 
 impl<'a> Extraction<'a> {
     fn new(nets: &'a Nets) -> Self {
-        Self { nets, mesh: TriangleMesh::default(), first: Vec::new(), start: 0, on_faces: BTreeMap::new() }
+        let mesh = TriangleMesh { origin: nets.origin(), ..TriangleMesh::default() };
+        Self { nets, mesh, first: Vec::new(), start: 0, on_faces: BTreeMap::new() }
     }
 
     fn add(&mut self, number: u16) {

@@ -26,8 +26,8 @@ mod zone;
 
 pub use params::LabelParams;
 
-use crate::math::DVec3;
-use crate::mesh::TriangleMesh;
+use crate::math::{DAffine3, DVec3};
+use crate::mesh::{TriangleMesh, grid_origin};
 use crate::methods::method::method;
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
 use crate::remesh::Changes;
@@ -81,6 +81,10 @@ impl LiveSurface for LabelSurfaces {
         self.nets.all_meshes()
     }
 
+    fn origin(&self) -> DVec3 {
+        self.nets.origin()
+    }
+
     fn counts(&self) -> [usize; 2] {
         let merged = (1..=self.label_counts.len() as u16).map(|number| self.nets.coarse.merged(number)).sum();
         self.counts.without(merged)
@@ -92,6 +96,11 @@ impl LiveSurface for LabelSurfaces {
 }
 
 impl LabelSurfaces {
+    /// Returns the origin of all surfaces in world space, see [`TriangleMesh::origin`].
+    pub fn origin(&self) -> DVec3 {
+        self.nets.origin()
+    }
+
     /// Creates the surfaces of the first frame of a label map, along the faces of the voxels at first; `labels` are those
     /// that get surfaces, by default all.
     ///
@@ -346,7 +355,7 @@ impl LabelSurfaces {
 
 /// Returns an error unless positions in single precision are much finer than the gaps between surfaces.
 fn check_precision(volume: &Volume) -> Result<(), MethodError> {
-    let affine = volume.affine();
+    let affine = DAffine3::from_translation(-grid_origin(&volume.affine(), volume.dims())) * volume.affine();
     let far = volume.dims().map(|n| n as f64);
     let ends = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
     let corners =
@@ -358,8 +367,8 @@ fn check_precision(volume: &Volume) -> Result<(), MethodError> {
         return Ok(());
     }
     let problem = format!(
-        "must be within {MOST_VOXELS_AWAY} voxels of the origin of world space, for positions in single precision, got \
-         {farthest} at a voxel size of {voxel}"
+        "must be less than {MOST_VOXELS_AWAY} voxels wide, for positions in single precision, got {farthest} at a voxel \
+         size of {voxel}"
     );
     Err(MethodError::invalid("volume", problem))
 }

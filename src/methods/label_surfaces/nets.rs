@@ -14,6 +14,7 @@ use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::order::sort_distinct;
 use crate::math::{DAffine3, DVec3, Vec3};
+use crate::mesh::grid_origin;
 use crate::volume::VolumeError;
 
 /// Width of the gap between surfaces that touch, in voxels.
@@ -94,6 +95,8 @@ pub struct Nets {
     /// Slots of the cells in which each label is, in ascending order; those of the label with number 1 come first.
     of_labels: Vec<Vec<u32>>,
     to_world: DAffine3,
+    /// The origin of all surfaces in world space.
+    origin: DVec3,
 }
 
 impl Nets {
@@ -104,7 +107,8 @@ impl Nets {
     /// [`VolumeError::TooLarge`].
     pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
         let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
-        let mut nets = Self { cells, coarse, of_labels, grid, to_world };
+        let origin = grid_origin(&to_world, grid.dims());
+        let mut nets = Self { cells, coarse, of_labels, grid, to_world, origin };
         nets.update(nets.everywhere())?;
         Ok(nets)
     }
@@ -139,7 +143,8 @@ impl Nets {
         for (slot, cell) in (0..).zip(cells.slots()) {
             cell.numbers().for_each(|number| of_labels[usize::from(number) - 1].push(slot));
         }
-        *self = Self { grid, cells, coarse: Coarsening::default(), of_labels, to_world: self.to_world };
+        let coarse = Coarsening::default();
+        *self = Self { grid, cells, coarse, of_labels, to_world: self.to_world, origin: self.origin };
     }
 
     /// Returns the slots of the cells in which a label is, in ascending order.
@@ -164,6 +169,11 @@ impl Nets {
     /// Returns the map from the index space of the volume to world space.
     pub fn to_world(&self) -> &DAffine3 {
         &self.to_world
+    }
+
+    /// Returns the origin of all surfaces in world space, see [`TriangleMesh::origin`](crate::mesh::TriangleMesh::origin).
+    pub fn origin(&self) -> DVec3 {
+        self.origin
     }
 
     /// Returns the box of all cells.
@@ -316,7 +326,7 @@ impl Nets {
         let at = self.cells.get(slot).at;
         let centre = DVec3::from(at.map(|n| f64::from(n) - 0.5));
         let local = (self.position(number, vertex, at) + shift).as_dvec3();
-        self.to_world.transform_point3(centre + local).as_vec3()
+        (self.to_world.transform_point3(centre + local) - self.origin).as_vec3()
     }
 
     fn cell_position(&self, number: u16, slot: u32, on: u8, from: [u32; 3]) -> Vec3 {

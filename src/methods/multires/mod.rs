@@ -37,8 +37,8 @@ pub use params::{Energy, MultiresParams, Topology};
 
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
-use crate::math::triangle;
-use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::math::{DVec3, triangle};
+use crate::mesh::{Mesh, TriangleMesh, measure, world_origin};
 use crate::remesh::{Changes, Embedding, restructure};
 use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
@@ -77,6 +77,8 @@ const MAX_VERTICES: usize = 200_000;
 
 /// A surface that is deformed by control ellipsoids and keeps its detail.
 pub struct MultiresolutionModel {
+    /// The origin in world space of everything that the model computes with.
+    origin: DVec3,
     bands: Bands,
     ellipsoids: MovingEllipsoids,
     params: MultiresParams,
@@ -106,6 +108,10 @@ impl LiveSurface for MultiresolutionModel {
         self.surface()
     }
 
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     fn counts(&self) -> [usize; 2] {
         self.mesh().counts()
     }
@@ -126,15 +132,21 @@ impl MultiresolutionModel {
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
-        let moving = MovingEllipsoids::new(&given);
+        let origin = match detail.as_ref().or(base.as_ref()) {
+            Some(mesh) => mesh.origin,
+            None => origin_of(&given),
+        };
+        let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| in_model(mesh, origin)));
+        let moving = MovingEllipsoids::new(&moved(&given, -origin));
         let ellipsoids = moving.now();
         let (bands, params) = set_up(detail, base, &ellipsoids, params)?;
         let bands = Bands::new(bands);
         let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
-        Self::from_parts(bands, moving, params, surface)
+        Self::from_parts(origin, bands, moving, params, surface)
     }
 
     fn from_parts(
+        origin: DVec3,
         bands: Bands,
         moving: MovingEllipsoids,
         params: MultiresParams,
@@ -154,6 +166,7 @@ impl MultiresolutionModel {
         let correspondence = project(&surface, &before, walker, f64::MAX);
         let detailed = detailed(&surface, &correspondence, &bands, &mut guard, detail_sampling(&params));
         let mut model = Self {
+            origin,
             components: 0,
             bands,
             ellipsoids: moving,
@@ -178,7 +191,8 @@ impl MultiresolutionModel {
         self.clock = clock;
     }
 
-    /// Returns the deformed surface with its detail, the result of the model.
+    /// Returns the deformed surface with its detail, the result of the model, in the model's space: relative to the
+    /// [origin](TriangleMesh::origin) of [`Self::surface`].
     pub fn mesh(&self) -> &Mesh {
         &self.detailed.mesh
     }
@@ -190,7 +204,11 @@ impl MultiresolutionModel {
         let finest = &self.bands.finest().walker;
         mesh.corner_uvs = texture::corner_uvs(&self.detailed.mesh, &self.detailed.points, finest);
         mesh.texture = finest.mesh().texture.clone();
-        mesh
+        self.in_world(mesh)
+    }
+
+    fn in_world(&self, mesh: TriangleMesh) -> TriangleMesh {
+        TriangleMesh { origin: self.origin, ..mesh }
     }
 
     /// Solves a copy of the membrane for the current ellipsoids, and returns its mesh on each level of the solver, from
@@ -200,7 +218,7 @@ impl MultiresolutionModel {
         let ellipsoids = self.ellipsoids.now();
         let mut mesh = self.surface.clone();
         solve_with(&mut mesh, &ellipsoids, &self.params, self.params.levels, |mesh| {
-            levels.push(mesh.to_triangles());
+            levels.push(self.in_world(mesh.to_triangles()));
         });
         levels
     }
@@ -210,9 +228,14 @@ impl MultiresolutionModel {
         distortion::distortion(&self.surface, &self.correspondence)
     }
 
-    /// Returns the deformed base S, without detail.
+    /// Returns the deformed base S, without detail, in the model's space, as [`Self::mesh`].
     pub fn base_mesh(&self) -> &Mesh {
         &self.surface
+    }
+
+    /// Returns the deformed base S, without detail, as triangles.
+    pub fn base_surface(&self) -> TriangleMesh {
+        self.in_world(self.surface.to_triangles())
     }
 
     /// Returns the image of the deformed base under the map T, to show the correspondence: the triangles of
@@ -221,7 +244,7 @@ impl MultiresolutionModel {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
         mesh.normals = None;
-        mesh
+        self.in_world(mesh)
     }
 
     /// Returns the current parameters.
@@ -273,6 +296,7 @@ impl MultiresolutionModel {
     /// and for tips too sharp for the edges of the membrane.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
+        let given = &moved(given, -self.origin);
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
         let surface = &self.surface;
         self.ellipsoids
@@ -284,12 +308,14 @@ impl MultiresolutionModel {
     /// Returns the ellipsoids in their current state, which steps move towards the targets, including those that are
     /// being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
-        self.ellipsoids.now().iter().map(Ellipsoid::control).collect()
+        let now: Vec<_> = self.ellipsoids.now().iter().map(Ellipsoid::control).collect();
+        moved(&now, self.origin)
     }
 
     /// Returns the target ellipsoids, without those that are being removed.
     pub fn targets(&self) -> Vec<ControlEllipsoid> {
-        self.ellipsoids.targets().iter().map(Ellipsoid::control).collect()
+        let targets: Vec<_> = self.ellipsoids.targets().iter().map(Ellipsoid::control).collect();
+        moved(&targets, self.origin)
     }
 
     /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area; 0 if the
@@ -367,6 +393,32 @@ impl MultiresolutionModel {
             warnings: Vec::new(),
         }
     }
+}
+
+/// Returns the origin for a model of ellipsoids alone.
+fn origin_of(ellipsoids: &[ControlEllipsoid]) -> DVec3 {
+    let ends = ellipsoids.iter().flat_map(|e| {
+        let reach = e.axes.iter().fold(DVec3::ZERO, |reach, &axis| reach + DVec3::from(axis).abs());
+        [DVec3::from(e.center) - reach, DVec3::from(e.center) + reach]
+    });
+    let bounds = ends.map(|p| (p, p)).reduce(|(min, max), (p, _)| (min.min(p), max.max(p)));
+    bounds.map_or(DVec3::ZERO, |(min, max)| world_origin(min, max))
+}
+
+/// Returns the ellipsoids moved by `shift`.
+fn moved(ellipsoids: &[ControlEllipsoid], shift: DVec3) -> Vec<ControlEllipsoid> {
+    let mut all = ellipsoids.to_vec();
+    if shift != DVec3::ZERO {
+        all.iter_mut().for_each(|e| e.center = (DVec3::from(e.center) + shift).to_array());
+    }
+    all
+}
+
+/// Returns a mesh in the space of a model with the given origin: positions relative to it, as if it were that of the
+/// world.
+fn in_model(mut mesh: TriangleMesh, origin: DVec3) -> TriangleMesh {
+    mesh.move_origin(origin);
+    TriangleMesh { origin: DVec3::ZERO, ..mesh }
 }
 
 fn detail_sampling(params: &MultiresParams) -> DetailSampling {

@@ -4,7 +4,7 @@
 use super::correspondence::{BasePoint, Correspondence};
 use super::motion::MovingEllipsoids;
 use super::{MultiresParams, MultiresolutionModel};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::mesh::Mesh;
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
@@ -96,6 +96,9 @@ impl MultiresolutionModel {
     /// restored only with the same surfaces.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
+        if self.origin != DVec3::ZERO {
+            self.origin.to_array().iter().for_each(|x| hash.mix(x.to_bits()));
+        }
         for band in &self.bands.all {
             let mesh = band.walker.mesh();
             hash.mix(mesh.positions.len() as u64);

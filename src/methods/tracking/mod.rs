@@ -136,6 +136,10 @@ impl LiveSurface for SurfaceTracker {
         self.mesh().to_triangles()
     }
 
+    fn origin(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
     fn counts(&self) -> [usize; 2] {
         self.mesh().counts()
     }
