@@ -35,7 +35,7 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
+        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f64>().is_ok())
     }
 
     /// Parses a cell of the line as a finite number.
@@ -304,7 +304,7 @@ impl Table {
 pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
-        words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f32>().is_ok())
+        words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f64>().is_ok())
     })
 }
 
