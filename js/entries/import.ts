@@ -7,7 +7,16 @@
  * @module vesicle/import
  */
 import { checkProperties, typedArray } from '../check.js';
-import type { LengthUnit, MeshData, MeshTexture, PointArray, PointData, Space, VolumeInit, VoxelArray } from '../data.js';
+import type {
+  LengthUnit,
+  MeshData,
+  MeshTexture,
+  PointArray,
+  PointData,
+  Space,
+  VolumeInit,
+  VoxelArray,
+} from '../data.js';
 import { MeshFile, VolumeFile } from '../files.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';

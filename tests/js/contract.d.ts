@@ -20,12 +20,16 @@ export class VesicleError extends Error {
     | 'singular-system' // the linear system has no usable solution; names the likely cause
     | 'needs-data' // a step that needs parts of a large volume that have not been read
     | 'unavailable' // data of a store that could not be fetched; the call may be made again
+    | 'precision' // single precision is too coarse for positions so far away; says what can be done
+    | 'no-progress' // work that stopped, since a round changed nothing for the better
     | 'too-large' // needs more memory than wasm32 has; says how much
     | 'aborted'
     | 'freed'; // use after free()
 }
 
 export type Vec3 = [number, number, number];
+/** Points in world space; in double precision where single is too coarse. */
+export type PointArray = Float32Array | Float64Array;
 export type VoxelArray =
   | Uint8Array
   | Int8Array
@@ -113,6 +117,8 @@ export interface MeshArrays {
   uvs?: Float32Array;
   /** rgb, 0..1 */
   colors?: Float32Array;
+  /** What positions are relative to, if that was asked for. */
+  origin?: Vec3;
 }
 export interface MeshInfo {
   vertices: number;
@@ -142,7 +148,7 @@ export interface MeshReport {
 export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
 export class Mesh {
   static icosphere(center: Vec3, radius: number, maxEdge: number): Mesh;
-  static fromArrays(positions: Float32Array, indices: Uint32Array, extra?: { uvs?: Float32Array }): Mesh;
+  static fromArrays(positions: PointArray, indices: Uint32Array, extra?: { uvs?: Float32Array }): Mesh;
   /** glb, ply, stl, obj: detected from the bytes. Duplicate positions are welded. */
   static parse(bytes: Uint8Array): Mesh;
   /** Iso-surface of a volume, closed at the volume's border; topologically consistent. */
@@ -152,9 +158,11 @@ export class Mesh {
   /** Increases when connectivity changes / when any vertex moves. */
   readonly topologyVersion: number;
   readonly geometryVersion: number;
-  arrays(): MeshArrays;
+  /** What the mesh keeps positions relative to; 0 unless it is far away for its size. */
+  readonly origin: Vec3;
+  arrays(options?: { relative?: boolean }): MeshArrays;
   /** Copies into the caller's buffers, which are replaced only when too small; returns the counts written. */
-  copyTo(out: MeshArrays): { vertices: number; triangles: number };
+  copyTo(out: MeshArrays, options?: { relative?: boolean }): { vertices: number; triangles: number };
   info(): MeshInfo;
   check(): MeshReport;
   components(): Mesh[];
@@ -169,7 +177,7 @@ export class Mesh {
   /** 4x4 column-major affine; singular and non-finite ones are refused; a reflection flips the triangles. */
   transform(matrix: Float64Array): void;
   /** World xyz; 1 inside, 0 outside; exact. */
-  contains(points: Float32Array): Uint8Array;
+  contains(points: PointArray): Uint8Array;
   /** On the grid of `like`: exact mask of voxel centres, coverage 0..1, or signed distance (negative inside). */
   toVolume(like: Volume, options?: { kind?: 'mask' | 'coverage' | 'distance'; value?: number }): Volume;
   /** Per vertex. */
@@ -182,14 +190,20 @@ export class Mesh {
     direction: Vec3,
   ): { triangle: number; barycentric: Vec3; point: Vec3; distance: number } | undefined;
   /** Line segments (pairs of points) where a plane cuts the surface. */
-  crossSection(origin: Vec3, normal: Vec3): Float32Array;
-  toBytes(format: MeshFormat): Uint8Array;
+  crossSection(origin: Vec3, normal: Vec3, options?: { relative?: boolean }): Float32Array;
+  toBytes(format: MeshFormat, options?: { recentre?: boolean }): Uint8Array;
   clone(): Mesh;
   free(): void;
   [Symbol.dispose](): void;
 }
 
 // ── one stepping contract for every method ──────────────────────────────────────────────────────
+/** Carried by volumes and results; a result without one is right. */
+export interface Warning {
+  code: string;
+  text: string;
+  where?: { frame: number } | { label: number } | { point: Vec3 };
+}
 export interface StepReport {
   iteration: number;
   done: boolean;
@@ -216,6 +230,8 @@ export interface StepReport {
   };
   /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
   times: Record<string, number>;
+  /** What to know about the result before relying on it. */
+  warnings: Warning[];
 }
 export interface RunOptions {
   signal?: AbortSignal; // rejects with signal.reason, the model stays usable
@@ -342,7 +358,7 @@ export interface Camera {
   image?: Uint8ClampedArray;
 }
 /** ply, obj, xyz, pts, csv: detected from the bytes. Colours are rgb, 0..1. */
-export function parsePoints(bytes: Uint8Array): { points: Float32Array; normals?: Float32Array; colors?: Float32Array };
+export function parsePoints(bytes: Uint8Array): { points: PointArray; normals?: Float32Array; colors?: Float32Array };
 export interface ImplicitParams {
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
   delta?: number; // δ first-order smoothness, in the 2x2x2 box
@@ -356,12 +372,12 @@ export interface ImplicitParams {
 }
 export class ImplicitSurface implements Stepper {
   constructor(options: {
-    points: Float32Array;
+    points: PointArray;
     normals?: Float32Array;
     /** Per point; scales lambda: unsure points bind less. */
     confidence?: Float32Array;
     /** Points known to be outside. Else made from cameras, normals or the bounding sphere. */
-    exterior?: Float32Array;
+    exterior?: PointArray;
     cameras?: Camera[];
     maxPoints?: number; // Poisson-disc subsample above this
     keepComponents?: number; // outliers: keep the n largest connected clusters; default all
@@ -374,10 +390,10 @@ export class ImplicitSurface implements Stepper {
   readonly params: Required<ImplicitParams>;
   setParams(params: ImplicitParams): void;
   /** f > 0 inside, 0 on the surface, < 0 outside. */
-  evaluate(points: Float32Array): Float32Array;
-  gradient(points: Float32Array): Float32Array;
+  evaluate(points: PointArray): Float32Array;
+  gradient(points: PointArray): Float32Array;
   /** The points that are used, and the exterior ones, for display. */
-  constraints(): { surface: Float32Array; exterior: Float32Array };
+  constraints(): { surface: PointArray; exterior: PointArray };
   /** Distances from all the original points to the surface. */
   fitness(): { mean: number; rms: number; max: number; meanCurvature: number };
   /** f sampled on a grid around the object, so that the deformable model can take over. */
