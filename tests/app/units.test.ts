@@ -151,7 +151,7 @@ describe('undo', () => {
 function report(iteration: number, more: Partial<StepReport> = {}): StepReport {
   const events = { creations: 0, deletions: 0, inversions: 0, axial: 0, annular: 0, vanished: 0, seeds: 0 };
   const counts = { vertices: 10, triangles: 16, components: 1, euler: 2 };
-  const end = { progress: 0, residual: 0.5, tolerance: 1e-6, done: false };
+  const end = { progress: 0, residual: 0.5, tolerance: 1e-6, done: false, warnings: [] };
   return { iteration, phase: 'level 1', events, times: { forces: 2, topology: 1 }, ...counts, ...end, ...more };
 }
 

@@ -198,7 +198,7 @@ export class Mesh {
 }
 
 // ── one stepping contract for every method ──────────────────────────────────────────────────────
-/** Carried by volumes and results; a result without one is right. */
+/** Carried by volumes and reports, as `warnings`; a result without one is right. */
 export interface Warning {
   code: string;
   text: string;
@@ -230,8 +230,6 @@ export interface StepReport {
   };
   /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
   times: Record<string, number>;
-  /** What to know about the result before relying on it. */
-  warnings: Warning[];
 }
 export interface RunOptions {
   signal?: AbortSignal; // rejects with signal.reason, the model stays usable

@@ -19,7 +19,7 @@ same<Same<built.MeshInfo, contract.MeshInfo>>(true);
 same<Same<built.MeshReport, contract.MeshReport>>(true);
 same<Same<built.MeshFormat, contract.MeshFormat>>(true);
 // The codes of warnings are more with each version.
-same<Same<Omit<built.StepReport, 'warnings'>, Omit<contract.StepReport, 'warnings'>>>(true);
+same<Same<Omit<built.StepReport, 'warnings'>, contract.StepReport>>(true);
 export const warnings = ({ warnings }: built.StepReport): contract.Warning[] => warnings;
 same<Same<built.RunOptions, contract.RunOptions>>(true);
 same<Same<built.ParamSpec, contract.ParamSpec>>(true);
