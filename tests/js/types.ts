@@ -21,7 +21,7 @@ same<Same<built.MeshFormat, contract.MeshFormat>>(true);
 // The codes of warnings are more with each version.
 same<Same<Omit<built.StepReport, 'warnings'>, contract.StepReport>>(true);
 export const warnings = ({ warnings }: built.StepReport): contract.Warning[] => warnings;
-same<Same<built.RunOptions, contract.RunOptions>>(true);
+same<Same<Omit<built.RunOptions, 'onStep'>, Omit<contract.RunOptions, 'onStep'>>>(true);
 same<Same<built.ParamSpec, contract.ParamSpec>>(true);
 same<Same<built.DeformableParams, contract.DeformableParams>>(true);
 same<Same<built.Coverage, contract.Coverage>>(true);
