@@ -12,6 +12,7 @@
 pub(crate) mod common;
 
 // Reads the source files.
+mod anywhere;
 #[cfg(not(target_arch = "wasm32"))]
 mod architecture;
 mod decimate;
