@@ -10,7 +10,7 @@ export type WarningCode =
   | 'precision'
   /** A surface that was moved towards the origin, since where it is it could not be represented. */
   | 'recentred'
-  /** Voxels so much longer along one axis that the shape between the slices is a guess. */
+  /** Voxels that are far longer along one axis, so that the shape between the slices is a guess. */
   | 'anisotropic';
 
 /** Something to know about a volume or a result before relying on it. */

@@ -55,7 +55,7 @@ pub enum WarningCode {
     Precision,
     /// The surface was moved towards the origin, since where it is it could not be represented.
     Recentred,
-    /// Voxels of the volume are so much longer along one axis than along the others that the shape between the slices is
-    /// a guess.
+    /// Voxels of the volume are far longer along one axis than along the others, so that the shape between the slices is a
+    /// guess.
     Anisotropic,
 }

@@ -309,7 +309,7 @@ fn surveyed_points_keep_their_millimetres() {
     }
 }
 
-/// What kept 5 % of its volume when positions were in single precision in world space.
+/// With positions of single precision in world space it kept 5 % of its volume.
 #[test]
 fn a_lamp_a_million_away_keeps_its_volume() {
     let home = measure(&lamp(Placement::HOME).unwrap()).volume;

@@ -117,7 +117,7 @@ export interface MeshArrays {
   uvs?: Float32Array;
   /** rgb, 0..1 */
   colors?: Float32Array;
-  /** What positions are relative to, if that was asked for. */
+  /** The point that positions are relative to, if that was asked for. */
   origin?: Vec3;
 }
 export interface MeshInfo {
@@ -158,7 +158,7 @@ export class Mesh {
   /** Increases when connectivity changes / when any vertex moves. */
   readonly topologyVersion: number;
   readonly geometryVersion: number;
-  /** What the mesh keeps positions relative to; 0 unless it is far away for its size. */
+  /** The point that positions are kept relative to; 0 unless the mesh is far away for its size. */
   readonly origin: Vec3;
   arrays(options?: { relative?: boolean }): MeshArrays;
   /** Copies into the caller's buffers, which are replaced only when too small; returns the counts written. */
