@@ -39,6 +39,7 @@ mod remesh;
 mod scenes;
 mod textured_meshes;
 mod thin_structures;
+mod tool_scales;
 mod tracking;
 mod tracking_fuzz;
 mod volume_files;
