@@ -24,11 +24,8 @@ export function place(point: Vec3, size: number): string {
     maximumFractionDigits: Math.min(20, decimals(size, 4)),
     useGrouping: false,
   });
-  const spelled = (value: number) => {
-    const short = shortened(value, 4, size);
-    return short === Number(value.toPrecision(4)) ? figure(short) : far.format(short);
-  };
-  return point.map(spelled).join(', ');
+  const isFar = point.some((value) => shortened(value, 4, size) !== Number(value.toPrecision(4)));
+  return point.map((value) => (isFar ? far.format(value) : figure(Number(value.toPrecision(4))))).join(', ');
 }
 
 /** Units of length, each a thousandth of the one before. */
