@@ -1,17 +1,17 @@
 import {
   checkProperties,
   denseCopy,
-  finite,
   integer,
   invalid,
   number,
+  pointArray,
   positive,
   shallowCopy,
   typedArray,
   vec3,
 } from './check.js';
 import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
-import type { DataOptions, LargeVolume, Vec3, VoxelArray } from './data.js';
+import type { DataOptions, LargeVolume, PointArray, Vec3, VoxelArray } from './data.js';
 import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
@@ -137,7 +137,7 @@ export type DeformableStart =
   | 'contour'
   | 'enclosing'
   | { bubbles: number }
-  | { seeds: Float32Array; radius: number }
+  | { seeds: PointArray; radius: number }
   | { marchingCubes: number }
   | Mesh;
 
@@ -484,7 +484,7 @@ function rawStart(start: DeformableStart): RawStart {
   }
   if ('seeds' in start) {
     const { seeds, radius } = checkProperties('start', start, ['seeds', 'radius']);
-    return RawStart.seeds(finite('seeds', seeds, 3), positive('radius', radius));
+    return RawStart.seeds(pointArray('seeds', seeds), positive('radius', radius));
   }
   throw unknownStart();
 }

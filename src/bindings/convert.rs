@@ -55,11 +55,15 @@ pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
 /// Converts an array of coordinates in world space, in single or double precision, to positions and the origin that they
 /// are relative to.
 pub fn located(array: &JsValue) -> Result<(Vec<Vec3>, DVec3), Failure> {
-    let world: WorldPositions = match array.dyn_ref::<Float32Array>() {
-        Some(array) => points(array)?.iter().map(|p| p.as_dvec3()).collect(),
-        None => double_points(array)?.into_iter().collect(),
-    };
-    Ok(world.relative())
+    Ok(world_points(array)?.into_iter().collect::<WorldPositions>().relative())
+}
+
+/// Converts an array of coordinates in world space, in single or double precision, to points.
+pub fn world_points(array: &JsValue) -> Result<Vec<DVec3>, Failure> {
+    match array.dyn_ref::<Float32Array>() {
+        Some(array) => Ok(points(array)?.iter().map(|p| p.as_dvec3()).collect()),
+        None => double_points(array),
+    }
 }
 
 /// Converts an array of coordinates in world space, in single or double precision, to positions relative to `origin`.

@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use js_sys::{Float32Array, Float64Array};
+use js_sys::Float64Array;
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{doubles, points, to_js, with_overrides};
+use super::convert::{doubles, to_js, with_overrides, world_points};
 use super::error::Failure;
 use super::mesh::RawMesh;
 use super::method::{method_bindings, shared};
@@ -42,9 +42,8 @@ impl RawStart {
 
     /// Returns a start of spheres of `radius`, in world units, around the points `seeds`, x, y and z of each in turn in
     /// world space.
-    pub fn seeds(seeds: &Float32Array, radius: f64) -> Result<RawStart, JsValue> {
-        let points = points(seeds)?.into_iter().map(|seed| seed.as_dvec3()).collect();
-        Ok(RawStart(Start::Seeds { points, radius }))
+    pub fn seeds(seeds: &JsValue, radius: f64) -> Result<RawStart, JsValue> {
+        Ok(RawStart(Start::Seeds { points: world_points(seeds)?, radius }))
     }
 
     /// Returns a start from marching cubes: the iso-surface of the coarsest pyramid level at intensity `iso`.

@@ -26,8 +26,9 @@ const SPEC = { dims: [36, 36, 36], spacing: [2, 2, 2], frames: 8, noise: 0, size
 const spec = () => structuredClone(SPEC) as unknown as Parameters<typeof cineVoxels>[0];
 
 function surfaceOf(mesh: Mesh): Surface {
-  const { positions, normals, indices } = mesh.arrays();
-  return { positions, normals, indices, vertices: positions.length / 3, triangles: indices.length / 3 };
+  const { positions, normals, indices } = mesh.arrays({ relative: true });
+  const counts = { vertices: positions.length / 3, triangles: indices.length / 3 };
+  return { positions, normals, indices, ...counts, origin: mesh.origin };
 }
 
 describe('the computed ventricle', () => {

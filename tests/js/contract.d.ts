@@ -318,7 +318,7 @@ export class DeformableModel implements Stepper {
       | 'contour'
       | 'enclosing'
       | { bubbles: number }
-      | { seeds: Float32Array; radius: number }
+      | { seeds: PointArray; radius: number }
       | { marchingCubes: number }
       | Mesh;
     levels?: number; // pyramid levels above the volume itself; 0 = direct

@@ -13,6 +13,7 @@ import type {
   MeshInfo,
   MeshReport,
   ParamSpec,
+  PointArray,
   StepReport,
   UncoveredRegion,
   Vec3,
@@ -22,7 +23,18 @@ import type { Edit } from './finish/protocol';
 import type { Shape } from './shapes';
 import type { RunLog } from './worker/run-log';
 
-export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredRegion, Vec3 };
+export type {
+  Attractor,
+  Coverage,
+  MeshFormat,
+  MeshInfo,
+  MeshReport,
+  ParamSpec,
+  PointArray,
+  StepReport,
+  UncoveredRegion,
+  Vec3,
+};
 
 export type ParamValues = Record<string, unknown>;
 
@@ -125,6 +137,7 @@ export interface Plane {
  * so that none is allocated for each surface sent. They may be longer than the part in use.
  */
 export interface SurfaceBuffers {
+  /** Relative to the origin of the surface. */
   positions: Float32Array;
   normals: Float32Array;
   indices: Uint32Array;
@@ -132,6 +145,8 @@ export interface SurfaceBuffers {
 
 /** A triangle mesh that a lab's worker sends to the page for drawing. */
 export interface Surface extends SurfaceBuffers {
+  /** The origin in world space that the positions are relative to. */
+  origin: Vec3;
   /** Number of vertices in use; the buffers may be longer. */
   vertices: number;
   /** Number of triangles in use; `indices` may be longer. */
@@ -202,6 +217,12 @@ export interface RunCode {
   note?: string | undefined;
 }
 
+/** A surface as a file; `recentre` moves it to the origin. */
+export interface ExportRequest {
+  format: MeshFormat;
+  recentre?: boolean;
+}
+
 /** Requests of the page to the workers of all labs whose model runs. */
 export interface CodeRequests {
   code: { body: CodeRequest; reply: RunCode };
@@ -231,7 +252,7 @@ export interface Requests extends CodeRequests {
   setParams: { body: ParamValues; reply: ParamValues };
   /** Sets the planes whose cross-sections with the surface are sent from now on, for the outlines on the slices. */
   planes: { body: Plane[]; reply: undefined };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
   /** Replies with `levels` coarser levels of the volume's pyramid for display, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
@@ -289,7 +310,7 @@ export interface SnapshotEvent {
    * Cross-sections of the surface with the planes set by the request `planes`, each as segments: pairs of world points,
    * packed xyz.
    */
-  sections: Float32Array[];
+  sections: PointArray[];
   /** One report per step since the last snapshot or progress event. */
   reports: StepReport[];
   measures?: Measures;
@@ -304,7 +325,7 @@ export interface ProgressEvent {
 }
 export interface SectionsEvent {
   event: 'sections';
-  sections: Float32Array[];
+  sections: PointArray[];
 }
 /**
  * Event with the state of a lab's run: sent when a run starts and, after its last results, when it is done or was

@@ -5,14 +5,15 @@ import type {
   Attractor,
   CodeRequest,
   DataEvent,
+  ExportRequest,
   LargeSource,
   LevelView,
   Loaded,
   MeasuredCoverage,
   Measures,
-  MeshFormat,
   ParamValues,
   Plane,
+  PointArray,
   Ready,
   Requests,
   ReturnMessage,
@@ -33,7 +34,7 @@ import { buildModel, restoredModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
 import { logged, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
-import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
+import { copySurface, emptyArrays, sectionOf, transferOf } from './worker/surface-buffers';
 import { levelsOf, openFrame, viewOf } from './worker/volumes';
 
 /**
@@ -100,7 +101,7 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     planes: (planes) => this.#setPlanes(planes),
-    export: ({ format }) => this.#export(format),
+    export: (body) => this.#export(body),
     pyramid: ({ levels }) => this.#pyramid(levels),
     setAttractors: (attractors) => this.#setAttractors(attractors),
     quantity: (quantity) => this.#setQuantity(quantity),
@@ -289,8 +290,8 @@ class Session {
     this.#done = false;
   }
 
-  #export(format: MeshFormat): Uint8Array {
-    const bytes = this.#current().mesh.toBytes(format);
+  #export({ format, recentre = false }: ExportRequest): Uint8Array {
+    const bytes = this.#current().mesh.toBytes(format, { recentre });
     return withTransfer(bytes, [bytes]);
   }
 
@@ -397,8 +398,8 @@ class Session {
     }
   }
 
-  #sections(mesh: Mesh): Float32Array[] {
-    return this.#planes.map(({ origin, normal }) => mesh.crossSection(origin, normal));
+  #sections(mesh: Mesh): PointArray[] {
+    return this.#planes.map((plane) => sectionOf(mesh, plane));
   }
 
   #snapshot(detail: Detail): void {

@@ -39,7 +39,7 @@ export function summary(values: Float32Array, weights: Float64Array): Distances 
 
 /** Returns the area around each vertex, times three: that of all its triangles. */
 function weightsOf(mesh: Mesh): Float64Array {
-  const { positions, indices } = mesh.arrays();
+  const { positions, indices } = mesh.arrays({ relative: true });
   const weights = new Float64Array(positions.length / 3);
   for (let at = 0; at < indices.length; at += 3) {
     const area = triangleArea(positions, indices, at);

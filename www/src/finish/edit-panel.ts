@@ -1,4 +1,5 @@
 import type { Unit } from '../examples';
+import { shortened } from '../placing';
 import type { ParamSpec, ParamValues, Vec3 } from '../protocol';
 import { plural, text } from '../texts';
 import { h } from '../ui/dom';
@@ -111,7 +112,7 @@ export class EditPanel {
   show(edited: Edited | undefined): void {
     this.#from = undefined;
     this.#distance.textContent = '';
-    this.#view.showLines(new Float32Array());
+    this.#view.showLines([]);
     this.#components.show(edited, this.unit);
     const log = edited?.log ?? [];
     this.#log.replaceChildren(...log.map((edit) => h('li', {}, h('code', {}, callOf(edit)))));
@@ -189,7 +190,7 @@ export class EditPanel {
     box.addEventListener('change', async () => {
       for (const other of [this.#choosing, this.#measuring]) if (other !== box) other.checked = false;
       this.#view.pick(undefined);
-      this.#view.showLines(new Float32Array());
+      this.#view.showLines([]);
       if (box.checked && (await this.#attempt(() => this.#finishing.open()))) this.#view.pick(take);
     });
     return box;
@@ -270,9 +271,12 @@ export class EditPanel {
   #plane(): { origin: Vec3; normal: Vec3 } {
     const axis = AXES.indexOf(String(this.#cutting.axis));
     const { min, max } = this.#finishing.edited?.measures.info.bounds ?? { min: [0, 0, 0], max: [0, 0, 0] };
-    const origin = min.map((low, k) => Number((0.5 * (low + (max[k] ?? 0))).toPrecision(6))) as Vec3;
-    const low = min[axis] ?? 0;
-    origin[axis] = Number((low + ((max[axis] ?? 0) - low) * 0.01 * Number(this.#cutting.position)).toPrecision(6));
+    const size = Math.max(...min.map((low, k) => (max[k] ?? 0) - low));
+    const along = (k: number, part: number) => {
+      const low = min[k] ?? 0;
+      return shortened(low + part * ((max[k] ?? 0) - low), 6, size);
+    };
+    const origin = min.map((_, k) => along(k, k === axis ? 0.01 * Number(this.#cutting.position) : 0.5)) as Vec3;
     const normal: Vec3 = [0, 0, 0];
     normal[axis] = this.#cutting.side === SIDES[0] ? 1 : -1;
     return { origin, normal };
@@ -293,7 +297,7 @@ export class EditPanel {
       this.#distance.textContent = text('finish.secondPoint');
       return;
     }
-    this.#view.showLines(Float32Array.from([...from.point, ...at.point]));
+    this.#view.showLines([...from.point, ...at.point]);
     await this.#attempt(async () => {
       const { straight, geodesic } = await this.#finishing.request('measure', [from, at]);
       const [a, b] = [straight, geodesic].map((length) => `${figure(length)} ${this.unit}`.trim());

@@ -1,5 +1,5 @@
 import type { Raycaster } from 'three';
-import type { Surface } from '../protocol';
+import type { Surface, Vec3 } from '../protocol';
 import { token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { Lines } from '../view/lines';
@@ -43,8 +43,13 @@ export class EditedView {
     this.#viewport.invalidate();
   }
 
-  /** Draws line segments, pairs of points. */
-  showLines(points: Float32Array): void {
+  /** The origin of the lab's own surface; undefined if there is none. */
+  get origin(): Vec3 | undefined {
+    return this.#surface.own?.origin;
+  }
+
+  /** Draws line segments, pairs of points in world space. */
+  showLines(points: ArrayLike<number>): void {
     this.#lines.show(points);
     this.#viewport.invalidate();
   }

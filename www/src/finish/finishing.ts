@@ -1,5 +1,5 @@
 import { RequestError } from '../channel';
-import type { MeshFormat } from '../protocol';
+import type { ExportRequest } from '../protocol';
 import { text } from '../texts';
 import { FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';
@@ -88,8 +88,8 @@ export class Finishing {
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */
-  exported(format: MeshFormat): Promise<Uint8Array> | undefined {
-    return this.#edited?.log.length ? this.#client?.request('export', format) : undefined;
+  exported(request: ExportRequest): Promise<Uint8Array> | undefined {
+    return this.#edited?.log.length ? this.#client?.request('export', request) : undefined;
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

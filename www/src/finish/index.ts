@@ -1,6 +1,6 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
 import type { Unit } from '../examples';
-import type { Measures, MeshFormat } from '../protocol';
+import type { ExportRequest, Measures, Vec3 } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
@@ -67,8 +67,14 @@ export class Finish {
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits. */
-  exported(format: MeshFormat): Promise<Uint8Array> | undefined {
-    return this.#finishing.exported(format);
+  exported(request: ExportRequest): Promise<Uint8Array> | undefined {
+    return this.#finishing.exported(request);
+  }
+
+  /** The origin of the edited surface; undefined if there are no edits. */
+  get origin(): Vec3 | undefined {
+    const { edited } = this.#finishing;
+    return edited?.log.length ? edited.surface.origin : undefined;
   }
 
   /** The edits that have been made, for a session. */

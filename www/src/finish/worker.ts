@@ -1,11 +1,12 @@
 /** Worker that edits a surface after a run, and compares it with a reference. */
 import init, { Mesh, Volume } from 'vesicle';
 import { importVolume } from '../importers';
+import { relativeTo } from '../placing';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 import { type Handlers, reply, withTransfer } from '../worker/serving';
-import { copySurface, emptyArrays } from '../worker/surface-buffers';
+import { copySurface, emptyArrays, sectionOf } from '../worker/surface-buffers';
 import { readFiles } from '../worker/volumes';
 import { apply } from './code';
 import { distancesBetween, gridAround } from './distances';
@@ -87,7 +88,8 @@ function travel(step: 1 | -1): Edited {
  * into three, so that paths begin and end in them.
  */
 function measure([from, to]: [SurfacePoint, SurfacePoint]): { straight: number; geodesic: number } {
-  const { positions, indices } = current().mesh.arrays();
+  const { mesh } = current();
+  const { positions, indices } = mesh.arrays({ relative: true });
   const corners = [...indices];
   const first = positions.length / 3;
   const insert = (triangle: number, vertex: number) => {
@@ -98,7 +100,7 @@ function measure([from, to]: [SurfacePoint, SurfacePoint]): { straight: number; 
   insert(from.triangle, first);
   // In the same triangle, the straight line is on the surface.
   if (from.triangle !== to.triangle) insert(to.triangle, first + 1);
-  const points = Float32Array.from([...positions, ...from.point, ...to.point]);
+  const points = Float32Array.from([...positions, ...relativeTo(mesh.origin, [...from.point, ...to.point])]);
   const straight = Math.hypot(...from.point.map((x, axis) => x - (to.point[axis] ?? 0)));
   if (from.triangle === to.triangle) return { straight, geodesic: straight };
   const refined = Mesh.fromArrays(points, Uint32Array.from(corners));
@@ -156,8 +158,8 @@ const handlers: Handlers<Requests> = {
   edit,
   undo: () => travel(-1),
   redo: () => travel(1),
-  export: (format) => current().mesh.toBytes(format),
-  section: ({ origin, normal }) => current().mesh.crossSection(origin, normal),
+  export: ({ format, recentre = false }) => current().mesh.toBytes(format, { recentre }),
+  section: (plane) => sectionOf(current().mesh, plane),
   measure,
   reference: readReference,
   compare,

@@ -1,7 +1,7 @@
 import type { Example } from '../examples';
 import { COVERAGE_GUIDE } from '../guides';
 import { isPreset, type Preset, type Variant, variantInForce } from '../presets';
-import type { Attractor, LargeSource, MeshFormat, ParamValues, Plane, VolumeView } from '../protocol';
+import type { Attractor, LargeSource, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { AttractorControls } from '../ui/attractors';
@@ -24,7 +24,7 @@ import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../ui/view-op
 import { Stage } from '../view/stage';
 import { type ExtractSource, frameOf } from './extract-opening';
 import { extractData, factsOf, unitOf } from './extract-page';
-import { type RunEvents, RunParts } from './lab-parts';
+import { type FetchMesh, type RunEvents, RunParts } from './lab-parts';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 
@@ -67,13 +67,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly #log = new EventLog();
   readonly #compareHolder: HTMLDetailsElement;
 
-  constructor(
-    root: HTMLElement,
-    history: History,
-    fetchMesh: (format: MeshFormat) => Promise<Uint8Array>,
-    signal: AbortSignal,
-    events: PartEvents,
-  ) {
+  constructor(root: HTMLElement, history: History, fetchMesh: FetchMesh, signal: AbortSignal, events: PartEvents) {
     const large = new LargeSourceControls(events.onLarge);
     const frames = new FrameChoice(events.onFrame);
     const chooser = fileChooser(events.onFiles);

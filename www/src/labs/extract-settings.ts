@@ -121,6 +121,7 @@ export class ExtractSettings {
     this.#volume = volume;
     this.#undo.clear();
     this.#ui.attractors.radius = ATTRACTOR_PART * this.#smallestSide;
+    this.#ui.coverage.size = this.#smallestSide;
     this.#attractors = attractors;
     this.#ui.showAttractors(attractors);
     this.#adoptModel(choice, params);

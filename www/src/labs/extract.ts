@@ -31,13 +31,7 @@ export class ExtractLab extends RunLab<Example> {
     const { client } = this;
     const { signal } = this.closing;
     const history = new History();
-    const ui = new ExtractParts(
-      root,
-      history,
-      (format) => client.request('export', { format }),
-      signal,
-      this.#events(),
-    );
+    const ui = new ExtractParts(root, history, (request) => client.request('export', request), signal, this.#events());
     const states = new LabStates(ui.banner, ui.status, signal);
     this.ui = ui;
     this.states = states;
@@ -81,7 +75,7 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
-      onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
     };
   }
 

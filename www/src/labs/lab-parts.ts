@@ -1,11 +1,12 @@
+import { toFailure } from '../channel';
 import type { Unit } from '../examples';
 import { Finish } from '../finish';
 import type { EditedView } from '../finish/edited-view';
-import type { MeshFormat, ParamSpec, ParamValues } from '../protocol';
+import type { ExportRequest, ParamSpec, ParamValues } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { folded, h, section, wideButton } from '../ui/dom';
-import { ExportButtons } from '../ui/exports';
+import { ExportButtons, RECENTRED } from '../ui/exports';
 import { acceptDrops } from '../ui/files';
 import type { History } from '../ui/history';
 import type { MeasurePanel } from '../ui/measures';
@@ -46,10 +47,13 @@ interface PartsOptions<Example extends Listed> {
   sessionHelp?: string;
 }
 
+/** Returns the present surface as a file. */
+export type FetchMesh = (request: ExportRequest) => Promise<Uint8Array>;
+
 interface RunPartsOptions<Example extends Listed> extends PartsOptions<Example> {
   history: History;
   /** Returns the present surface as a file. */
-  fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  fetchMesh: FetchMesh;
   /** Heading of the column of residuals in the data of the plots. */
   residual?: string;
 }
@@ -204,7 +208,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
   protected readonly history: History;
-  readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  readonly #fetchMesh: FetchMesh;
+  #edited: EditedView | undefined;
   finish: Finish | undefined;
 
   constructor(
@@ -219,10 +224,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     this.transport = new Transport(events);
     this.session.addCode(events);
     this.onRun = events.onToggle;
-    this.exports = new ExportButtons((format, type) => {
-      this.surfaceFile(format)
-        .then((bytes) => this.saving.bytes(format, bytes, type, this.suffix))
-        .catch((error) => events.onError(text('labs.saveFailed'), error));
+    this.exports = new ExportButtons((request, type) => {
+      this.#save(request, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
     this.csv = h(
       'button',
@@ -241,8 +244,21 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   }
 
   /** Returns the surface, edited if it is, as a file. */
-  surfaceFile(format: MeshFormat): Promise<Uint8Array> {
-    return this.finish?.exported(format) ?? this.#fetchMesh(format);
+  surfaceFile(request: ExportRequest): Promise<Uint8Array> {
+    return this.finish?.exported(request) ?? this.#fetchMesh(request);
+  }
+
+  /** Saves the surface, or offers to save it at the origin if the format is too coarse for it where it is. */
+  async #save(request: ExportRequest, type: string): Promise<void> {
+    const { format, recentre } = request;
+    try {
+      const bytes = await this.surfaceFile(request);
+      this.saving.bytes(format, bytes, type, `${this.suffix}${recentre ? RECENTRED : ''}`);
+    } catch (error) {
+      const origin = this.finish?.origin ?? this.#edited?.origin;
+      if (toFailure(error).code !== 'precision' || !origin) throw error;
+      this.exports.offer(format, type, origin);
+    }
   }
 
   protected override saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
@@ -256,8 +272,9 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected finishSections(view: EditedView, measures: MeasurePanel, onOpen = () => {}): HTMLElement[] {
     const mesh = () => {
       onOpen();
-      return this.#fetchMesh('ply');
+      return this.#fetchMesh({ format: 'ply' });
     };
+    this.#edited = view;
     this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
     return this.finish.elements;
   }

@@ -1,11 +1,14 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 import { EXAMPLES, type Example } from '../examples';
+import { shortened } from '../placing';
 import { defaultStart, exampleById, isPreset, PAPER } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
 import type { ColorMode } from '../ui/view-options';
 
 export const ADDRESS = '#extract';
+/** Significant digits of a sphere, which is about a tenth of the volume: finer than any click. */
+const DIGITS = 7;
 
 /**
  * Version number of the defaults that a link relies on. Links without a version were written when the defaults were an
@@ -67,13 +70,19 @@ export function linkOf(settings: LabSettings): Linked {
     ...(frame > 0 && { frame }),
     ...(choice.kind !== start.kind && { start: choice.kind }),
     ...(choice.kind === 'bubbles' && choice.bubbles !== bubbles && { bubbles: choice.bubbles }),
-    ...(choice.kind === 'sphere' && { sphere }),
+    ...(choice.kind === 'sphere' && { sphere: short(sphere) }),
     ...(choice.levels !== usual.levels && { levels: choice.levels }),
     ...(choice.edge !== usual.edge && { edge: choice.edge ?? 0 }),
     params: differing(params, { ...defaults, ...example?.params }),
     attractors,
     ...(color !== 'plain' && { color }),
   };
+}
+
+/** Rounds a sphere to what a link needs. */
+function short({ center, radius }: LabSettings['sphere']): LabSettings['sphere'] {
+  const rounded = center.map((value) => shortened(value, DIGITS, 10 * radius)) as Vec3;
+  return { center: rounded, radius: Number(radius.toPrecision(DIGITS)) };
 }
 
 /** Returns the entries of `values` that differ from those in `usual`, for a link that omits the others. */
@@ -91,7 +100,8 @@ export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: 
   };
 }
 
-const numbers = (values: number[]) => values.map((value) => Number(value.toPrecision(7))).join(',');
+// All digits but those that rounding has left, such as those of 0.1 + 0.2.
+const numbers = (values: number[]) => values.map((value) => Number(value.toPrecision(15))).join(',');
 
 /** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: Linked): string {

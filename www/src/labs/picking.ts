@@ -1,5 +1,6 @@
 /** Editing points by clicks in the Reconstruct lab's view. */
-import type { Vec3 } from '../protocol';
+import { pointsAt } from '../placing';
+import type { PointArray, Vec3 } from '../protocol';
 import type { Edits } from '../reconstruct/protocol';
 import type { EditTool } from '../ui/edit-tools';
 import type { Hit } from '../view/reconstruction';
@@ -16,7 +17,7 @@ export function applyClick(
   { point, normal }: Hit,
   distance: number,
   edits: Edits,
-  points: Float32Array,
+  points: PointArray,
 ): Edits | undefined {
   const position = normal ? (point.map((x, axis) => x + distance * (normal[axis] ?? 0)) as Vec3) : point;
   switch (tool) {
@@ -35,7 +36,7 @@ export function applyClick(
  * Returns the manual edits with all points within `radius` (world units) of the position `place` removed, including
  * those added by hand; undefined if there are no such points.
  */
-function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Array): Edits | undefined {
+function removeNear(place: Vec3, radius: number, edits: Edits, points: PointArray): Edits | undefined {
   const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= radius;
   const gone = new Set(edits.removed);
   const found: number[] = [];
@@ -50,7 +51,12 @@ function removeNear(place: Vec3, radius: number, edits: Edits, points: Float32Ar
 /**
  * Returns the positions or colours of points, packed triples, without those of the points with the indices `removed`.
  */
-export function withoutRemoved(values: Float32Array, removed: number[]): Float32Array {
+export function withoutRemoved<Points extends PointArray>(values: Points, removed: readonly number[]): Points {
+  if (removed.length === 0) return values;
   const gone = new Set(removed);
-  return gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;
+  const indices = Uint32Array.from({ length: values.length / 3 }, (_, i) => i);
+  return pointsAt(
+    values,
+    indices.filter((i) => !gone.has(i)),
+  );
 }

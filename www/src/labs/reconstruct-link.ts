@@ -1,4 +1,5 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
+import { shortened } from '../placing';
 import type { ParamValues, Vec3 } from '../protocol';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { isCloudPreset } from '../reconstruct/presets';
@@ -7,6 +8,8 @@ import type { CloudChoice } from '../ui/cloud-setup';
 import { differing, readValue } from './link';
 
 const ADDRESS = '#reconstruct';
+/** Significant digits of coordinates: finer than any click. */
+const DIGITS = 6;
 /** Most points changed by hand that a link includes: some programs truncate long addresses. */
 export const MOST_EDITS = 200;
 
@@ -33,6 +36,8 @@ export interface CloudSettings {
   params: ParamValues;
   defaults: ParamValues;
   edits: Edits;
+  /** Size of the points, to which coordinates are rounded. */
+  size: number;
   color: string;
   photo: number | undefined;
 }
@@ -43,7 +48,8 @@ export interface CloudSettings {
  * number of points, `keepComponents` is 0 for all clusters.
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
-  const { example, file, choice, params, defaults, edits, color, photo } = settings;
+  const { example, file, choice, params, defaults, edits, size, color, photo } = settings;
+  const short = (points: Vec3[]) => points.map((point) => point.map((x) => shortened(x, DIGITS, size)) as Vec3);
   const { maxPoints, keepComponents } = choice;
   return {
     ...(!example && { file }),
@@ -51,7 +57,9 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
     ...(maxPoints !== example?.maxPoints && { maxPoints: maxPoints ?? 0 }),
     ...(keepComponents !== example?.keepComponents && { keepComponents: keepComponents ?? 0 }),
     params: differing(params, { ...defaults, ...example?.params }),
-    edits: fits(edits) ? edits : { added: [], removed: [], outside: [] },
+    edits: fits(edits)
+      ? { ...edits, added: short(edits.added), outside: short(edits.outside) }
+      : { added: [], removed: [], outside: [] },
     ...(color !== (example?.color ?? 'plain') && { color }),
     ...(photo !== photoOf(example) && { photo: photo === undefined ? 0 : photo + 1 }),
   };
@@ -87,8 +95,6 @@ export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Par
   };
 }
 
-const coordinates = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
-
 /** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: LinkedCloud): string {
   const query = new URLSearchParams();
@@ -97,8 +103,8 @@ export function toHash(linked: LinkedCloud): string {
     if (value !== undefined) query.set(name, String(value));
   }
   for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
-  for (const point of linked.edits.added) query.append('add', coordinates(point));
-  for (const point of linked.edits.outside) query.append('outside', coordinates(point));
+  for (const point of linked.edits.added) query.append('add', point.join(','));
+  for (const point of linked.edits.outside) query.append('outside', point.join(','));
   if (linked.edits.removed.length > 0) query.set('remove', linked.edits.removed.join(','));
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;

@@ -70,7 +70,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
       drop: text('reconstruct.drop'),
       data: cloudData(fileChooser(events.onFiles, ACCEPT), events.onExample),
       history,
-      fetchMesh: (format) => client.request('export', { format }),
+      fetchMesh: (request) => client.request('export', request),
       residual: 'residual',
     });
     this.#events = events;

@@ -228,7 +228,7 @@ export class ReconstructSettings {
     const { points, colors } = this.#cloud;
     const { added, removed, outside } = this.#edits;
     this.#ui.view.showPoints(withoutRemoved(points, removed), colors && withoutRemoved(colors, removed));
-    this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
+    this.#ui.view.showByHand(added, outside);
   }
 }
 

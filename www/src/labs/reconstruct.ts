@@ -69,7 +69,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
       onPhotograph: () => this.updateAddress(),
       onSaveVolume: () => this.#saveVolume(),
       onPassOn: () => this.#toExtract(),
-      onSculpt: () => this.toSculpt(this.ui.surfaceFile('ply')),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
     };
   }
 
@@ -140,7 +140,8 @@ export class ReconstructLab extends RunLab<CloudExample> {
     const { defaults } = this.opening;
     const { color } = this.ui.options.value;
     const photo = this.ui.photos.chosen;
-    return toHash(linkOf({ example, file, choice, params, defaults, edits, color, photo }));
+    const { size } = this.ui.view;
+    return toHash(linkOf({ example, file, choice, params, defaults, edits, size, color, photo }));
   }
 
   protected override linkLacks(): (string | false)[] {
@@ -149,7 +150,9 @@ export class ReconstructLab extends RunLab<CloudExample> {
 
   #saveVolume(): void {
     const volume = this.client.request('volume', { size: VOLUME_SIZE });
-    const saved = volume.then(({ bytes }) => this.ui.saving.bytes('nii', bytes, 'application/octet-stream'));
+    const saved = volume.then(({ extension, bytes }) =>
+      this.ui.saving.bytes(extension, bytes, 'application/octet-stream'),
+    );
     this.ask(saved, text('reconstruct.volumeFailed'));
   }
 

@@ -1,4 +1,4 @@
-import { deformPoints } from '../sculpt/deform';
+import { deformSurface } from '../sculpt/deform';
 import { samePose } from '../sculpt/ellipsoids';
 import type { FrameEvent, Pose, Surface } from '../sculpt/protocol';
 import type { SculptureView } from '../view/sculpture';
@@ -59,7 +59,7 @@ export class SurfaceCarrier {
     const [before, after] = [this.#frame?.ellipsoids, this.#dragged?.pose];
     // While ellipsoids vanish, the poses do not correspond.
     if (!before || !after || before.length !== after.length) return false;
-    this.#place(({ positions, vertices }) => deformPoints(positions, before, after, vertices));
+    this.#place((surface) => deformSurface(surface, before, after));
     return true;
   }
 

@@ -87,7 +87,7 @@ function asText(pose: Pose): string {
 
 function rounding(step: number): (value: number) => number {
   const power = 10 ** Math.floor(Math.log10(step));
-  return (value) => Number((Math.round(value / power) * power).toPrecision(10));
+  return (value) => Number((Math.round(value / power) * power).toPrecision(15));
 }
 
 function asPose(text: string): Pose | undefined {

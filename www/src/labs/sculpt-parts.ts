@@ -54,7 +54,7 @@ export class SculptParts extends RunParts<SculptExample> {
       drop: text('sculpt.drop'),
       data: sceneData(fileChooser(events.onFiles, ACCEPT), events.onExample),
       history,
-      fetchMesh: (format) => client.request('export', { format }),
+      fetchMesh: (request) => client.request('export', request),
       residual: 'unrest',
     });
     this.#onError = events.onError;

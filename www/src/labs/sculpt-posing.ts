@@ -1,7 +1,8 @@
+import { shortened } from '../placing';
 import { moved, scaled, turned } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from '../sculpt/protocol';
 import { text } from '../texts';
-import { figure } from '../ui/format';
+import { place } from '../ui/format';
 import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
 import type { SculptSettings } from './sculpt-settings';
@@ -124,8 +125,9 @@ export class Posing {
     const { pose, chosen } = this.#settings;
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
     if (chosen === undefined || !ellipsoid) return;
-    const place = ellipsoid.center.map((x) => figure(Number(x.toPrecision(3)))).join(', ');
-    this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre: place }));
+    const { size } = this.#ui.view;
+    const centre = place(ellipsoid.center.map((x) => shortened(x, 3, size)) as Vec3, size);
+    this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre }));
   }
 
   /**

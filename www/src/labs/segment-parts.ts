@@ -3,6 +3,7 @@ import type { ParamValues, VolumeFormat } from '../segment/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { h, section, wideButton } from '../ui/dom';
+import { RecentreOffer } from '../ui/exports';
 import { fileChooser } from '../ui/files';
 import { LabelList, type LabelListEvents } from '../ui/label-list';
 import { LabelMeasureTable } from '../ui/label-measures';
@@ -45,6 +46,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
   readonly options: OptionControls<SegmentViewOptions>;
   readonly labels: LabelList;
   readonly tools: SegmentTools;
+  readonly offer = new RecentreOffer();
   readonly #saves: HTMLButtonElement[];
 
   constructor(root: HTMLElement, signal: AbortSignal, events: PartEvents) {
@@ -89,7 +91,11 @@ export class SegmentParts extends LabParts<SegmentExample> {
       results: [
         section(text('segment.sectionMeasures'), this.measures.element),
         section(text('segment.sectionMap'), exported(text('segment.mapsHelp'), ...maps)),
-        section(text('segment.sectionSurfaces'), exported(text('segment.surfacesHelp'), ...surfaces)),
+        section(
+          text('segment.sectionSurfaces'),
+          exported(text('segment.surfacesHelp'), ...surfaces),
+          this.offer.element,
+        ),
         this.saveSection(this.view.subject),
       ],
     });
@@ -104,6 +110,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
     const idle = this.showLoading(state, ready);
     this.tools.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle;
+    if (!idle) this.offer.hide();
   }
 
   dispose(): void {

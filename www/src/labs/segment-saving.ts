@@ -4,6 +4,7 @@ import { zipSync } from 'three/addons/libs/fflate.module.js';
 import type { SegmentClient } from '../segment/client';
 import type { Label } from '../segment/labels';
 import type { VolumeFormat } from '../segment/protocol';
+import { RECENTRED } from '../ui/exports';
 import type { SegmentView } from '../view/segmentation';
 import type { Saving } from './saving';
 import type { SurfaceFormat } from './segment-parts';
@@ -27,7 +28,7 @@ export async function saveMap(
 
 /**
  * Saves the surfaces: as one GLB, with a node for each label that has its name and colour, or else as files of the same
- * format, one a label, in a ZIP archive.
+ * format, one a label, in a ZIP archive; `recentre` moves them to the origin, as all have the same.
  */
 export async function saveSurfaces(
   format: SurfaceFormat,
@@ -35,6 +36,7 @@ export async function saveSurfaces(
   saving: Saving,
   labels: readonly Label[],
   surfaces: ReturnType<SegmentView['surfaces']>,
+  recentre = false,
 ): Promise<void> {
   if (format === 'glb') {
     const { toGlb } = await import('../segment/glb');
@@ -44,7 +46,7 @@ export async function saveSurfaces(
   for (const { value, name } of labels) {
     if (!surfaces.has(value)) continue;
     const stem = `${value}-${name.replace(/[^\p{L}\p{N}]+/gu, '-')}`;
-    files[`${stem}.${format}`] = await client.request('exportMesh', { value, format });
+    files[`${stem}.${format}`] = await client.request('exportMesh', { value, format, recentre });
   }
-  saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip', `-${format}`);
+  saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip', `-${format}${recentre ? RECENTRED : ''}`);
 }

@@ -406,9 +406,16 @@ export class SegmentLab extends LabShell<SegmentExample> {
     return [text('segment.linkLacksLabels')];
   }
 
-  #saveSurfaces(format: SurfaceFormat): void {
-    const saving = saveSurfaces(format, this.client, this.ui.saving, this.#editing.labels, this.ui.view.surfaces());
-    this.ask(saving, text('segment.saveFailed'));
+  #saveSurfaces(format: SurfaceFormat, recentre = false): void {
+    this.ui.offer.hide();
+    const surfaces = this.ui.view.surfaces();
+    const saving = saveSurfaces(format, this.client, this.ui.saving, this.#editing.labels, surfaces, recentre);
+    const offering = saving.catch((error) => {
+      const [first] = surfaces.values();
+      if (toFailure(error).code !== 'precision' || !first) throw error;
+      this.ui.offer.show(format, first.origin, () => this.#saveSurfaces(format, true));
+    });
+    this.ask(offering, text('segment.saveFailed'));
   }
 
   /** Opens volume and label map again; after a failure of the engine, with the present labels. */

@@ -78,7 +78,7 @@ export class TrackParts extends RunParts<TrackExample> {
       data: imageData(fileChooser(events.onFiles), events.onExample),
       ownControls: ['threshold'],
       history,
-      fetchMesh: (format) => client.request('export', { frame: this.frames.frame, format }),
+      fetchMesh: (request) => client.request('export', { ...request, frame: this.frames.frame }),
     });
     this.#onParam = events.onParam;
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);

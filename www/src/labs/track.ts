@@ -220,7 +220,10 @@ export class TrackLab extends RunLab<TrackExample> {
 
   #frameToSculpt(): void {
     const { frame } = this.#results;
-    this.toSculpt(this.ui.surfaceFile('ply'), text('track.frameName', { name: this.ui.saving.name, frame: frame + 1 }));
+    this.toSculpt(
+      this.ui.surfaceFile({ format: 'ply' }),
+      text('track.frameName', { name: this.ui.saving.name, frame: frame + 1 }),
+    );
   }
 
   async #compare(other: Alternative): Promise<void> {

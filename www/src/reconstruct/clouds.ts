@@ -4,7 +4,6 @@
  */
 import type { Vec3 } from '../protocol';
 import { normal, uniform } from '../random';
-import type { Cloud } from './protocol';
 
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
 
@@ -22,7 +21,7 @@ const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: 
 };
 
 /** Returns the points of a computed example shape, without normals and colours; the same at every call. */
-export function computedCloud(shape: PointShape): Cloud {
+export function computedCloud(shape: PointShape): { points: Float32Array } {
   const { seed, count, point } = SHAPES[shape];
   const random = uniform(seed);
   const points = new Float32Array(3 * count);

@@ -4,7 +4,7 @@ import { bytesOf, callsOf, chosen, type Program } from '../worker/code';
 import { literal } from '../worker/literal';
 import { Refusal } from '../worker/refusal';
 import { toPointEdits } from './model';
-import type { CameraView, Edits, Setup } from './protocol';
+import type { CameraView, Edits, PointArray, Setup } from './protocol';
 
 /** Returns how code makes the model of a set-up, with points from `file` or, if they were computed, from one that is saved. */
 export function programOf(
@@ -32,7 +32,7 @@ export function programOf(
 }
 
 /** Returns computed points as text, three coordinates a line; refuses if they are of a file, which the code reads. */
-export function pointsFile(file: string | undefined, points: Float32Array): Uint8Array {
+export function pointsFile(file: string | undefined, points: PointArray): Uint8Array {
   if (file !== undefined) throw new Refusal('invalid-argument', text('sessions.noDataNeeded'));
   const lines = Array.from({ length: points.length / 3 }, (_, i) => points.subarray(3 * i, 3 * i + 3).join(' '));
   return new TextEncoder().encode(`${lines.join('\n')}\n`);

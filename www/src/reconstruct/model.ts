@@ -1,7 +1,9 @@
 /** Builds point clouds and surface models for the requests of the Reconstruct lab's page. Used by the worker only. */
 import { type ImplicitOptions, ImplicitSurface, type PointEdits } from 'vesicle';
 import startReaders, { parsePoints } from 'vesicle/import';
-import type { Vec3 } from '../protocol';
+import { withoutRemoved } from '../labs/picking';
+import { likewise, relativeTo } from '../placing';
+import type { PointArray, Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
 import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
@@ -46,18 +48,17 @@ export function buildModel(
 /** Converts the user's point edits to the typed arrays that the model expects. */
 export function toPointEdits({ added, removed, outside }: Edits): Required<PointEdits> {
   return {
-    added: Float32Array.from(added.flat()),
+    added: Float64Array.from(added.flat()),
     removed: Uint32Array.from(removed),
-    exterior: Float32Array.from(outside.flat()),
+    exterior: Float64Array.from(outside.flat()),
   };
 }
 
 /** Returns the points in use, packed xyz: the loaded `points` without the removed ones, followed by the added ones. */
-export function applyEdits(points: Float32Array, { added, removed }: Edits): Float32Array {
+export function applyEdits(points: PointArray, { added, removed }: Edits): PointArray {
   if (added.length + removed.length === 0) return points;
-  const gone = new Set(removed);
-  const kept = points.filter((_, i) => !gone.has(Math.floor(i / 3)));
-  const all = new Float32Array(kept.length + 3 * added.length);
+  const kept = withoutRemoved(points, removed);
+  const all = likewise(points, kept.length + 3 * added.length);
   all.set(kept);
   all.set(added.flat(), kept.length);
   return all;
@@ -67,16 +68,16 @@ export function applyEdits(points: Float32Array, { added, removed }: Edits): Flo
  * For each quantity by which the surface can be coloured, a function that computes one value per vertex, in the order
  * of the mesh's arrays.
  */
-const QUANTITIES: Record<PointQuantity, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
+const QUANTITIES: Record<PointQuantity, (model: ImplicitSurface, points: PointArray) => Float32Array> = {
   'mean curvature': ({ mesh }) => mesh.curvature('mean'),
-  distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
+  distance: ({ mesh }, points) => distances(mesh.arrays({ relative: true }).positions, relativeTo(mesh.origin, points)),
 };
 
 /**
  * Returns one value of the quantity per vertex of the model's surface, to colour it by. `points` are the points in use,
  * with the user's edits applied.
  */
-export function valuesFor(model: ImplicitSurface, points: Float32Array, quantity: PointQuantity): Float32Array {
+export function valuesFor(model: ImplicitSurface, points: PointArray, quantity: PointQuantity): Float32Array {
   return QUANTITIES[quantity](model, points);
 }
 
@@ -94,7 +95,7 @@ export function levelOf(model: ImplicitSurface): number {
  * Returns the dimensions of a grid around the points, for the export of the fitted function as a volume with nearly
  * cubic voxels: `size` along the longest side, and at least `LEAST_DIM` along each.
  */
-export function cubicDims(points: Float32Array, size: number): Vec3 {
+export function cubicDims(points: PointArray, size: number): Vec3 {
   const sides = [0, 1, 2].map((axis) => {
     const [low, high] = span(points, axis);
     return high - low;

@@ -118,7 +118,7 @@ class PointGrid {
 }
 
 /** Returns the smallest and the largest coordinate of packed points along an axis, 0 to 2. */
-export function span(points: Float32Array, axis: number): [number, number] {
+export function span(points: ArrayLike<number>, axis: number): [number, number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (let i = axis; i < points.length; i += 3) {
     low = Math.min(low, points[i] ?? 0);

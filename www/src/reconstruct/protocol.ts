@@ -8,26 +8,28 @@
 import type { Fitness } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
-  MeshFormat,
   NamedBytes,
   ParamSpec,
   ParamValues,
+  PointArray,
   StateEvent,
   StepReport,
   Surface,
   Vec3,
 } from '../protocol';
 import type { RunLog } from '../worker/run-log';
+import type { VolumeBytes } from '../worker/volumes';
 import type { PointShape } from './clouds';
 
-export type { Failure, Fitness, MeshFormat, NamedBytes, ParamSpec, ParamValues, StepReport, Surface, Vec3 };
+export type { Failure, Fitness, NamedBytes, ParamSpec, ParamValues, PointArray, StepReport, Surface, Vec3 };
 
 /** A point cloud: positions, packed xyz, with normals and colours if known. */
 export interface Cloud {
-  points: Float32Array;
+  points: PointArray;
   normals?: Float32Array;
   /** Colours of the points, rgb in 0..1. */
   colors?: Float32Array;
@@ -139,12 +141,12 @@ export interface Requests extends CodeRequests {
    */
   setEdits: { body: Edits; reply: undefined };
   save: { body: undefined; reply: SavedSurface };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
   /**
    * Replies with the fitted function f sampled on a grid around the points, `size` voxels along the longest side, as
-   * NIfTI, and with the level of f at which the surface is extracted.
+   * a file, and with the level of f at which the surface is extracted.
    */
-  volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };
+  volume: { body: { size: number }; reply: VolumeBytes & { level: number } };
   quantity: { body: PointQuantity | undefined; reply: undefined };
   /**
    * Times solves with subsamples of the loaded points, without edits, for each of the `sizes` (numbers of points) and
@@ -186,8 +188,8 @@ export interface MeasuredEvent {
  */
 export interface ConstraintsEvent {
   event: 'constraints';
-  surface: Float32Array;
-  exterior: Float32Array;
+  surface: PointArray;
+  exterior: PointArray;
 }
 export interface TimedEvent {
   event: 'timed';

@@ -8,6 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, RunRecorder } from '../worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work } from '../worker/serving';
 import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
+import { fileOf } from '../worker/volumes';
 import { pointsFile, programOf } from './code';
 import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
@@ -16,6 +17,7 @@ import type {
   Edits,
   Loaded,
   ParamValues,
+  PointArray,
   PointQuantity,
   Ready,
   Requests,
@@ -73,7 +75,7 @@ class Session {
       return toCode(this.#log.log, (setup) => programOf(setup, data, stem), edits);
     },
     data: () => ({ extension: 'xyz', bytes: pointsFile(this.#file, this.#points().points) }),
-    export: ({ format }) => this.#current().mesh.toBytes(format),
+    export: ({ format, recentre = false }) => this.#current().mesh.toBytes(format, { recentre }),
     volume: ({ size }) => this.#volume(size),
     quantity: (quantity) => this.#setQuantity(quantity),
     timing: (body) => this.#time(body),
@@ -130,7 +132,7 @@ class Session {
     return this.#cloud;
   }
 
-  #pointsInForce(): Float32Array {
+  #pointsInForce(): PointArray {
     const { points } = this.#points();
     return this.#setup ? applyEdits(points, this.#setup.edits) : points;
   }
@@ -271,7 +273,7 @@ class Session {
     const model = this.#current();
     const volume = model.toVolume(cubicDims(this.#pointsInForce(), size));
     try {
-      return { bytes: volume.toNifti(), level: levelOf(model) };
+      return { ...fileOf(volume), level: levelOf(model) };
     } finally {
       volume.free();
     }

@@ -2,8 +2,8 @@
  * Approximate deformation of a surface by its control ellipsoids, the same as the first stage of a step of the model.
  * Makes the displayed surface follow a dragged ellipsoid before the model's result arrives.
  */
-import { lengthsOf } from './ellipsoids';
-import type { ControlEllipsoid, Pose, Vec3 } from './protocol';
+import { lengthsOf, moved, times } from './ellipsoids';
+import type { ControlEllipsoid, Pose, Surface, Vec3 } from './protocol';
 
 /**
  * Softening term of the weight of an ellipsoid at a point, 1 / (term + d²), where d is the point's distance in units of
@@ -21,6 +21,12 @@ export function deformPoints(points: Float32Array, before: Pose, after: Pose, co
   const out = new Float32Array(points.length);
   for (let i = 0; i < 3 * count; i += 3) deformPoint(points, i, maps, out);
   return out;
+}
+
+/** Returns the positions of the vertices of a surface, moved as by {@link deformPoints}, relative to its origin. */
+export function deformSurface({ positions, vertices, origin }: Surface, before: Pose, after: Pose): Float32Array {
+  const [from, to] = [before, after].map((pose) => pose.map((one) => moved(one, times(origin, -1)))) as [Pose, Pose];
+  return deformPoints(positions, from, to, vertices);
 }
 
 /**

@@ -22,9 +22,9 @@ const MIN_SEMI_AXIS = 0.03;
  */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
-  const { positions } = mesh.arrays();
+  const { positions } = mesh.arrays({ relative: true });
   const axes = principalAxes(inertia);
-  const local = project(positions, centroid, axes);
+  const local = project(positions, added(centroid, times(mesh.origin, -1)), axes);
   const spans = [0, 1, 2].map((k) => spanOf(local, k));
   const [long = 1, ...others] = spans.map(([low, high]) => high - low);
   const size = Math.max(long, ...others);

@@ -9,10 +9,10 @@
 import type { ControlEllipsoid, MeshTexture } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
-  MeshFormat,
   NamedBytes,
   ParamSpec,
   ParamValues,
@@ -25,18 +25,7 @@ import type { RunLog } from '../worker/run-log';
 import type { Film } from './film';
 import type { ComputedMesh } from './shapes';
 
-export type {
-  ControlEllipsoid,
-  Failure,
-  MeshFormat,
-  MeshTexture,
-  NamedBytes,
-  ParamSpec,
-  ParamValues,
-  StepReport,
-  Surface,
-  Vec3,
-};
+export type { ControlEllipsoid, Failure, MeshTexture, NamedBytes, ParamSpec, ParamValues, StepReport, Surface, Vec3 };
 
 /** All control ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
@@ -187,7 +176,7 @@ export interface Requests extends CodeRequests {
    */
   record: { body: { frameSeconds: number }; reply: Uint8Array | undefined };
   cancelRecord: { body: undefined; reply: undefined };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

@@ -95,7 +95,7 @@ class Session {
     stages: (kind) => stagesOf(kind),
     record: (body) => this.#record(body.frameSeconds),
     cancelRecord: () => this.#recording.stop(),
-    export: ({ format }) => this.#current().mesh.toBytes(format),
+    export: ({ format, recentre = false }) => this.#current().mesh.toBytes(format, { recentre }),
   };
 
   shown({ serial }: ShownMessage): void {

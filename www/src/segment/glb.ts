@@ -16,12 +16,13 @@ export async function toGlb(labels: readonly Label[], surfaces: ReadonlyMap<numb
   return new Uint8Array(result);
 }
 
-function meshOf({ name, color }: Label, { positions, normals, indices, vertices, triangles }: Surface): Mesh {
+function meshOf({ name, color }: Label, { positions, normals, indices, vertices, triangles, origin }: Surface): Mesh {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new BufferAttribute(positions.slice(0, 3 * vertices), 3));
   geometry.setAttribute('normal', new BufferAttribute(normals.slice(0, 3 * vertices), 3));
   geometry.setIndex(new BufferAttribute(indices.slice(0, 3 * triangles), 1));
   const mesh = new Mesh(geometry, new MeshStandardMaterial({ name, color, roughness: 0.62, metalness: 0 }));
   mesh.name = name;
+  mesh.position.set(...origin);
   return mesh;
 }

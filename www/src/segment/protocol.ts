@@ -2,11 +2,20 @@
  * Messages between the page and the worker of the Segment lab. Both sides import this file, and neither imports the
  * other's code.
  */
-import type { MeshFormat, VolumeFormat } from 'vesicle';
-import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
+import type { VolumeFormat } from 'vesicle';
+import type {
+  ExportRequest,
+  FailureEvent,
+  NamedBytes,
+  ParamSpec,
+  ParamValues,
+  Surface,
+  Vec3,
+  VolumeView,
+} from '../protocol';
 import type { KnownLabel, Label } from './labels';
 
-export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
+export type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
 
 /** Voxels of a label map, in the type in which they are stored in a file; 0 is the background. */
 export type LabelArray = Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Int32Array;
@@ -110,7 +119,7 @@ export interface Requests {
   /** Replies with the label map as a file, in the geometry of the volume; NRRD has names and colours of the labels, too. */
   exportMap: { body: { format: VolumeFormat; labels: readonly Label[] }; reply: Uint8Array };
   /** Replies with the surface of a label as a file. */
-  exportMesh: { body: { value: number; format: MeshFormat }; reply: Uint8Array };
+  exportMesh: { body: ExportRequest & { value: number }; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

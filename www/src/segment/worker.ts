@@ -7,7 +7,7 @@ import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
 import { triangleArea } from '../worker/triangle-area';
-import { viewOf } from '../worker/volumes';
+import { fitsNifti, viewOf } from '../worker/volumes';
 import type {
   LabelArray,
   LabelBlock,
@@ -101,8 +101,8 @@ class LiveMap {
       normals: new Float32Array(numbers),
       indices: new Uint32Array(corners),
     };
-    mesh.copyTo(arrays);
-    return { ...arrays, vertices, triangles };
+    mesh.copyTo(arrays, { relative: true });
+    return { ...arrays, vertices, triangles, origin: mesh.origin };
   }
 
   #count(label: number, change: number): void {
@@ -128,10 +128,14 @@ class Session {
     mask: ({ low, high }) => this.#mask(low, high),
     exportMap: ({ format, labels }) => {
       const { map } = this.#current();
+      if (format === 'nifti' && !fitsNifti(map)) throw new Refusal('precision', text('segment.tooFarForNifti'));
       const file = map.toBytes(format, { gzip: true });
       return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
     },
-    exportMesh: ({ value, format }) => this.#current().surfaces.mesh(value).toBytes(format),
+    exportMesh: ({ value, ...request }) =>
+      this.#current()
+        .surfaces.mesh(value)
+        .toBytes(request.format, { recentre: request.recentre ?? false }),
   };
 
   async #openImage({ name, source, params, labels, state }: Requests['open']['body']): Promise<OpenedImage> {

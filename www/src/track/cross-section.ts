@@ -1,15 +1,17 @@
 /** Intersects a surface with a plane, and the resulting segments with a row of an image, to draw outlines on slices. */
-import type { Plane, Surface } from '../protocol';
+import { inWorld } from '../placing';
+import type { Plane, PointArray, Surface, Vec3 } from '../protocol';
 
 /**
  * Returns the cross-section of a surface with a plane, as segments: pairs of points in world coordinates, packed xyz.
  */
 export function crossSection(
-  { positions, indices, vertices, triangles }: Surface,
+  { positions, indices, vertices, triangles, origin: from }: Surface,
   { origin, normal }: Plane,
-): Float32Array {
+): PointArray {
   const heights = new Float32Array(vertices);
-  const offset = normal[0] * origin[0] + normal[1] * origin[1] + normal[2] * origin[2];
+  const [x, y, z] = origin.map((value, axis) => value - (from[axis] ?? 0)) as Vec3;
+  const offset = normal[0] * x + normal[1] * y + normal[2] * z;
   for (let i = 0; i < vertices; i++) {
     const height =
       normal[0] * (positions[3 * i] ?? 0) +
@@ -23,16 +25,16 @@ export function crossSection(
   for (let i = 0; i < 3 * triangles; i += 3) {
     for (let side = 0; side < 3; side++) {
       const [a, b] = [indices[i + side] ?? 0, indices[i + ((side + 1) % 3)] ?? 0];
-      const [from, to] = [heights[a] ?? 0, heights[b] ?? 0];
-      if (from > 0 === to > 0) continue;
-      const part = from / (from - to);
+      const [here, there] = [heights[a] ?? 0, heights[b] ?? 0];
+      if (here > 0 === there > 0) continue;
+      const part = here / (here - there);
       for (let k = 0; k < 3; k++) {
         const [x, y] = [positions[3 * a + k] ?? 0, positions[3 * b + k] ?? 0];
         out.push(x + part * (y - x));
       }
     }
   }
-  return Float32Array.from(out);
+  return inWorld(Float32Array.from(out), from);
 }
 
 /**

@@ -7,13 +7,14 @@
 import type { FrameStatistics } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
-  MeshFormat,
   NamedBytes,
   ParamSpec,
   ParamValues,
+  PointArray,
   StateEvent,
   StepReport,
   Surface,
@@ -28,10 +29,10 @@ export type {
   Failure,
   FrameStatistics,
   Measures,
-  MeshFormat,
   NamedBytes,
   ParamSpec,
   ParamValues,
+  PointArray,
   StepReport,
   Surface,
   Vec3,
@@ -135,7 +136,7 @@ export interface SavedTrack {
  */
 export interface BoundaryVotes {
   frame: number;
-  points: Float32Array;
+  points: PointArray;
   weights: Float32Array;
 }
 
@@ -201,7 +202,7 @@ export interface Requests extends CodeRequests {
   view: { body: undefined; reply: VolumeView };
   /** Makes the worker send a state event, `done` or `paused`, to the page. */
   sendState: { body: undefined; reply: undefined };
-  export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest & { frame: number }; reply: Uint8Array };
   /** Replies with all tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
   /** Tracks all frames with another setup, for comparison; replies with undefined if cancelled. */

@@ -1,6 +1,7 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
 
 import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
+import { likewise } from '../placing';
 import { text } from '../texts';
 import { toCode } from '../worker/code';
 import { Refusal, toFailure } from '../worker/refusal';
@@ -18,6 +19,7 @@ import type {
   ComparedTrack,
   OpenedImage,
   ParamValues,
+  PointArray,
   Preparation,
   Ready,
   Requests,
@@ -78,7 +80,7 @@ class Session {
     restore: (saved) => this.#restore(saved),
     view: () => this.#view(),
     sendState: () => this.#reportStopped(),
-    export: ({ frame, format }) => this.#export(frame, format),
+    export: (body) => this.#export(body),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => this.#comparison.stop(),
@@ -264,9 +266,9 @@ class Session {
   }
 
   #votes(frame: number): BoundaryVotes {
-    const all = this.#current().boundary(frame);
+    const all: PointArray = this.#current().boundary(frame);
     const count = all.length / 5;
-    const [points, weights] = [new Float32Array(3 * count), new Float32Array(count)];
+    const [points, weights] = [likewise(all, 3 * count), new Float32Array(count)];
     for (let i = 0; i < count; i++) {
       points.set(all.subarray(5 * i, 5 * i + 3), 3 * i);
       weights[i] = all[5 * i + 4] ?? 0;
@@ -300,10 +302,10 @@ class Session {
     return toCode(this.#log.log, program, edits);
   }
 
-  #export(frame: number, format: Requests['export']['body']['format']): Uint8Array {
+  #export({ frame, format, recentre = false }: Requests['export']['body']): Uint8Array {
     const mesh = this.#current().meshAt(frame);
     try {
-      return mesh.toBytes(format);
+      return mesh.toBytes(format, { recentre });
     } finally {
       mesh.free();
     }

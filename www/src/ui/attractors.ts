@@ -1,8 +1,9 @@
+import { shortened } from '../placing';
 import type { Attractor, Vec3 } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
 import { labelFor } from './field';
-import { figure } from './format';
+import { place } from './format';
 
 const STRENGTH = 0.1;
 const PLACE = text('extractPanels.attractorPlace');
@@ -83,6 +84,11 @@ export class AttractorControls {
     this.#radius = Number(radius.toPrecision(2));
   }
 
+  /** Size of what attractors are placed in, about ten times the radius of one. */
+  get #size(): number {
+    return 10 * this.#radius;
+  }
+
   show(attractors: Attractor[]): void {
     this.#attractors = attractors;
     this.#error.textContent = '';
@@ -94,7 +100,7 @@ export class AttractorControls {
   }
 
   add(point: Vec3): void {
-    const rounded = point.map((x) => Number(x.toPrecision(6))) as Vec3;
+    const rounded = point.map((x) => shortened(x, 6, this.#size)) as Vec3;
     this.#change(
       [...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }],
       text('extractPanels.newAttractor'),
@@ -115,7 +121,7 @@ export class AttractorControls {
 
   #item(attractor: Attractor, index: number): HTMLElement {
     const name = text('extractPanels.attractorName', { number: index + 1 });
-    const where = attractor.point.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
+    const where = place(attractor.point, this.#size);
     const goTo = h(
       'button',
       {

@@ -1,7 +1,7 @@
 import type { CoverageProgressEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../protocol';
 import { plural, text } from '../texts';
 import { h } from './dom';
-import { count, figure, lengths } from './format';
+import { count, lengths, place } from './format';
 import { TaskControls } from './task';
 
 /**
@@ -33,6 +33,8 @@ export class CoveragePanel {
   readonly element: HTMLElement;
   /** Unit of length in the volume's world space, for areas; empty if unknown. */
   unit = '';
+  /** Size of the volume, to which positions are rounded. */
+  size = 0;
   readonly #events: CoverageEvents;
   readonly #task: TaskControls;
   readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
@@ -120,7 +122,7 @@ export class CoveragePanel {
   }
 
   #item({ kind, area, position }: UncoveredRegion): HTMLElement {
-    const where = position.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
+    const where = place(position, this.size);
     const size = lengths([Number(area.toPrecision(3))], this.unit, 2);
     const label = text('extractPanels.uncoveredShow', { kind: KINDS[kind], size, where });
     const goTo = h(

@@ -1,4 +1,5 @@
-import { lengthsOf, turned, withLengths } from '../sculpt/ellipsoids';
+import { shortened } from '../placing';
+import { boxOf, lengthsOf, turned, withLengths } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Vec3 } from '../sculpt/protocol';
 import { text } from '../texts';
 import type { HandleMode } from '../view/handles';
@@ -158,7 +159,7 @@ export class EllipsoidControls {
     const lengths = lengthsOf(ellipsoid);
     for (let k = 0; k < 3; k++) {
       const [center, length] = [this.#center[k], this.#lengths[k]];
-      if (center && center !== document.activeElement) center.value = short(ellipsoid.center[k] ?? 0);
+      if (center && center !== document.activeElement) center.value = short(ellipsoid.center[k] ?? 0, this.#size);
       if (length && length !== document.activeElement) length.value = short(lengths[k] ?? 0);
     }
   }
@@ -213,6 +214,12 @@ export class EllipsoidControls {
     return input;
   }
 
+  /** Size of the box around all ellipsoids. */
+  get #size(): number {
+    const { min, max } = boxOf(this.#pose);
+    return Math.max(...max.map((high, k) => high - (min[k] ?? 0)));
+  }
+
   get #ellipsoid(): ControlEllipsoid | undefined {
     return this.#chosen === undefined ? undefined : this.#pose[this.#chosen];
   }
@@ -256,7 +263,7 @@ export class EllipsoidControls {
     if (ellipsoid) {
       const lengths = lengthsOf(ellipsoid);
       this.#center.forEach((field, k) => {
-        field.value = short(ellipsoid.center[k] ?? 0);
+        field.value = short(ellipsoid.center[k] ?? 0, this.#size);
       });
       this.#lengths.forEach((field, k) => {
         field.value = short(lengths[k] ?? 0);
@@ -266,7 +273,10 @@ export class EllipsoidControls {
   }
 }
 
-/** Formats a coordinate or length with four significant digits; dragging is no more precise. */
-function short(value: number): string {
-  return String(Number(value.toPrecision(4)));
+/**
+ * Formats a length, or a coordinate in a scene of this size, with four significant digits, far from the origin with
+ * more; dragging is no more precise.
+ */
+function short(value: number, size = 0): string {
+  return String(shortened(value, 4, size));
 }

@@ -1,6 +1,8 @@
-import type { MeshFormat } from '../protocol';
+import type { ExportRequest, Vec3 } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
+
+type MeshFormat = ExportRequest['format'];
 
 const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   {
@@ -15,12 +17,43 @@ const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   { format: 'mz3', help: text('controls.exportMz3'), type: 'application/octet-stream' },
 ];
 
+/** Message that a format is too coarse for the surface where it is, with a button that saves it moved to the origin. */
+export class RecentreOffer {
+  readonly element: HTMLElement;
+  readonly #message = h('p', { class: 'help' });
+  readonly #save = h('button', { type: 'button', 'data-action': 'recentre' });
+
+  constructor() {
+    this.element = h('div', { role: 'status', hidden: true }, this.#message, this.#save);
+  }
+
+  /** Shows the message; `save` saves the surface with positions relative to `origin`. */
+  show(format: string, origin: Vec3, save: () => void): void {
+    const name = format.toUpperCase();
+    this.#message.textContent = text('controls.tooFar', { format: name, origin: origin.join(', ') });
+    this.#save.textContent = text('controls.saveRecentred', { format: name });
+    this.#save.onclick = save;
+    this.element.hidden = false;
+  }
+
+  hide(): void {
+    this.element.hidden = true;
+  }
+}
+
+/** Added to the names of files whose surface is moved to the origin. */
+export const RECENTRED = '-recentred';
+
 /** Buttons that save the current surface, one for each mesh file format. */
 export class ExportButtons {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[];
+  readonly #offer = new RecentreOffer();
+  readonly #onExport: (request: ExportRequest, type: string) => void;
 
-  constructor(onExport: (format: MeshFormat, type: string) => void) {
+  /** `onExport` is called again for a surface that is to be moved to the origin, after an {@link offer}. */
+  constructor(onExport: (request: ExportRequest, type: string) => void) {
+    this.#onExport = onExport;
     this.#buttons = FORMATS.map(({ format, help, type }) => {
       const attributes = {
         type: 'button',
@@ -28,12 +61,25 @@ export class ExportButtons {
         'aria-label': text('controls.saveAs', { format: help }),
         'data-export': format,
       };
-      return h('button', { ...attributes, onclick: () => onExport(format, type) }, format.toUpperCase());
+      const onclick = () => {
+        this.#offer.hide();
+        onExport({ format }, type);
+      };
+      return h('button', { ...attributes, onclick }, format.toUpperCase());
     });
-    this.element = h('div', { class: 'buttons exports' }, ...this.#buttons);
+    this.element = h('div', {}, h('div', { class: 'buttons exports' }, ...this.#buttons), this.#offer.element);
+  }
+
+  /** Offers to save the surface relative to `origin`, since the format is too coarse for it where it is. */
+  offer(format: MeshFormat, type: string, origin: Vec3): void {
+    this.#offer.show(format, origin, () => {
+      this.#offer.hide();
+      this.#onExport({ format, recentre: true }, type);
+    });
   }
 
   set enabled(enabled: boolean) {
+    if (!enabled) this.#offer.hide();
     for (const button of this.#buttons) button.disabled = !enabled;
   }
 }

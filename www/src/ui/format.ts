@@ -1,3 +1,5 @@
+import { decimals, shortened } from '../placing';
+import type { Vec3 } from '../protocol';
 import { LANGUAGE, text } from '../texts';
 
 export { count } from '../texts';
@@ -11,6 +13,19 @@ export function figure(value: number): string {
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-3 || size >= 1e7)) return value.toExponential(2);
   return new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 }).format(value);
+}
+
+/**
+ * Formats a point with four significant digits of each coordinate, or with as many decimals as say as much of something
+ * of this size where it is far from the origin.
+ */
+export function place(point: Vec3, size: number): string {
+  const far = new Intl.NumberFormat(LANGUAGE, {
+    maximumFractionDigits: Math.min(20, decimals(size, 4)),
+    useGrouping: false,
+  });
+  const isFar = point.some((value) => shortened(value, 4, size) !== Number(value.toPrecision(4)));
+  return point.map((value) => (isFar ? far.format(value) : figure(Number(value.toPrecision(4))))).join(', ');
 }
 
 /** Units of length, each a thousandth of the one before. */

@@ -30,13 +30,13 @@ export class CameraMarks {
 
   set visible(visible: boolean) {
     this.#visible = visible;
-    this.#all.show(new Float32Array(visible ? this.#cameras.flatMap((camera) => pyramid(camera, this.#depth)) : []));
+    this.#all.show(visible ? this.#cameras.flatMap((camera) => pyramid(camera, this.#depth)) : []);
     this.#chosen.object.visible &&= visible;
   }
 
   choose(index: number | undefined): void {
     const camera = index === undefined ? undefined : this.#cameras[index];
-    this.#chosen.show(new Float32Array(camera && this.#visible ? pyramid(camera, this.#depth) : []));
+    this.#chosen.show(camera && this.#visible ? pyramid(camera, this.#depth) : []);
   }
 
   /** Camera centres in world space, to fit the view to. */

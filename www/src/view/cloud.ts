@@ -1,4 +1,5 @@
 import { BufferAttribute, BufferGeometry, CanvasTexture, Points, PointsMaterial } from 'three';
+import { placed } from '../placing';
 import { linearColors } from './shading';
 
 /** A point cloud drawn as small discs that face the viewer, in one colour or with a colour per point. */
@@ -24,11 +25,13 @@ export class PointCloud {
     this.#material.size = size;
   }
 
-  /** Shows points, packed xyz; `colors` are sRGB of each point, 0..1. */
-  show(points: Float32Array, colors?: Float32Array): void {
+  /** Shows points in world space, packed xyz; `colors` are sRGB of each point, 0..1. */
+  show(points: ArrayLike<number>, colors?: Float32Array): void {
     this.object.geometry.dispose();
     const geometry = new BufferGeometry();
-    geometry.setAttribute('position', new BufferAttribute(points, 3));
+    const drawn = placed(points);
+    this.object.position.set(...drawn.origin);
+    geometry.setAttribute('position', new BufferAttribute(drawn.points, 3));
     if (colors) {
       const linear = new Float32Array(colors.length);
       linearColors(colors, linear);

@@ -1,4 +1,5 @@
 import { BufferAttribute, BufferGeometry, type ColorRepresentation, LineBasicMaterial, LineSegments } from 'three';
+import { placed } from '../placing';
 
 /** Line segments in the 3D view that change every frame, in a GPU buffer with spare capacity. */
 export class Lines {
@@ -10,13 +11,15 @@ export class Lines {
     this.object.visible = false;
   }
 
-  /** Shows segments given as pairs of points, packed xyz; they are copied. */
-  show(points: Float32Array): void {
+  /** Shows segments given as pairs of points in world space, packed xyz; they are copied. */
+  show(points: ArrayLike<number>): void {
     const count = points.length / 3;
     this.object.visible = count > 0;
     if (count === 0) return;
     const position = this.#reserve(count);
-    (position.array as Float32Array).set(points);
+    const drawn = placed(points);
+    this.object.position.set(...drawn.origin);
+    (position.array as Float32Array).set(drawn.points);
     position.clearUpdateRanges();
     position.addUpdateRange(0, points.length);
     position.needsUpdate = true;

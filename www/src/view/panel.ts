@@ -1,4 +1,4 @@
-import type { Attractor, LevelView, UncoveredRegion, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, PointArray, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { text } from '../texts';
 import { context2d, h, token, uniqueId } from '../ui/dom';
 import { nearestVoxel, SLICE_NAMES, type SliceOrientation } from './anatomy';
@@ -124,7 +124,7 @@ export class SlicePanel {
   }
 
   /** Shows the cross-section of the surface with this slice, given as pairs of world points. */
-  setOutline(segments: Float32Array): void {
+  setOutline(segments: PointArray): void {
     this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.orientation);
     this.draw();
     this.#describe();

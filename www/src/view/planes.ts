@@ -13,7 +13,8 @@ import {
   SRGBColorSpace,
   Vector3,
 } from 'three';
-import type { Vec3 } from '../protocol';
+import { placed } from '../placing';
+import type { PointArray, Vec3 } from '../protocol';
 import { type Grid, type SliceOrientation, toWorld } from './anatomy';
 import { Lines } from './lines';
 
@@ -36,6 +37,8 @@ export class SlicePlane {
   readonly #material: MeshBasicMaterial;
   readonly #line: LineBasicMaterial;
   readonly #section: Lines;
+  /** The rectangle and its frame. */
+  readonly #slice = new Group();
   #index = 0;
 
   /** `picture` contains the slice image, oriented as specified by `orientation`; it is the rectangle's texture. */
@@ -61,7 +64,8 @@ export class SlicePlane {
     this.#geometry.setIndex([0, 3, 2, 0, 2, 1]);
     this.#outline.setAttribute('position', this.#geometry.getAttribute('position'));
     const rectangle = new Mesh(this.#geometry, this.#material);
-    this.object.add(rectangle, new LineLoop(this.#outline, this.#line), this.#section.object);
+    this.#slice.add(rectangle, new LineLoop(this.#outline, this.#line));
+    this.object.add(this.#slice, this.#section.object);
   }
 
   /** Moves the rectangle to the slice with the given index, and uploads its texture, which the caller has repainted. */
@@ -74,7 +78,9 @@ export class SlicePlane {
       [1, 1],
       [0, 1],
     ] as const;
-    for (const [i, [u, v]] of corners.entries()) position.setXYZ(i, ...this.#corner(index, u, v));
+    const { points, origin } = placed(corners.flatMap(([u, v]) => this.#corner(index, u, v)));
+    position.copyArray(points);
+    this.#slice.position.set(...origin);
     position.needsUpdate = true;
     this.#geometry.computeBoundingSphere();
     this.#outline.boundingSphere = this.#geometry.boundingSphere;
@@ -87,7 +93,7 @@ export class SlicePlane {
   }
 
   /** Shows the cross-section of the surface with this slice, given as pairs of world points, packed xyz. */
-  showSection(segments: Float32Array): void {
+  showSection(segments: PointArray): void {
     this.#section.show(segments);
   }
 

@@ -1,6 +1,6 @@
 import { Box3, Plane, type Raycaster, Vector3 } from 'three';
 import { EditedView } from '../finish/edited-view';
-import type { Surface, Vec3 } from '../protocol';
+import type { PointArray, Surface, Vec3 } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { PictureSubject } from '../ui/pictures';
@@ -33,7 +33,7 @@ export interface CloudViewOptions {
 
 /** Points to show in the Reconstruct lab's 3D view, their cameras, and the orientation of the view. */
 export interface ShownCloud {
-  points: Float32Array;
+  points: PointArray;
   /** Colours of the points, packed sRGB, 0..1; missing if there are none. */
   colors?: Float32Array | undefined;
   cameras: readonly PinholeCamera[];
@@ -100,25 +100,25 @@ export class ReconstructionView {
     this.#viewport.up = up;
     this.#front = front;
     this.showPoints(points, colors);
-    this.showByHand(new Float32Array(0), new Float32Array(0));
+    this.showByHand([], []);
     this.showConstraints(new Float32Array(0), new Float32Array(0));
     this.clearSurface();
     this.#fitView();
   }
 
-  showPoints(points: Float32Array, colors: Float32Array | undefined): void {
+  showPoints(points: PointArray, colors: Float32Array | undefined): void {
     this.#points.show(points, colors);
     this.#viewport.invalidate();
   }
 
-  /** Shows the user's edits of the points, emphasised: points added, and points marked as outside, both packed xyz. */
-  showByHand(added: Float32Array, outside: Float32Array): void {
-    this.#addedByHand.show(added);
-    this.#outsideByHand.show(outside);
+  /** Shows the user's edits of the points, emphasised: points added, and points marked as outside. */
+  showByHand(added: readonly Vec3[], outside: readonly Vec3[]): void {
+    this.#addedByHand.show(added.flat());
+    this.#outsideByHand.show(outside.flat());
     this.#viewport.invalidate();
   }
 
-  showConstraints(surface: Float32Array, exterior: Float32Array): void {
+  showConstraints(surface: PointArray, exterior: PointArray): void {
     this.#inside.show(surface);
     this.#outside.show(exterior);
     this.#viewport.invalidate();
@@ -242,12 +242,12 @@ export class ReconstructionView {
  * Returns the bounding box of the points without the outermost {@link OUTLIER_FRACTION} at either end of each axis,
  * enlarged on all sides by 3 % of its diagonal.
  */
-function robustBox(points: Float32Array): Box3 {
+function robustBox(points: PointArray): Box3 {
   const box = new Box3();
   const count = points.length / 3;
   const [low, high] = [new Vector3(), new Vector3()];
   for (let axis = 0; axis < 3; axis++) {
-    const sorted = Float32Array.from({ length: count }, (_, i) => points[3 * i + axis] ?? 0).sort();
+    const sorted = Float64Array.from({ length: count }, (_, i) => points[3 * i + axis] ?? 0).sort();
     const [first, last] = [Math.floor(OUTLIER_FRACTION * (count - 1)), Math.ceil((1 - OUTLIER_FRACTION) * (count - 1))];
     low.setComponent(axis, sorted[first] ?? 0);
     high.setComponent(axis, sorted[last] ?? 0);

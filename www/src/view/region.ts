@@ -91,11 +91,11 @@ function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims
  * Returns the twelve edges of a box of voxels, `low` to `high`, as pairs of world points, packed xyz; `affine` maps
  * voxel indices to world space.
  */
-export function regionEdges({ low, high }: VoxelBox, affine: ArrayLike<number>): Float32Array {
+export function regionEdges({ low, high }: VoxelBox, affine: ArrayLike<number>): number[] {
   const corner = (i: number) =>
     toWorld(affine, low.map((from, k) => ((i >> k) & 1 ? (high[k] ?? 0) + 0.5 : from - 0.5)) as Vec3);
   const edges: number[] = [];
   for (let i = 0; i < 8; i++)
     for (let k = 0; k < 3; k++) if (!((i >> k) & 1)) edges.push(...corner(i), ...corner(i | (1 << k)));
-  return Float32Array.from(edges);
+  return edges;
 }

@@ -112,7 +112,7 @@ export function ballSection(
   volume: Pick<VolumeView, 'dims' | 'spacing'>,
   orientation: SliceOrientation,
 ): { x: number; y: number; radiusX: number; radiusY: number; near: boolean } | undefined {
-  const [x = 0, y = 0] = projectSegments(new Float32Array(point), inverse, volume, orientation);
+  const [x = 0, y = 0] = projectSegments(point, inverse, volume, orientation);
   const { axis } = orientation;
   const row = [0, 4, 8].reduce((sum, column, i) => sum + (inverse[column + axis] ?? 0) * (point[i] ?? 0), 0);
   const off = Math.abs(row + (inverse[12 + axis] ?? 0) - slice);
@@ -130,7 +130,7 @@ export function ballSection(
  * voxel's centre is at (½, ½).
  */
 export function projectSegments(
-  segments: Float32Array,
+  segments: ArrayLike<number>,
   inverse: ArrayLike<number>,
   volume: Pick<VolumeView, 'dims'>,
   orientation: SliceOrientation,

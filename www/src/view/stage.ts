@@ -1,6 +1,6 @@
 import type { Raycaster, Vector3 } from 'three';
 import { EditedView } from '../finish/edited-view';
-import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, Plane, PointArray, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { crossSection } from '../track/cross-section';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
@@ -108,11 +108,11 @@ export class Stage {
   }
 
   /** Shows the cross-sections of the surface with the slice planes last passed to `onPlanes`, in the same order. */
-  showSections(sections: Float32Array[]): void {
+  showSections(sections: PointArray[]): void {
     if (!this.#surface.edited) this.#drawSections(sections);
   }
 
-  #drawSections(sections: Float32Array[]): void {
+  #drawSections(sections: PointArray[]): void {
     sections.forEach((section, axis) => {
       this.#scene?.panels[axis]?.setOutline(section);
       this.#scene?.planes[axis]?.showSection(section);

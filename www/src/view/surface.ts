@@ -48,7 +48,10 @@ export type SurfaceColor = ColorMode | ShownQuantity | 'own' | 'texture';
  * a copy in between; arrays of the same capacity as the previous ones reuse the buffers.
  */
 export class SurfaceObject {
+  /** In the coordinates of the world. */
   readonly object = new Group();
+  /** The parts of the object, at the origin of the surface. */
+  readonly #placed = new Group();
   readonly #material = new MeshStandardMaterial({
     color: BONE,
     roughness: 0.62,
@@ -104,8 +107,9 @@ export class SurfaceObject {
     for (const part of [this.#mesh, this.#inside, this.#edges]) {
       // No culling: the surface nearly always fills the view, and bounding spheres are infinite.
       part.frustumCulled = false;
-      this.object.add(part);
+      this.#placed.add(part);
     }
+    this.object.add(this.#placed);
     for (const material of [this.#material, this.#plainMaterial, this.#inside.material, this.#edgeMaterial])
       material.clippingPlanes = clipping;
   }
@@ -123,12 +127,18 @@ export class SurfaceObject {
     if (shown) this.#display(shown);
   }
 
+  /** The surface shown last, without edits. */
+  get own(): Surface | undefined {
+    return this.#own;
+  }
+
   get edited(): Surface | undefined {
     return this.#edited;
   }
 
   #display(surface: Surface): void {
     this.#dropCoarse();
+    this.#placed.position.set(...surface.origin);
     this.#vertices = surface.vertices;
     this.#corners = 3 * surface.triangles;
     this.#takeOver(surface);
@@ -141,7 +151,7 @@ export class SurfaceObject {
   }
 
   /**
-   * Moves the vertices to other positions, packed xyz, in an array of the same length. Normals stay unchanged, since
+   * Moves the vertices to other positions relative to the surface's origin, packed xyz, in an array of the same length. Normals stay unchanged, since
    * this is only a preview until the next surface is shown.
    */
   move(positions: Float32Array): void {

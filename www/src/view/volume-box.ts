@@ -1,16 +1,17 @@
 import {
   BoxGeometry,
+  BufferAttribute,
   CanvasTexture,
   type ColorRepresentation,
   EdgesGeometry,
   Group,
   LineBasicMaterial,
   LineSegments,
-  Matrix4,
   Sprite,
   SpriteMaterial,
   SRGBColorSpace,
 } from 'three';
+import { placed } from '../placing';
 import type { Vec3 } from '../protocol';
 import { anatomyOf, type Grid, toWorld } from './anatomy';
 
@@ -70,8 +71,13 @@ function boxOf(grid: Grid, color: ColorRepresentation): LineSegments<EdgesGeomet
   const box = new BoxGeometry(nx, ny, nz).translate((nx - 1) / 2, (ny - 1) / 2, (nz - 1) / 2);
   const edges = new EdgesGeometry(box);
   box.dispose();
-  edges.applyMatrix4(new Matrix4().fromArray(grid.affine));
-  return new LineSegments(edges, new LineBasicMaterial({ color, transparent: true, opacity: 0.35 }));
+  const { array, count } = edges.getAttribute('position');
+  const corners = Array.from({ length: count }, (_, i) => Array.from(array.subarray(3 * i, 3 * i + 3)) as Vec3);
+  const { points, origin } = placed(corners.flatMap((corner) => toWorld(grid.affine, corner)));
+  edges.setAttribute('position', new BufferAttribute(points, 3));
+  const lines = new LineSegments(edges, new LineBasicMaterial({ color, transparent: true, opacity: 0.35 }));
+  lines.position.set(...origin);
+  return lines;
 }
 
 /**

@@ -2,7 +2,7 @@ import { Plane, Vector3 } from 'three';
 import type { LevelView, Vec3, VolumeView } from '../protocol';
 import { text } from '../texts';
 import { token } from '../ui/dom';
-import { count, figure } from '../ui/format';
+import { count, figure, place } from '../ui/format';
 import { type CutSide, SliceBar } from '../ui/slice-bar';
 import type { SlicePlacement } from '../ui/view-options';
 import { type Axis, anatomyOf, invert, type SliceOrientation, sliceOrientations, slicePlane, toWorld } from './anatomy';
@@ -12,6 +12,9 @@ import type { Drag } from './slice-gestures';
 import type { DisplayWindow } from './slicing';
 import type { Viewport } from './viewport';
 import { VolumeBox } from './volume-box';
+
+/** Returns the longest side of a volume. */
+const sizeOf = ({ dims, spacing }: VolumeView) => Math.max(...dims.map((n, axis) => n * (spacing[axis] ?? 1)));
 
 /** Pixels of a drag that double or halve the width of the displayed window, or move its level by its width. */
 const WINDOW_DRAG = 150;
@@ -166,9 +169,7 @@ export class VolumeScene {
       place: text(pointed ? 'slices.atPointer' : 'slices.atCrosshair'),
       voxel: voxel.join(', '),
       space: this.volume.space,
-      world: toWorld(this.volume.affine, voxel)
-        .map((x) => figure(Number(x.toPrecision(4))))
-        .join(', '),
+      world: place(toWorld(this.volume.affine, voxel), sizeOf(this.volume)),
       intensity: this.#intensityAt(voxel),
     });
     if (pointed) return;

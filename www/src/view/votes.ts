@@ -2,6 +2,7 @@
  * Displays boundary votes, which mark faces between two voxels that windows of the tracker separate, as points in space
  * and on slices, coloured by the share of windows that voted for them.
  */
+import { pointsAt, relativeTo } from '../placing';
 import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { BoundaryVotes } from '../track/protocol';
 import { type SliceOrientation, toWorld } from './anatomy';
@@ -30,9 +31,10 @@ export function voteColors(weights: Float32Array): Float32Array {
  */
 export function votesNear(
   { frame, points, weights }: BoundaryVotes,
-  { positions, vertices }: Surface,
+  { positions, vertices, origin }: Surface,
   reach: number,
 ): BoundaryVotes {
+  const local = relativeTo(origin, points);
   const cell = (p: Float32Array, i: number, k: number, off = 0) => Math.floor((p[3 * i + k] ?? 0) / reach) + off;
   // Hash collisions are harmless: a distant point is shown as well.
   const key = (x: number, y: number, z: number) =>
@@ -44,11 +46,9 @@ export function votesNear(
       taken.add(key(cell(positions, i, 0, dx), cell(positions, i, 1, dy), cell(positions, i, 2, dz)));
     }
   const near = [...weights.keys()].filter((i) =>
-    taken.has(key(cell(points, i, 0), cell(points, i, 1), cell(points, i, 2))),
+    taken.has(key(cell(local, i, 0), cell(local, i, 1), cell(local, i, 2))),
   );
-  const kept = new Float32Array(3 * near.length);
-  for (const [to, i] of near.entries()) kept.set(points.subarray(3 * i, 3 * i + 3), 3 * to);
-  return { frame, points: kept, weights: Float32Array.from(near, (i) => weights[i] ?? 0) };
+  return { frame, points: pointsAt(points, near), weights: Float32Array.from(near, (i) => weights[i] ?? 0) };
 }
 
 interface OnSlice {

@@ -1,6 +1,6 @@
 /** Returns JavaScript for a value of plain data; numbers are written so that they are read as the same numbers. */
 export function literal(value: unknown): string {
-  if (value instanceof Float32Array || value instanceof Uint32Array)
+  if (value instanceof Float32Array || value instanceof Float64Array || value instanceof Uint32Array)
     return `new ${value.constructor.name}(${literal([...value])})`;
   if (Array.isArray(value)) return `[${value.map(literal).join(', ')}]`;
   if (typeof value === 'object' && value !== null) {

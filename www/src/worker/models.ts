@@ -20,7 +20,7 @@ export function startOf({ start }: Setup, iso: number): Options['start'] {
     case 'isosurface':
       return { marchingCubes: iso };
     case 'sphere':
-      return { seeds: new Float32Array(start.center), radius: start.radius };
+      return { seeds: new Float64Array(start.center), radius: start.radius };
   }
 }
 

@@ -1,6 +1,7 @@
 /** Arrays with spare capacity in which a worker sends meshes to the page. */
 import type { Mesh } from 'vesicle';
-import type { Surface } from '../protocol';
+import { inWorld } from '../placing';
+import type { Plane, PointArray, Surface } from '../protocol';
 import { buffersOf } from './serving';
 
 /**
@@ -34,8 +35,13 @@ export function copySurface({ positions, normals, indices }: Arrays, mesh: Mesh)
     normals: normals.length === numbers ? normals : new Float32Array(numbers),
     indices: indices.length === corners ? indices : new Uint32Array(corners),
   };
-  const counts = mesh.copyTo(arrays);
-  return { ...arrays, ...counts };
+  const counts = mesh.copyTo(arrays, { relative: true });
+  return { ...arrays, ...counts, origin: mesh.origin };
+}
+
+/** Returns the cross-section of a mesh with a plane, as segments: pairs of points in world space, packed xyz. */
+export function sectionOf(mesh: Mesh, { origin, normal }: Plane): PointArray {
+  return inWorld(mesh.crossSection(origin, normal, { relative: true }), mesh.origin);
 }
 
 /** Copies a mesh into new arrays with spare capacity, with its texture coordinates if it has any. */

@@ -72,6 +72,28 @@ async function read(source: VolumeSource): Promise<VolumeInit> {
   return (await importVolume(source.files)) ?? readFiles(source.files);
 }
 
+/** A volume as a file, with the extension of its format. */
+export interface VolumeBytes {
+  extension: 'nii' | 'nrrd';
+  bytes: Uint8Array;
+}
+
+/** The part of a voxel by which a file may move the voxels: less than what any interpolation between them shows. */
+const MOVED = 1e-3;
+
+/** Returns whether NIfTI, which has positions in single precision, keeps the voxels of a volume where they are. */
+export function fitsNifti({ affine, spacing }: Pick<Volume, 'affine' | 'spacing'>): boolean {
+  const first = affine.slice(12, 15);
+  return first.every((value) => Math.abs(Math.fround(value) - value) <= MOVED * Math.min(...spacing));
+}
+
+/** Returns a volume as a file: NIfTI or, where that would move its voxels, NRRD. */
+export function fileOf(volume: Volume): VolumeBytes {
+  return fitsNifti(volume)
+    ? { extension: 'nii', bytes: volume.toNifti() }
+    : { extension: 'nrrd', bytes: volume.toBytes('nrrd', { gzip: true }) };
+}
+
 /** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */
 export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   const { range } = volume;
