@@ -25,7 +25,7 @@ struct Oriented {
     weight: f64,
 }
 
-/// Extracts the closed surfaces around all bright regions of the first frame, in world coordinates; an empty mesh if
+/// Extracts the closed surfaces around all bright regions of the first frame, in the working space; an empty mesh if
 /// the image has no boundary.
 pub(super) fn extract_bright_surface(
     region: &Region,
@@ -46,7 +46,7 @@ pub(super) fn extract_bright_surface(
     };
     let values = (0..distance.len()).map(value).collect();
     let mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
-    Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
+    Ok(mesh.transformed(&(region.to_space * DAffine3::from_scale(region.spacing))))
 }
 
 /// Returns the centres of the faces that separate bright from dark in the first frame, those with a weight of at least

@@ -29,6 +29,7 @@ mod samples;
 mod start;
 mod state;
 mod vote;
+mod working_space;
 
 pub use frame_tracker::FrameStatistics;
 pub use params::TrackingParams;
@@ -108,7 +109,7 @@ pub struct SurfaceTracker {
     /// The boundary points around the newest tracked frame in time, `None` before the first.
     samples: Option<SpaceTimeSamples>,
     mesh: Mesh,
-    /// The surface of each frame tracked so far, in world coordinates.
+    /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
     cycle_closure_error: Option<f64>,
@@ -166,12 +167,12 @@ impl SurfaceTracker {
         let noise = region.noise() * region.quantum;
         let image = ImageStatistics {
             shortest_side,
-            longest_side: region.longest_side(),
+            longest_side: region.longest_side() / region.space.scale,
             noise,
             range: region.span(),
         };
         let start =
-            start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::validate_start(mesh, &region))?;
+            start.as_ref().map_or(Ok(region.space.empty_mesh()), |mesh| start::validate_start(mesh, &region))?;
         let mut tracker = Self {
             voting: BoundaryVoting::new(Window::default(), 0),
             mesh: start.clone(),
@@ -267,13 +268,20 @@ impl SurfaceTracker {
         self.image.noise
     }
 
-    /// Returns the surface in the newest frame, in world coordinates; before the first frame is done, the caller's
+    /// Returns the origin in world space of all meshes and boundary points that the tracker gives: their coordinates plus
+    /// this are those in the world. It is 0 unless the volume is far from the world's origin for its size, where single
+    /// precision would be too coarse.
+    pub fn origin(&self) -> DVec3 {
+        self.region.space.origin
+    }
+
+    /// Returns the surface in the newest frame, relative to [`Self::origin`]; before the first frame is done, the caller's
     /// start, or an empty mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Returns the surface of each frame tracked so far, in world coordinates; positions and triangles only.
+    /// Returns the surface of each frame tracked so far, relative to [`Self::origin`]; positions and triangles only.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
@@ -305,15 +313,16 @@ impl SurfaceTracker {
         self.faces.len()
     }
 
-    /// Returns the boundary points of a frame: x, y, z in world coordinates, t in frames, and the weight (share of
-    /// votes, up to 1), for display. Empty until the boundary of the frame has been found.
+    /// Returns the boundary points of a frame: x, y, z relative to [`Self::origin`], t in frames, and the weight (share
+    /// of votes, up to 1), for display. Empty until the boundary of the frame has been found.
     pub fn boundary(&self, frame: usize) -> Vec<[f32; 5]> {
         let Some(faces) = self.faces.get(frame) else { return Vec::new() };
         let mut points = Vec::new();
         for (direction, list) in faces.iter().enumerate() {
             for face in list {
                 let (position, later) = self.region.face(direction, face.voxel);
-                let [x, y, z] = self.region.to_world(position).to_array();
+                let at = self.region.to_space(position);
+                let [x, y, z] = self.region.space.to_relative(at).to_array();
                 points.push([x, y, z, frame as f32 + later, face.weight]);
             }
         }
@@ -368,24 +377,27 @@ impl SurfaceTracker {
             Some(tracker) => tracker,
             None => {
                 self.find_first_mesh()?;
-                FrameTracker::new(measure(&self.mesh.to_triangles()).edge_mean)
+                FrameTracker::new(measure(&self.mesh.to_triangles()).edge_mean * self.region.space.scale)
             }
         };
         // Present for every frame but the first.
         let from = self.samples.take();
         let samples = self.samples_around(frame);
         self.voting.ensure_levels(&self.region, frame);
+        let space = self.region.space;
         let context = FrameContext {
             region: &self.region,
-            params: &self.params,
+            params: &space.params(&self.params),
             frame,
             samples: &samples,
             voting: &self.voting,
         };
+        space.enter(&mut self.mesh);
         let (changes, statistics) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
+        space.leave(&mut self.mesh);
         (self.frame_tracker, self.samples) = (Some(tracker), Some(samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
-        self.statistics.push(statistics);
+        self.statistics.push(space.statistics(statistics));
         Ok(changes)
     }
 
@@ -395,17 +407,20 @@ impl SurfaceTracker {
         let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
             return;
         };
+        let space = self.region.space;
         let mut mesh = self.mesh.clone();
+        space.enter(&mut mesh);
         let samples = self.samples_around(0);
         self.voting.ensure_levels(&self.region, 0);
         let context = FrameContext {
             region: &self.region,
-            params: &self.params,
+            params: &space.params(&self.params),
             frame: 0,
             samples: &samples,
             voting: &self.voting,
         };
         tracker.track_frame(&mut mesh, self.samples.as_ref(), &context);
+        space.leave(&mut mesh);
         let distance = surface_distance(&mesh.to_triangles(), first);
         self.cycle_closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
     }
@@ -428,7 +443,7 @@ impl SurfaceTracker {
             }
         }
         let shortest_side = self.region.spacing.min_element();
-        let (damping, time_scale) = (self.params.damping, self.params.time_scale);
+        let (damping, time_scale) = (self.params.damping, falloff.time_scale);
         let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame]);
         let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame]);
         SpaceTimeSamples {
@@ -443,7 +458,8 @@ impl SurfaceTracker {
     }
 
     fn falloff(&self) -> Falloff {
-        Falloff { radius: self.params.radius, time_scale: self.params.time_scale }
+        let params = self.region.space.params(&self.params);
+        Falloff { radius: params.radius, time_scale: params.time_scale }
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {
@@ -464,7 +480,7 @@ impl SurfaceTracker {
             phase,
             progress: steps_done as f64 / (2 * frames + closing_steps) as f64,
             residual: self.statistics.last().map_or(f64::NAN, |statistics| statistics.mean_final_correction),
-            tolerance: CONVERGED_STEP * self.region.spacing.min_element(),
+            tolerance: CONVERGED_STEP * self.region.shortest_side(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
             components: self.mesh.component_count() as u32,
@@ -478,14 +494,14 @@ impl SurfaceTracker {
 
 impl Region {
     fn to_local(&self, p: Vec3) -> DVec3 {
-        self.from_world.transform_point3(p.as_dvec3())
+        self.from_space.transform_point3(p.as_dvec3())
     }
 
-    fn to_world(&self, position: DVec3) -> Vec3 {
-        self.to_world.transform_point3(position).as_vec3()
+    fn to_space(&self, position: DVec3) -> Vec3 {
+        self.to_space.transform_point3(position).as_vec3()
     }
 
-    fn direction_to_world(&self, displacement: DVec3) -> Vec3 {
-        self.to_world.transform_vector3(displacement).as_vec3()
+    fn direction_to_space(&self, displacement: DVec3) -> Vec3 {
+        self.to_space.transform_vector3(displacement).as_vec3()
     }
 }

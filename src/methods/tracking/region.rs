@@ -2,6 +2,7 @@
 
 use super::Bounds;
 use super::vote::TIME;
+use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, trilinear};
@@ -38,19 +39,21 @@ const ORTHOGONAL: f64 = 1e-3;
 /// A box of voxels of a 4D image, in all frames, with quantised intensities, in which a surface is tracked. Padding
 /// around the box lets windows extend beyond it; outside of the image, the border is replicated.
 ///
-/// Positions in the region are in world units (millimetres) along the voxel axes, from the centre of the first voxel of
-/// the padded box.
+/// Positions in the region are in units of the working space (see [`WorkingSpace`]) along the voxel axes, from the centre
+/// of the first voxel of the padded box.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub dims: [usize; 3],
     /// The first and the last voxel of the box without its padding, in coordinates of the padded grid.
     pub inner: [[usize; 3]; 2],
-    /// Side lengths of a voxel, in world units.
+    /// The working space, in which lengths and positions of this region are given.
+    pub space: WorkingSpace,
+    /// Side lengths of a voxel.
     pub spacing: DVec3,
-    /// Maps positions in the region, along the voxel axes, to world coordinates.
-    pub to_world: DAffine3,
-    /// Maps world coordinates to positions in the region, along the voxel axes.
-    pub from_world: DAffine3,
+    /// Maps positions in the region, along the voxel axes, to the working space.
+    pub to_space: DAffine3,
+    /// Maps positions in the working space to those in the region, along the voxel axes.
+    pub from_space: DAffine3,
     /// Quantised intensities of the padded box for each frame, x fastest.
     pub frames: Vec<Vec<u8>>,
     /// The difference in intensity that one step of the quantised intensities stands for.
@@ -82,13 +85,15 @@ impl Region {
         let dims = inner[1].map(|last| last + PADDING + 1);
         check_size(dims, volume.frames())?;
         let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - PADDING as f64)));
-        let to_world = DAffine3::from_mat3_translation(directions, first);
+        let space = WorkingSpace::of(volume);
+        let to_space = DAffine3::from_mat3_translation(directions, space.point(first));
         let mut region = Self {
             dims,
             inner,
-            spacing,
-            to_world,
-            from_world: to_world.inverse(),
+            space,
+            spacing: spacing * space.scale,
+            to_space,
+            from_space: to_space.inverse(),
             frames: Vec::new(),
             quantum: 0.0,
             threshold: 0.0,
@@ -150,11 +155,16 @@ impl Region {
         Ok(())
     }
 
-    /// Returns the longest side of a voxel among axes along which the box has more than one voxel, in world units; the
-    /// default radius of plane fits depends on it.
+    /// Returns the longest side of a voxel among axes along which the box has more than one voxel; the default radius of
+    /// plane fits depends on it.
     pub fn longest_side(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
+    }
+
+    /// Returns the shortest side of a voxel, in world units.
+    pub fn shortest_side(&self) -> f64 {
+        self.spacing.min_element() / self.space.scale
     }
 
     /// Returns the difference between the largest and the smallest intensity in the region, without outliers, in the

@@ -21,20 +21,24 @@ const EDGE_BOUND_RATIO: f32 = 1.5;
 /// kept: with shorter edges, a surface as large as the image would have more triangles than fit into memory.
 const MIN_EDGE: f64 = 0.1;
 
-/// Validates the caller's mesh for the first frame, and converts it to a [`Mesh`] with the same vertices.
+/// Validates the caller's mesh for the first frame, and converts it to a [`Mesh`] with the same vertices, relative to
+/// the origin of the working space.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
 /// [`checked_mesh`].
 pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
-    let mesh = checked_mesh("start", start)?;
-    let (edge, least) = (measure(start).edge_mean, MIN_EDGE * region.spacing.min_element());
+    let rebased = region.space.rebased(start);
+    let mesh = checked_mesh("start", &rebased)?;
+    let (edge, least) = (measure(&rebased).edge_mean, MIN_EDGE * region.shortest_side());
     if edge < least {
         let problem =
             format!("the mean edge length must be ≥ {least:.1e} (a tenth of a voxel), got {edge:.1e}");
         return Err(MethodError::invalid("start", problem));
     }
-    if start.positions.iter().all(|&p| region.clamp_into_box(region.to_local(p)).is_some()) {
+    let mut surface = mesh.clone();
+    region.space.enter(&mut surface);
+    if surface.vertices().all(|v| region.clamp_into_box(region.to_local(surface.position(v))).is_some()) {
         let problem =
             "no vertex of the mesh is inside the box; give a surface of the first frame in world coordinates";
         return Err(MethodError::invalid("start", problem));
@@ -43,7 +47,7 @@ pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Me
 }
 
 impl SurfaceTracker {
-    /// Extracts the initial mesh from the first frame, in world coordinates, unless the caller gave one.
+    /// Extracts the initial mesh from the first frame, unless the caller gave one.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if no frame has a boundary, or there is no closed surface in the first one.
@@ -67,6 +71,7 @@ impl SurfaceTracker {
         let mut mesh = Mesh::from_triangles(&part)?;
         let edge = (EDGE * self.region.spacing.min_element()) as f32;
         remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
+        self.region.space.leave(&mut mesh);
         self.mesh = mesh;
         Ok(())
     }
@@ -78,13 +83,13 @@ impl SurfaceTracker {
         let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
         let scored = solids.map(|(volume, part)| match self.component {
             Component::Largest => (-volume, part),
-            Component::Nearest(p) => (distance(&part, p.as_vec3()), part),
+            Component::Nearest(p) => (distance(&part, self.region.space.point(p).as_vec3()), part),
         });
         scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
     }
 }
 
-/// Returns the distance, in world units, of a point from the nearest vertex of a closed surface; 0 if the point is
+/// Returns the distance of a point from the nearest vertex of a closed surface; 0 if the point is
 /// inside. It selects the tracked component.
 fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
     let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();

@@ -3,6 +3,7 @@
 
 use super::frame_tracker::{FrameStatistics, FrameTracker};
 use super::vote::{Faces, TIME};
+use super::working_space::WorkingSpace;
 use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
@@ -40,7 +41,7 @@ impl SurfaceTracker {
                 params: self.params.clone(),
                 faces: self.faces.clone(),
                 mesh: self.mesh.clone(),
-                edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge),
+                edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge / self.region.space.scale),
                 meshes: self.meshes.iter().map(plain).collect(),
                 statistics: self.statistics.clone(),
                 cycle_closure_error: self.cycle_closure_error,
@@ -54,7 +55,7 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = decode(&MAGIC, bytes)?;
+        let mut state: State = decode(&MAGIC, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("volume", "the state belongs to another volume, box, component or start");
@@ -65,8 +66,15 @@ impl SurfaceTracker {
         if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_valid(faces)) {
             return bad("boundary", "boundary votes outside the box");
         }
+        let origin = self.region.space.origin;
+        state.mesh.set_origin(origin);
         let meshes: Vec<TriangleMesh> = (state.meshes.into_iter())
-            .map(|(positions, triangles)| TriangleMesh { positions, triangles, ..TriangleMesh::default() })
+            .map(|(positions, triangles)| TriangleMesh {
+                positions,
+                origin,
+                triangles,
+                ..TriangleMesh::default()
+            })
             .collect();
         let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.statistics.len();
         let boundary_fits = meshes.is_empty() || state.faces.len() == self.frames();
@@ -95,7 +103,7 @@ impl SurfaceTracker {
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
         (self.cycle_closure_error, self.steps) = (state.cycle_closure_error, state.steps);
-        self.frame_tracker = state.edge.map(FrameTracker::new);
+        self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();
         Ok(())
     }
@@ -116,7 +124,11 @@ impl SurfaceTracker {
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));
-        mix(&self.region.to_world.to_cols_array());
+        mix(&self.region.to_space.to_cols_array());
+        if self.region.space != WorkingSpace::default() {
+            mix(&self.region.space.origin.to_array());
+            mix(&[self.region.space.scale]);
+        }
         mix(&self.region.spacing.to_array());
         mix(&[self.region.quantum]);
         if let Component::Nearest(p) = self.component {

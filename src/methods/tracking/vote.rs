@@ -444,6 +444,7 @@ impl<'a> Slabs<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
     #[cfg(target_arch = "wasm32")]
@@ -464,8 +465,9 @@ mod tests {
             dims,
             inner: [[0; 3], dims.map(|n| n - 1)],
             spacing: DVec3::ONE,
-            to_world: DAffine3::IDENTITY,
-            from_world: DAffine3::IDENTITY,
+            space: WorkingSpace::default(),
+            to_space: DAffine3::IDENTITY,
+            from_space: DAffine3::IDENTITY,
             frames: (0..frames).map(|t| frame(t, &mut random)).collect(),
             quantum: 1.0,
             threshold: 50.0,
