@@ -23,12 +23,14 @@ mod first;
 mod frame_tracker;
 mod labelling;
 mod params;
+mod presence;
 mod project;
 mod region;
 mod samples;
 mod start;
 mod state;
 mod vote;
+mod warnings;
 mod working_space;
 
 pub use frame_tracker::FrameStatistics;
@@ -41,7 +43,8 @@ use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
-use frame_tracker::{FrameContext, FrameTracker};
+use frame_tracker::FrameTracker;
+use presence::Tracked;
 use project::SpaceTimeSamples;
 use region::Region;
 use samples::{Falloff, SampleField};
@@ -112,7 +115,12 @@ pub struct SurfaceTracker {
     /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
+    /// By frame, the mean intensity step at its surface, in steps of the quantised intensities; 0 without one.
+    steps_at_surface: Vec<f64>,
+    /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,
+    /// The frames in which the surface of the frame before ended and another one began.
+    lost: Vec<u32>,
     steps: u32,
     clock: fn() -> f64,
 }
@@ -186,7 +194,9 @@ impl SurfaceTracker {
             samples: None,
             meshes: Vec::new(),
             statistics: Vec::new(),
+            steps_at_surface: Vec::new(),
             cycle_closure_error: None,
+            lost: Vec::new(),
             steps: 0,
             clock: || 0.0,
         };
@@ -230,6 +240,8 @@ impl SurfaceTracker {
         (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
         self.statistics.clear();
+        self.steps_at_surface.clear();
+        self.lost.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.advance_versions_past(&replaced);
     }
@@ -302,9 +314,10 @@ impl SurfaceTracker {
     }
 
     /// Returns the cycle closure error: the mean distance of the last frame's surface, tracked on to the first frame,
-    /// from the surface there, in world units. `None` until it is known, and for sequences that are not cyclic.
+    /// from the surface there, in world units. `None` until it is known, for sequences that are not cyclic, and if the
+    /// first or the last frame has no surface.
     pub fn cycle_closure_error(&self) -> Option<f64> {
-        self.cycle_closure_error
+        self.cycle_closure_error.filter(|error| !error.is_nan())
     }
 
     /// Returns the number of frames, from the first on, whose boundary in the image has been found, for progress
@@ -369,60 +382,87 @@ impl SurfaceTracker {
         self.region.frames.len()
     }
 
-    /// Tracks the surface into the next frame, or extracts it in the first; returns the edits of the mesh. If this
-    /// fails, nothing has changed.
+    /// Tracks the surface into the next frame, or extracts it where an object begins; returns the edits of the mesh. The
+    /// surface is empty in frames without an object. If this fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
-        let frame = self.meshes.len();
-        let mut tracker = match self.frame_tracker.take() {
-            Some(tracker) => tracker,
-            None => {
-                self.find_first_mesh()?;
-                FrameTracker::new(measure(&self.mesh.to_triangles()).edge_mean * self.region.space.scale)
+        let (frame, space) = (self.meshes.len(), self.region.space);
+        if frame == 0 {
+            self.check_boundary()?;
+        }
+        let mut last = self.mesh.clone();
+        space.enter(&mut last);
+        let has_surface = last.vertex_count() > 0;
+        if has_surface {
+            let tracker = self.frame_tracker.take();
+            let tracker =
+                tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
+            let (edge, from) = (tracker.edge, self.samples.take());
+            if let Some(found) = self.follow(&last, tracker, from.as_ref(), frame) {
+                return Ok(self.set_frame(found));
             }
-        };
-        // Present for every frame but the first.
-        let from = self.samples.take();
-        let samples = self.samples_around(frame);
-        self.voting.ensure_levels(&self.region, frame);
+            (self.frame_tracker, self.samples) = (Some(FrameTracker::new(edge)), from);
+        }
+        // Nothing else begins where a caller's start ends.
+        let may_begin = frame > 0 || !has_surface;
+        match if may_begin { self.begin(&last, frame)? } else { None } {
+            Some(found) => {
+                if has_surface {
+                    self.lost.push(frame as u32);
+                }
+                let replaced = std::mem::take(&mut self.mesh);
+                let changes = self.set_frame(found);
+                self.mesh.advance_versions_past(&replaced);
+                Ok(changes)
+            }
+            None => {
+                self.set_empty_frame();
+                Ok(Changes::default())
+            }
+        }
+    }
+
+    /// Adds the next frame with the surface tracked into it; returns the edits of the mesh.
+    fn set_frame(&mut self, found: Tracked) -> Changes {
         let space = self.region.space;
-        let context = FrameContext {
-            region: &self.region,
-            params: &space.params(&self.params),
-            frame,
-            samples: &samples,
-            voting: &self.voting,
-        };
-        space.enter(&mut self.mesh);
-        let (changes, statistics) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
+        self.mesh = found.mesh;
         space.leave(&mut self.mesh);
-        (self.frame_tracker, self.samples) = (Some(tracker), Some(samples));
+        (self.frame_tracker, self.samples) = (Some(found.tracker), Some(found.samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
-        self.statistics.push(space.statistics(statistics));
-        Ok(changes)
+        self.statistics.push(space.statistics(found.statistics));
+        self.steps_at_surface.push(self.measured_step(self.meshes.len() - 1));
+        found.changes
+    }
+
+    /// Adds the next frame without a surface.
+    fn set_empty_frame(&mut self) {
+        let replaced = std::mem::replace(&mut self.mesh, self.region.space.empty_mesh());
+        self.mesh.advance_versions_past(&replaced);
+        self.samples = None;
+        self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
+        self.statistics.push(FrameStatistics::default());
+        self.steps_at_surface.push(0.0);
     }
 
     /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean
-    /// distance from the surface there.
+    /// distance from the surface there; to NaN if one of the two is empty, or the first frame has no object there.
     fn close_cycle(&mut self) {
-        let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
+        self.cycle_closure_error = Some(f64::NAN);
+        let (Some(tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
             return;
         };
+        if first.triangles.is_empty() || self.mesh.vertex_count() == 0 {
+            return;
+        }
         let space = self.region.space;
         let mut mesh = self.mesh.clone();
         space.enter(&mut mesh);
-        let samples = self.samples_around(0);
         self.voting.ensure_levels(&self.region, 0);
-        let context = FrameContext {
-            region: &self.region,
-            params: &space.params(&self.params),
-            frame: 0,
-            samples: &samples,
-            voting: &self.voting,
-        };
-        tracker.track_frame(&mut mesh, self.samples.as_ref(), &context);
-        space.leave(&mut mesh);
-        let distance = surface_distance(&mesh.to_triangles(), first);
-        self.cycle_closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
+        let mut closed = self.tracked(mesh, tracker, self.samples.as_ref(), 0, &self.voting);
+        if closed.is_present {
+            space.leave(&mut closed.mesh);
+            let distance = surface_distance(&closed.mesh.to_triangles(), first);
+            self.cycle_closure_error = Some(distance.map_or(f64::NAN, |distance| distance.mean));
+        }
     }
 
     /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
@@ -487,7 +527,7 @@ impl SurfaceTracker {
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.warnings(),
         }
     }
 }

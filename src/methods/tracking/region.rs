@@ -179,6 +179,12 @@ impl Region {
         [i % nx, i / nx % ny, i / (nx * ny)]
     }
 
+    /// Returns the index of the voxel with the given coordinates in the region's grid.
+    pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        let [nx, ny, _] = self.dims;
+        (z * ny + y) * nx + x
+    }
+
     /// Returns the coordinates, in the region's grid, of the voxel nearest to a position.
     pub fn nearest(&self, position: DVec3) -> [usize; 3] {
         let last = DVec3::from(self.dims.map(|n| (n - 1) as f64));

@@ -13,6 +13,10 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLTRK\x01";
 
+/// That of states which also list the frames in which one surface ended and another began. States without such frames
+/// keep the first layout.
+const MAGIC_WITH_LOST: Magic = *b"VSCLTRK\x02";
+
 /// The saved state of a [`SurfaceTracker`]: everything of a run but its input and what is computed again.
 #[derive(Serialize, Deserialize)]
 struct State {
@@ -34,20 +38,18 @@ impl SurfaceTracker {
     /// start.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
-        encode(
-            &MAGIC,
-            &State {
-                fingerprint: self.fingerprint(),
-                params: self.params.clone(),
-                faces: self.faces.clone(),
-                mesh: self.mesh.clone(),
-                edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge / self.region.space.scale),
-                meshes: self.meshes.iter().map(plain).collect(),
-                statistics: self.statistics.clone(),
-                cycle_closure_error: self.cycle_closure_error,
-                steps: self.steps,
-            },
-        )
+        let state = State {
+            fingerprint: self.fingerprint(),
+            params: self.params.clone(),
+            faces: self.faces.clone(),
+            mesh: self.mesh.clone(),
+            edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge / self.region.space.scale),
+            meshes: self.meshes.iter().map(plain).collect(),
+            statistics: self.statistics.clone(),
+            cycle_closure_error: self.cycle_closure_error,
+            steps: self.steps,
+        };
+        if self.lost.is_empty() { encode(&MAGIC, &state) } else { encode(&MAGIC_WITH_LOST, &(state, &self.lost)) }
     }
 
     /// Restores a run from the bytes of [`Self::save`], for a tracker of the same volume, box, component and start.
@@ -55,7 +57,11 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let mut state: State = decode(&MAGIC, bytes)?;
+        let (mut state, lost): (State, Vec<u32>) = if bytes.starts_with(&MAGIC_WITH_LOST) {
+            decode(&MAGIC_WITH_LOST, bytes)?
+        } else {
+            (decode(&MAGIC, bytes)?, Vec::new())
+        };
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("volume", "the state belongs to another volume, box, component or start");
@@ -86,7 +92,11 @@ impl SurfaceTracker {
         if !edge_fits || !closure_fits || !start_fits {
             return bad("frames", "inconsistent with this tracker");
         }
-        if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
+        let had_surface = meshes.iter().any(|mesh| !mesh.triangles.is_empty());
+        let edge_is_known = state.edge.is_some() || !had_surface;
+        let lost_fit = lost.iter().all(|&frame| (frame as usize) < meshes.len());
+        let is_newest = meshes.last().is_none_or(|last| last.triangles.len() == state.mesh.triangle_count());
+        if !frames_fit || !boundary_fits || !edge_is_known || !lost_fit || !is_newest {
             return bad("frames", "inconsistent");
         }
         if !can_be_checked(&state.mesh)
@@ -102,7 +112,8 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
-        (self.cycle_closure_error, self.steps) = (state.cycle_closure_error, state.steps);
+        self.steps_at_surface = (0..self.meshes.len()).map(|frame| self.measured_step(frame)).collect();
+        (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
         self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();
         Ok(())

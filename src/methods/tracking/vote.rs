@@ -70,6 +70,11 @@ impl BoundaryVoting {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
+    /// Returns the extent of the windows.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
     /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
     /// sides where they cut bright regions.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
@@ -260,7 +265,7 @@ impl VotingWindows<'_> {
 impl Window {
     /// Returns the indices of the frames within a window's extent in time around `frame`, in a sequence of `count`
     /// frames that may be cyclic.
-    fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
+    pub fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
         let half_width = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
             let t = (frame + count + offset).checked_sub(half_width)?;
