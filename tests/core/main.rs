@@ -40,4 +40,5 @@ mod textured_meshes;
 mod thin_structures;
 mod tracking;
 mod tracking_fuzz;
+mod tracking_input;
 mod volume_files;

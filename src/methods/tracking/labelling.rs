@@ -233,6 +233,8 @@ mod tests {
             frames: vec![(0..DIMS.iter().product()).map(value).collect()],
             quantum: 1.0,
             threshold: 20.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

@@ -115,8 +115,8 @@ pub struct SurfaceTracker {
     /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
-    /// By frame, the mean intensity step at its surface, in steps of the quantised intensities; 0 without one.
-    steps_at_surface: Vec<f64>,
+    /// By frame, the mean intensities inside and outside of its surface, in steps of the quantised intensities.
+    intensities_at_surface: Vec<Option<[f64; 2]>>,
     /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,
     /// The frames in which the surface of the frame before ended and another one began.
@@ -194,7 +194,7 @@ impl SurfaceTracker {
             samples: None,
             meshes: Vec::new(),
             statistics: Vec::new(),
-            steps_at_surface: Vec::new(),
+            intensities_at_surface: Vec::new(),
             cycle_closure_error: None,
             lost: Vec::new(),
             steps: 0,
@@ -240,7 +240,7 @@ impl SurfaceTracker {
         (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
         self.statistics.clear();
-        self.steps_at_surface.clear();
+        self.intensities_at_surface.clear();
         self.lost.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.advance_versions_past(&replaced);
@@ -429,7 +429,7 @@ impl SurfaceTracker {
         (self.frame_tracker, self.samples) = (Some(found.tracker), Some(found.samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(space.statistics(found.statistics));
-        self.steps_at_surface.push(self.measured_step(self.meshes.len() - 1));
+        self.intensities_at_surface.push(self.measured_intensities(self.meshes.len() - 1));
         found.changes
     }
 
@@ -440,7 +440,7 @@ impl SurfaceTracker {
         self.samples = None;
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(FrameStatistics::default());
-        self.steps_at_surface.push(0.0);
+        self.intensities_at_surface.push(None);
     }
 
     /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean

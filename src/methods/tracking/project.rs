@@ -116,6 +116,8 @@ mod tests {
             frames: vec![Vec::new(); 5],
             quantum: 1.0,
             threshold: 1.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

@@ -112,7 +112,8 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
-        self.steps_at_surface = (0..self.meshes.len()).map(|frame| self.measured_step(frame)).collect();
+        self.intensities_at_surface =
+            (0..self.meshes.len()).map(|frame| self.measured_intensities(frame)).collect();
         (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
         self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();

@@ -78,14 +78,18 @@ impl BoundaryVoting {
     /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
     /// sides where they cut bright regions.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
-        let frames = self.window.frames_around(frame, region.frames.len());
-        frames.iter().for_each(|&t| self.ensure_levels(region, t));
         let mut faces = Faces::default();
+        if region.is_blank(frame) {
+            return faces;
+        }
+        let frames = self.window.frames_with_contrast(region, frame);
+        frames.iter().for_each(|&t| self.ensure_levels(region, t));
         for direction in [X, Y, Z] {
             faces[direction] = self.votes(region, frame, frame, direction, &frames);
         }
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
+        let next = next.filter(|&next| !region.is_blank(next));
         if let (Some(next), true) = (next, self.window.frames > 0) {
             // Windows that contain both frames.
             let both: Vec<usize> =
@@ -124,7 +128,7 @@ impl BoundaryVoting {
         let [nx, ny, nz] = region.dims;
         let frames: Vec<&[u8]> = self
             .window
-            .frames_around(frame, region.frames.len())
+            .frames_with_contrast(region, frame)
             .iter()
             .map(|&t| &region.frames[t][..])
             .collect();
@@ -263,6 +267,13 @@ impl VotingWindows<'_> {
 }
 
 impl Window {
+    /// Returns the frames of a window around a frame, without those that are blank.
+    fn frames_with_contrast(&self, region: &Region, frame: usize) -> Vec<usize> {
+        let mut frames = self.frames_around(frame, region.frames.len());
+        frames.retain(|&t| !region.is_blank(t));
+        frames
+    }
+
     /// Returns the indices of the frames within a window's extent in time around `frame`, in a sequence of `count`
     /// frames that may be cyclic.
     pub fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
@@ -476,6 +487,8 @@ mod tests {
             frames: (0..frames).map(|t| frame(t, &mut random)).collect(),
             quantum: 1.0,
             threshold: 50.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

@@ -6,10 +6,11 @@ use super::region::Region;
 use crate::mesh::TriangleMesh;
 use crate::warning::{Place, Warning, WarningCode};
 
-/// Largest accepted ratio of the intensity step at the surface in a frame of the windows to that in their own. The level
-/// between bright and dark is that of the window: at this ratio it is at three quarters of the smaller step instead of
-/// half, a quarter of a voxel off where the image is blurred by one. Steps in cine sequences differ by a fifth at most.
-const MAX_STEP_RATIO: f64 = 1.5;
+/// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
+/// in units of the step of one. The level between bright and dark is that of the window: at this difference it may be at
+/// a fifth of the step instead of half, a third of a voxel off where the image is blurred by one. With a smaller limit,
+/// frames of a cine sequence are warned of.
+const MAX_SHIFT: f64 = 0.3;
 
 /// Radius of a ball with the volume of the object, in units of the radius of the plane fits, below which its volume is
 /// uncertain: planes fitted to half of a ball and more do not show its curvature. At this radius errors are 5 %.
@@ -55,16 +56,18 @@ impl SurfaceTracker {
         }
     }
 
-    /// Returns a warning if the intensity step at the surface is much smaller than that in another frame of the windows.
+    /// Returns a warning if the intensities at the surface differ too much from those in another frame of the windows.
     fn uneven_brightness(&self, frame: usize) -> Option<Warning> {
-        let step = self.steps_at_surface[frame];
+        let [inside, outside] = self.intensities_at_surface[frame]?;
+        let middle = |[inside, outside]: [f64; 2]| (inside + outside) / 2.0;
         let near = self.voting.window().frames_around(frame, self.frames());
-        let others = near.iter().filter_map(|&t| self.steps_at_surface.get(t));
-        let ratio = others.fold(0.0, |most: f64, other| most.max(other / step));
-        (step > 0.0 && ratio > MAX_STEP_RATIO).then(|| {
+        let others = near.iter().filter_map(|&t| *self.intensities_at_surface.get(t)?);
+        let shift = others.map(|other| (middle(other) - middle([inside, outside])).abs()).fold(0.0, f64::max);
+        (shift > MAX_SHIFT * (inside - outside)).then(|| {
             let text = format!(
-                "the intensity step at the surface is {ratio:.1} times as large in a frame nearby, so the surface may be \
-                 off; equalise the brightness of the frames, or set windowFrames to 0"
+                "intensities at the surface differ from those in a frame nearby by {:.1} times the step there, so the \
+                 surface may be off; equalise the brightness of the frames, or set windowFrames to 0",
+                shift / (inside - outside)
             );
             Warning::at(WarningCode::UnevenBrightness, Place::Frame(frame as u32), text)
         })
@@ -84,30 +87,31 @@ impl SurfaceTracker {
         })
     }
 
-    /// Returns the mean intensity step at the surface of a frame tracked so far, see [`step_at_surface`].
-    pub(super) fn measured_step(&self, frame: usize) -> f64 {
+    /// Returns the mean intensities at the surface of a frame tracked so far, see [`intensities_at`].
+    pub(super) fn measured_intensities(&self, frame: usize) -> Option<[f64; 2]> {
         let mut mesh = self.meshes[frame].clone();
         mesh.positions.iter_mut().for_each(|p| *p *= self.region.space.scale as f32);
-        step_at_surface(&self.region, frame, &mesh)
+        intensities_at(&self.region, frame, &mesh)
     }
 }
 
-/// Returns the mean fall of intensity from one voxel inside a surface, given in the working space, to one voxel outside, in
-/// steps of the quantised intensities; vertices at which it rises, or beyond the box, are left out. 0 without others.
-fn step_at_surface(region: &Region, frame: usize, mesh: &TriangleMesh) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
+/// Returns the mean intensities one voxel inside and one voxel outside of a surface, given in the working space, in steps of
+/// the quantised intensities. Vertices at which intensity rises outwards, or beyond the box, are left out; `None` if
+/// there are no others.
+fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<[f64; 2]> {
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
     for (p, normal) in mesh.positions.iter().zip(mesh.vertex_normals()) {
         let (at, out) = (region.to_local(*p), region.from_space.transform_vector3(normal.as_dvec3()));
         let out = out.normalize_or_zero() * region.spacing.min_element();
         if region.clamp_into_box(at + out).is_some() {
             continue;
         }
-        let step = region.sample(frame, at - out) - region.sample(frame, at + out);
-        if step > 0.0 {
-            (sum, count) = (sum + step, count + 1.0);
+        let [inside, outside] = [at - out, at + out].map(|at| region.sample(frame, at));
+        if inside > outside {
+            (sums, count) = ([sums[0] + inside, sums[1] + outside], count + 1.0);
         }
     }
-    if count > 0.0 { sum / count } else { 0.0 }
+    (count > 0.0).then(|| sums.map(|sum| sum / count))
 }
 
 fn ends(frame: usize) -> Warning {
