@@ -49,6 +49,10 @@ pub enum WarningCode {
     EndsInFrame,
     /// A part of the surface begins in this frame: there was no object in the image before.
     BeginsInFrame,
+    /// The intensity step at the surface differs so much from that in the frames around it that the surface may be off.
+    UnevenBrightness,
+    /// The object is so small that its volume is uncertain.
+    SmallObject,
     /// A label is so thin that the volume of its surface is not that of its voxels.
     ThinLabel,
     /// Positions or intensities are rounded more than the result should suffer.

@@ -42,4 +42,5 @@ mod thin_structures;
 mod tool_scales;
 mod tracking;
 mod tracking_fuzz;
+mod tracking_input;
 mod volume_files;

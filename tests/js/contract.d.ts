@@ -441,8 +441,9 @@ export class SurfaceTracker implements Stepper {
   readonly mesh: Mesh; // of the current frame
   readonly frame: number;
   readonly frames: number;
+  readonly origin: Vec3; // of surfaces and boundary points in world space; 0 unless the volume is far from it
   readonly noise: number; // standard deviation, intensity units
-  readonly cycleClosureError: number | undefined; // for cyclic sequences: distance of the closed cycle from its first surface, world units
+  readonly cycleClosureError: number | undefined; // for cyclic sequences with a surface in the first and the last frame: distance of the closed cycle from its first surface, world units
   readonly statistics: FrameStatistics[];
   readonly params: Required<TrackingParams>;
   setParams(params: TrackingParams): void;
