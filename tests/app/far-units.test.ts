@@ -1,5 +1,6 @@
 /** What the app computes on the page of data far from the origin of world space: the same as beside the origin. */
 import { beforeAll, describe, expect, test, vi } from 'vitest';
+import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/link';
 import * as cloudLink from '../../www/src/labs/reconstruct-link';
@@ -22,7 +23,10 @@ import { literal } from '../../www/src/worker/literal';
 import { fileOf } from '../../www/src/worker/volumes';
 import { ballPoints, FAR } from './far';
 
-beforeAll(() => init());
+beforeAll(async () => {
+  await init();
+  await startReaders();
+});
 
 const add = (one: Vec3, other: Vec3) => one.map((value, axis) => value + (other[axis] ?? 0)) as Vec3;
 
@@ -153,11 +157,14 @@ test('edges of a region, and points with edits, keep double precision', () => {
 });
 
 test('a volume far away is saved as NRRD, whose numbers are exact', () => {
+  const data = Float32Array.from({ length: 24 }, (_, i) => Math.sin(i));
   const volume = (origin: Vec3) =>
-    new Volume({ data: new Uint8Array(8), dims: [2, 2, 2], spacing: [0.1, 0.1, 0.1], origin });
+    new Volume({ data, dims: [2, 3, 4], spacing: [0.1, 0.2, 0.3], origin, space: 'LPS' });
   const { extension, bytes } = fileOf(volume(FAR));
   expect(extension).toBe('nrrd');
-  expect([...Volume.parse(bytes).affine.slice(12, 15)]).toEqual(FAR);
+  const { affine, dims, space, ...read } = parseVolume(bytes);
+  expect({ affine, dims, space }).toEqual({ affine: volume(FAR).affine, dims: [2, 3, 4], space: 'LPS' });
+  expect(read.data).toEqual(data);
   expect(fileOf(volume([0.1, 100.3, -20.7])).extension).toBe('nii');
 });
 

@@ -94,6 +94,13 @@ export function shortened(value: number, digits: number, size: number): number {
   return Number(value.toFixed(decimals(size, digits)));
 }
 
+/** Rounds a point of something of this size, as {@link shortened} does; if one coordinate needs decimals, all get them. */
+export function shortenedPoint(point: Vec3, digits: number, size: number): Vec3 {
+  const short = point.map((value) => shortened(value, digits, size)) as Vec3;
+  if (short.every((value, axis) => value === Number((point[axis] ?? 0).toPrecision(digits)))) return short;
+  return point.map((value) => Number(value.toFixed(decimals(size, digits)))) as Vec3;
+}
+
 /** Returns the number of decimals of coordinates that say as much of something of this size as some digits do of it. */
 export function decimals(size: number, digits: number): number {
   return Math.min(100, Math.max(0, digits - Math.floor(Math.log10(size))));

@@ -1,6 +1,6 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 import { EXAMPLES, type Example } from '../examples';
-import { shortened } from '../placing';
+import { shortenedPoint } from '../placing';
 import { defaultStart, exampleById, isPreset, PAPER } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
@@ -81,8 +81,7 @@ export function linkOf(settings: LabSettings): Linked {
 
 /** Rounds a sphere to what a link needs. */
 function short({ center, radius }: LabSettings['sphere']): LabSettings['sphere'] {
-  const rounded = center.map((value) => shortened(value, DIGITS, 10 * radius)) as Vec3;
-  return { center: rounded, radius: Number(radius.toPrecision(DIGITS)) };
+  return { center: shortenedPoint(center, DIGITS, 10 * radius), radius: Number(radius.toPrecision(DIGITS)) };
 }
 
 /** Returns the entries of `values` that differ from those in `usual`, for a link that omits the others. */

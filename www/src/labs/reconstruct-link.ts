@@ -1,5 +1,5 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
-import { shortened } from '../placing';
+import { shortenedPoint } from '../placing';
 import type { ParamValues, Vec3 } from '../protocol';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { isCloudPreset } from '../reconstruct/presets';
@@ -49,7 +49,7 @@ export interface CloudSettings {
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
   const { example, file, choice, params, defaults, edits, size, color, photo } = settings;
-  const short = (points: Vec3[]) => points.map((point) => point.map((x) => shortened(x, DIGITS, size)) as Vec3);
+  const short = (points: Vec3[]) => points.map((point) => shortenedPoint(point, DIGITS, size));
   const { maxPoints, keepComponents } = choice;
   return {
     ...(!example && { file }),

@@ -150,9 +150,10 @@ export class ReconstructLab extends RunLab<CloudExample> {
 
   #saveVolume(): void {
     const volume = this.client.request('volume', { size: VOLUME_SIZE });
-    const saved = volume.then(({ extension, bytes }) =>
-      this.ui.saving.bytes(extension, bytes, 'application/octet-stream'),
-    );
+    const saved = volume.then(({ extension, bytes }) => {
+      this.ui.saving.bytes(extension, bytes, 'application/octet-stream');
+      if (extension === 'nrrd') this.ui.status.say(text('reconstruct.savedAsNrrd', { stem: this.ui.saving.stem }));
+    });
     this.ask(saved, text('reconstruct.volumeFailed'));
   }
 

@@ -1,4 +1,4 @@
-import { shortened } from '../placing';
+import { shortenedPoint } from '../placing';
 import { moved, scaled, turned } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from '../sculpt/protocol';
 import { text } from '../texts';
@@ -126,7 +126,7 @@ export class Posing {
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
     if (chosen === undefined || !ellipsoid) return;
     const { size } = this.#ui.view;
-    const centre = place(ellipsoid.center.map((x) => shortened(x, 3, size)) as Vec3, size);
+    const centre = place(shortenedPoint(ellipsoid.center, 3, size), size);
     this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre }));
   }
 

@@ -1,4 +1,4 @@
-import { shortened } from '../placing';
+import { shortenedPoint } from '../placing';
 import type { Attractor, Vec3 } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
@@ -100,7 +100,7 @@ export class AttractorControls {
   }
 
   add(point: Vec3): void {
-    const rounded = point.map((x) => shortened(x, 6, this.#size)) as Vec3;
+    const rounded = shortenedPoint(point, 6, this.#size);
     this.#change(
       [...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }],
       text('extractPanels.newAttractor'),

@@ -1,4 +1,4 @@
-import { decimals, shortened } from '../placing';
+import { decimals, shortenedPoint } from '../placing';
 import type { Vec3 } from '../protocol';
 import { LANGUAGE, text } from '../texts';
 
@@ -24,8 +24,9 @@ export function place(point: Vec3, size: number): string {
     maximumFractionDigits: Math.min(20, decimals(size, 4)),
     useGrouping: false,
   });
-  const isFar = point.some((value) => shortened(value, 4, size) !== Number(value.toPrecision(4)));
-  return point.map((value) => (isFar ? far.format(value) : figure(Number(value.toPrecision(4))))).join(', ');
+  const short = shortenedPoint(point, 4, size);
+  const isNear = short.every((value, axis) => value === Number((point[axis] ?? 0).toPrecision(4)));
+  return short.map((value) => (isNear ? figure(value) : far.format(value))).join(', ');
 }
 
 /** Units of length, each a thousandth of the one before. */

@@ -6,6 +6,7 @@ import type { Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } fro
 import { shapeVoxels } from '../shapes';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
+import { toNrrd } from './nrrd';
 import { Refusal } from './refusal';
 
 export const HISTOGRAM_BINS = 256;
@@ -91,7 +92,7 @@ export function fitsNifti({ affine, spacing }: Pick<Volume, 'affine' | 'spacing'
 export function fileOf(volume: Volume): VolumeBytes {
   return fitsNifti(volume)
     ? { extension: 'nii', bytes: volume.toNifti() }
-    : { extension: 'nrrd', bytes: volume.toBytes('nrrd', { gzip: true }) };
+    : { extension: 'nrrd', bytes: toNrrd(volume) };
 }
 
 /** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */
