@@ -38,7 +38,10 @@ mod tests {
             for at in [20.0, -1e3, 1e8] {
                 let [min, max] = cube(at * size);
                 let origin = world_origin(min, max);
-                assert!((origin - (min + max) / 2.0).abs().max_element() <= 2.0 * size, "{size} {at} {origin}");
+                assert!(
+                    (origin - (min + max) / 2.0).abs().max_element() <= 2.0 * size,
+                    "{size} {at} {origin}"
+                );
                 assert_eq!(origin + (min - origin), min, "{size} {at}");
             }
         }

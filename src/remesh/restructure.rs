@@ -228,7 +228,8 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
 }
 
 /// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (Kobbelt, Bareuther
-/// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped. Returns the number of splits.
+/// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped, and those that would shorten
+/// nothing, as no number lies between the ends. Returns the number of splits.
 pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let longest = bounds.max * bounds.max;
@@ -243,7 +244,11 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
             if mesh.vertex_count() >= most {
                 return changes;
             }
-            let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
+            let [p, q] = [u, v].map(|end| mesh.position(end));
+            let middle = (p + q) * 0.5;
+            if middle == p || middle == q {
+                continue;
+            }
             if let Ok(fresh) = edits.attempt(mesh, |mesh| mesh.split(u, v, middle)) {
                 edits.was_split(fresh, u);
                 changes.creations += 1;
