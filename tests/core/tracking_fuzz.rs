@@ -88,7 +88,10 @@ fn track(options: TrackingOptions) -> Result<usize, MethodError> {
         if let Some(mesh) = tracker.meshes().get(frames) {
             let found = measure(mesh);
             // None in a frame without an object.
-            assert_eq!((found.components, count_self_intersections(mesh)), (usize::from(found.triangles > 0), 0));
+            assert_eq!(
+                (found.components, count_self_intersections(mesh)),
+                (usize::from(found.triangles > 0), 0)
+            );
             assert!(mesh.positions.iter().all(|p| p.is_finite()));
         }
     }

@@ -35,7 +35,9 @@ pub(super) fn extract_bright_surface(
     falloff: Falloff,
 ) -> Result<TriangleMesh, MethodError> {
     let part = VoxelBox { ends: region.inner };
-    let Some(is_bright) = label_bright(region, frame, faces, part) else { return Ok(TriangleMesh::default()) };
+    let Some(is_bright) = label_bright(region, frame, faces, part) else {
+        return Ok(TriangleMesh::default());
+    };
     let points = oriented(region, frame, faces, falloff);
     let band = BAND * falloff.radius;
     let distance = signed_distances(region, &points, band);

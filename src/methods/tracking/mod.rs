@@ -183,8 +183,9 @@ impl SurfaceTracker {
             noise,
             range: region.span(),
         };
-        let start =
-            start.as_ref().map_or(Ok(region.space.empty_mesh()), |mesh| start::validate_start(mesh, &region))?;
+        let start = start
+            .as_ref()
+            .map_or(Ok(region.space.empty_mesh()), |mesh| start::validate_start(mesh, &region))?;
         let mut tracker = Self {
             voting: BoundaryVoting::new(Window::default(), 0),
             mesh: start.clone(),

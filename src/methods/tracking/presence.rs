@@ -113,7 +113,9 @@ impl SurfaceTracker {
             return Ok(None);
         }
         let known = self.known_before(last, frame);
-        let Some(part) = self.tracked_component(parts.into_iter().filter(|part| !self.is_known(part, &known))) else {
+        let Some(part) =
+            self.tracked_component(parts.into_iter().filter(|part| !self.is_known(part, &known)))
+        else {
             return Ok(None);
         };
         let mesh = self.remeshed(&part)?;
@@ -182,7 +184,10 @@ impl SurfaceTracker {
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.
 fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
     let to_voxels = DAffine3::from_scale(region.spacing.recip()) * region.from_space;
-    voxels_inside(&TriangleMesh { origin: Default::default(), ..surface.clone() }.transformed(&to_voxels), region.dims)
+    voxels_inside(
+        &TriangleMesh { origin: Default::default(), ..surface.clone() }.transformed(&to_voxels),
+        region.dims,
+    )
 }
 
 impl FrameContext<'_> {

@@ -18,7 +18,7 @@ const OUTLIERS: f64 = 1e-3;
 const BINS: usize = 4096;
 
 /// Share of the range of intensities up to which those next to voxels without a value are among the darkest: noise in a
-/// background reaches a tenth, and the values of an object without one are above it in the mean.
+/// background reaches a tenth, and the values of an object without one are above it on average.
 const DARKEST: f64 = 0.25;
 
 /// Share of the mean intensity, above the least, from which those next to voxels without a value are typical of an object:
@@ -382,12 +382,8 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
     Ok([low, high])
 }
 
-/// Checks that a box of so many voxels is large enough along all axes; `parameter` is the one that gave the box.
-fn check_extent(
-    parameter: &'static str,
-    counts: [usize; 3],
-    spacing: [f64; 3],
-) -> Result<(), MethodError> {
+/// Checks that a box with these numbers of voxels is large enough along all axes; `parameter` is the one that gave the box.
+fn check_extent(parameter: &'static str, counts: [usize; 3], spacing: [f64; 3]) -> Result<(), MethodError> {
     let shortest = spacing.into_iter().fold(f64::INFINITY, f64::min);
     let is_thick = |k: usize| {
         // A rounding error must not decide about three isotropic slices.

@@ -54,8 +54,7 @@ impl SurfaceTracker {
     pub(super) fn check_boundary(&mut self) -> Result<(), MethodError> {
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.quantum;
-            let largest =
-                if largest < 0.01 { format!("{largest:.2e}") } else { format!("{largest:.4}") };
+            let largest = if largest < 0.01 { format!("{largest:.2e}") } else { format!("{largest:.4}") };
             let problem = format!(
                 "must be below {largest}, the largest step in the box, got {}: no boundary was found",
                 self.params.threshold

@@ -49,7 +49,11 @@ impl SurfaceTracker {
             cycle_closure_error: self.cycle_closure_error,
             steps: self.steps,
         };
-        if self.lost.is_empty() { encode(&MAGIC, &state) } else { encode(&MAGIC_WITH_LOST, &(state, &self.lost)) }
+        if self.lost.is_empty() {
+            encode(&MAGIC, &state)
+        } else {
+            encode(&MAGIC_WITH_LOST, &(state, &self.lost))
+        }
     }
 
     /// Restores a run from the bytes of [`Self::save`], for a tracker of the same volume, box, component and start.

@@ -126,12 +126,8 @@ impl BoundaryVoting {
     /// [`Rows`]).
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
-        let frames: Vec<&[u8]> = self
-            .window
-            .frames_with_contrast(region, frame)
-            .iter()
-            .map(|&t| &region.frames[t][..])
-            .collect();
+        let frames: Vec<&[u8]> =
+            self.window.frames_with_contrast(region, frame).iter().map(|&t| &region.frames[t][..]).collect();
         let rows = Rows::new(region.dims, self.window.half_width);
         let mut out = vec![NONE; rows.len()];
         let mut slabs = Slabs::new(region.dims, self.window.half_width, &frames);

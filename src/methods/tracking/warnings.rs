@@ -1,4 +1,4 @@
-//! What a user should know about a tracked sequence: frames in which the object ends or begins, and those in which its
+//! Warnings about a tracked sequence: frames in which the object ends or begins, and those in which its
 //! surface is uncertain.
 
 use super::SurfaceTracker;
