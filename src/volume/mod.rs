@@ -44,6 +44,7 @@ mod sampling;
 mod sequence;
 mod slices;
 mod sparse;
+mod subdivided;
 mod surface_extractor;
 mod threshold;
 mod unscaled;
@@ -52,6 +53,7 @@ mod write;
 
 pub use bricks::BRICK;
 pub(crate) use bricks::{BrickGrid, BrickId};
+pub(crate) use contour::marching_cubes_of_slices;
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use coverage::coverage;
 pub use enrich::Enrichment;
@@ -66,6 +68,7 @@ pub use resample::{Interpolation, ResampleGrid};
 pub(crate) use sampling::trilinear;
 pub(crate) use sparse::merged;
 pub use sparse::{BrickBox, SparseInit, SparseLevel, SparseVolume};
+pub(crate) use subdivided::Subdivided;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 

@@ -84,7 +84,7 @@ impl DeformableModel {
         self.check_is_whole()?;
         let iso = self.pyramid.normalised(self.params.iso);
         let object = ObjectIs::by(&self.params);
-        let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.params.smallest_part)?;
+        let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.smallest_part())?;
         let model = self.mesh.to_triangles();
         Ok(CoverageSurvey {
             to_world: self.to_world,

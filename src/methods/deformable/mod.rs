@@ -244,8 +244,9 @@ impl DeformableModel {
         Self::from_pyramid(pyramid, volume.affine(), origin)
     }
 
-    fn from_pyramid(pyramid: Pyramid, to_world: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+    fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
+        let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
         let finest_delta = finest_delta(edge, voxel)?;
         let level = pyramid.levels.len() - 1;
@@ -257,7 +258,7 @@ impl DeformableModel {
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
             iso: pyramid.normalised(params.iso),
             object: ObjectIs::by(&params),
-            smallest_part: params.smallest_part,
+            smallest_part: params.smallest_part * pyramid.voxel(),
             dims: pyramid.dims(),
             domain,
             from_world: to_world.inverse(),
@@ -450,6 +451,11 @@ impl DeformableModel {
         changes
     }
 
+    /// Returns the least volume of a part in model units.
+    fn smallest_part(&self) -> f64 {
+        self.params.smallest_part * self.pyramid.voxel()
+    }
+
     fn sampling(&self) -> Sampling {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
@@ -607,7 +613,8 @@ impl DeformableModel {
         self.pyramid.delta_at(self.finest_delta, self.level)
     }
 
-    /// The mesh in model space, the index space of the volume, where voxels are unit cubes.
+    /// The mesh in model space: the index space of the volume, or of the parts into which elongated voxels are divided,
+    /// where these are unit cubes.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
