@@ -59,6 +59,7 @@ pub use coverage::coverage;
 pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub(crate) use error::filled;
+pub(crate) use grid::share_of_values;
 pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::{FillRule, for_each_inside, voxels_inside};
 pub use labels::LabelCount;

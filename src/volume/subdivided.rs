@@ -98,3 +98,42 @@ impl<'a> Subdivided<'a> {
 fn mixed(a: &[f32], b: &[f32], share: f32) -> Vec<f32> {
     a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn parts_have_the_interpolated_values_however_they_are_read() {
+        let mut random = Random::new(1);
+        for parts in [[1, 1, 5], [3, 1, 1], [1, 7, 3], [1, 1, 1], [3, 3, 3]] {
+            let dims = [5, 4, 3];
+            let grid = Grid { dims, values: (0..60).map(|_| random.unit() as f32).collect() };
+            let divided = Subdivided::new(&grid, parts);
+            let [nx, ny, nz] = divided.dims();
+            let region = Region { min: [1, 2, 0], dims: [nx - 1, ny - 3, nz] };
+            let part = divided.region(region).unwrap();
+            let mut in_region = part.values.iter();
+            for z in 0..nz {
+                let slice = divided.slice(z);
+                for (k, &value) in slice.iter().enumerate() {
+                    let at = [k % nx, k / nx, z];
+                    let p = Vec3::from([0, 1, 2].map(|a| (at[a] as f32 + 0.5) / parts[a] as f32 - 0.5));
+                    assert!((value - grid.sample(p)).abs() < 1e-6);
+                    assert!((value - divided.value(k + nx * ny * z)).abs() < 1e-6);
+                    if at[0] >= 1 && (2..ny - 1).contains(&at[1]) {
+                        assert!((value - in_region.next().unwrap()).abs() < 1e-6);
+                    }
+                    if (0..3).all(|a| at[a] % parts[a] == parts[a] / 2) {
+                        let [x, y, z] = [0, 1, 2].map(|a| at[a] / parts[a]);
+                        assert_eq!(value, grid.values[x + 5 * (y + 4 * z)]);
+                    }
+                }
+            }
+            assert!(in_region.next().is_none());
+        }
+    }
+}

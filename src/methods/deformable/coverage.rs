@@ -10,7 +10,7 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
 /// The distance to the other surface, of model and iso-surface, up to which a point is covered, in voxels of the finest
-/// level.
+/// level, or in the parts into which elongated ones are divided.
 const COVERED_DISTANCE: f64 = 1.0;
 
 /// The largest side of the pieces into which triangles are divided to measure coverage, in voxels of the finest level:

@@ -10,7 +10,10 @@ use super::DeformableParams;
 use crate::math::order::median;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
-use crate::volume::{BrickGrid, CellCache, Grid, Region, SparseVolume, Subdivided, VectorGrid, Volume};
+use crate::volume::{
+    BrickGrid, CellCache, Grid, Region, SparseVolume, Subdivided, VectorGrid, Volume, share_of_values,
+};
+use crate::warning::{Warning, WarningCode};
 
 /// The reduction factor ρ = √3: δ and the shortest side of a voxel grow by it with each level of the pyramid. It is
 /// that of √3 refinement, by which the mesh gets finer (15).
@@ -25,8 +28,13 @@ pub(super) const MAX_NORMALISED: f64 = 100.0;
 /// less, the meshes of usual computed tomographies, which are right without it, would have more vertices.
 const MAX_RATIO: f64 = 2.0;
 
-/// The largest number of parts into which a voxel is divided along a side; an odd number.
-pub(super) const MAX_PARTS: usize = 31;
+/// The largest number of parts into which a voxel is divided along a side; an odd number. With more, a few slices far
+/// apart would get meshes as large as those of whole volumes; with less than 21, voxels of 1 × 1 × 20 are not cubes.
+const MAX_PARTS: usize = 31;
+
+/// The largest number of parts of all voxels of a level, which the search for missing parts marks in two bits each. On
+/// wasm32, indices of four times as many do not fit into a `usize`.
+const MOST_PARTS: usize = 1 << 30;
 
 /// Returns the number of parts along each axis into which voxels with the given sides are divided: 1, or the odd number
 /// that makes them most nearly as long as the shortest side.
@@ -36,6 +44,18 @@ fn parts_of(sides: [f64; 3]) -> [usize; 3] {
         let ratio = side / shortest;
         if ratio <= MAX_RATIO { 1 } else { (2 * (ratio / 2.0) as usize + 1).min(MAX_PARTS) }
     })
+}
+
+/// Returns numbers of parts as [`parts_of`], but smaller ones if `dims` voxels would have more than [`MOST_PARTS`].
+fn parts_of_whole(sides: [f64; 3], dims: [usize; 3]) -> [usize; 3] {
+    let mut parts = parts_of(sides);
+    let count =
+        |parts: [usize; 3]| (0..3).map(|axis| dims[axis] as f64 * parts[axis] as f64).product::<f64>();
+    while parts != [1; 3] && count(parts) > MOST_PARTS as f64 {
+        let most = parts.into_iter().max().unwrap_or(1);
+        parts = parts.map(|n| if n == most { n - 2 } else { n });
+    }
+    parts
 }
 
 /// One level of the image pyramid, sampled at positions in model space.
@@ -146,9 +166,23 @@ impl LevelImage {
     /// the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
+        if self.parts == [1; 3] {
+            return self.intensity_at(self.index(p), background, known);
+        }
+        // Padding by parts, as the contour has it, which ends half a voxel beyond the centres; padding by long voxels would
+        // end more than that beyond the centres where the object is bright.
+        let last = Vec3::from(self.grid.dims.map(|n| (n - 1) as f32));
+        let share = share_of_values(self.part_grid().0.dims(), self.part_index(p));
+        let value = self.intensity_at(self.index(p).clamp(Vec3::ZERO, last), background, known);
+        background + share * (value - background)
+    }
+
+    /// Returns the intensity at an index in voxels of this level, and `background` outside.
+    #[inline]
+    fn intensity_at(&self, index: Vec3, background: f32, known: &mut CellCache) -> f32 {
         match self.bricks() {
-            None => self.grid.sample_padded(self.index(p), background, known),
-            Some(bricks) => bricks.sample_padded(self.index(p), background, known),
+            None => self.grid.sample_padded(index, background, known),
+            Some(bricks) => bricks.sample_padded(index, background, known),
         }
     }
 
@@ -297,7 +331,8 @@ impl Pyramid {
     /// [`MethodError::InvalidArgument`] for more levels than the volume allows; [`MethodError::Volume`] if there is no
     /// such frame or memory does not suffice.
     pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
-        let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
+        let parts = parts_of_whole(volume.spacing(), volume.dims());
+        let possible = most_levels_above(volume, parts)?;
         if above > possible {
             let [nx, ny, nz] = volume.dims();
             let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
@@ -307,7 +342,6 @@ impl Pyramid {
         let mut spacing = volume.spacing();
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
         let mut levels = Vec::with_capacity(above + 1);
-        let parts = parts_of(spacing);
         let finest = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
         let mut level_parts = parts;
         for _ in 0..above {
@@ -316,7 +350,7 @@ impl Pyramid {
             levels.push(LevelImage::new(std::mem::replace(&mut grid, coarse), level_parts, finest));
             spacing = coarse_spacing;
             unit *= REDUCTION;
-            level_parts = parts_on_coarse_level(parts, spacing);
+            level_parts = parts_on_coarse_level(parts, spacing, grid.dims);
         }
         levels.push(LevelImage::new(grid, level_parts, finest));
         let spacing = volume.spacing();
@@ -347,8 +381,11 @@ impl Pyramid {
         for (k, level) in all[finest..].iter().enumerate() {
             let map = level.affine.inverse() * to_world;
             let [x, y, z] = [map.matrix3.x_axis.x, map.matrix3.y_axis.y, map.matrix3.z_axis.z];
-            let of_level =
-                if k == 0 { parts } else { parts_on_coarse_level(parts, spacing_of(&level.affine)) };
+            let of_level = match k {
+                0 => parts,
+                _ if k + finest < last => parts_of_coarse_voxels(parts, spacing_of(&level.affine)),
+                _ => parts_on_coarse_level(parts, spacing_of(&level.affine), level.dims),
+            };
             let [scale, offset] = [Vec3::new(x as f32, y as f32, z as f32), map.translation.as_vec3()];
             levels.push(LevelImage::of_bricks(level.dims, of_level, [scale, offset]));
         }
@@ -467,6 +504,22 @@ impl Pyramid {
         self.parts.iter().product::<usize>() as f64
     }
 
+    /// Returns the warnings about results on this image.
+    pub(super) fn warnings(&self) -> Vec<Warning> {
+        let spacing = self.spacing();
+        let [shortest, longest] =
+            [f64::min, f64::max].map(|of| spacing.into_iter().reduce(of).unwrap_or(1.0));
+        if longest / shortest <= MAX_RATIO {
+            return Vec::new();
+        }
+        let ratio = self.spacing.into_iter().fold(0.0, f64::max) / shortest;
+        let text = format!(
+            "voxels are {ratio:.0} times as long as wide: between their centres the shape is a guess, and the surface has \
+             steps; interpolate slices (enrichSlices) or resample the volume first"
+        );
+        vec![Warning::new(WarningCode::Anisotropic, text)]
+    }
+
     /// Returns the map from model space to world space for a volume with the affine transform `affine`.
     pub(super) fn to_world(&self, affine: &DAffine3) -> DAffine3 {
         model_to_world(affine, self.parts)
@@ -493,8 +546,33 @@ impl Pyramid {
 
 /// Returns the number of parts into which the voxels of a coarse level are divided, given those of the finest: none if
 /// these are not, although rounding may have made them a little longer.
-fn parts_on_coarse_level(finest: [usize; 3], sides: [f64; 3]) -> [usize; 3] {
+fn parts_on_coarse_level(finest: [usize; 3], sides: [f64; 3], dims: [usize; 3]) -> [usize; 3] {
+    if finest == [1; 3] { finest } else { parts_of_whole(sides, dims) }
+}
+
+/// Returns numbers of parts as [`parts_on_coarse_level`], of a level that is never there as a whole.
+fn parts_of_coarse_voxels(finest: [usize; 3], sides: [f64; 3]) -> [usize; 3] {
     if finest == [1; 3] { finest } else { parts_of(sides) }
+}
+
+/// Returns the largest number of levels above a volume with voxels divided into `parts`: each must have at least two
+/// voxels along every axis. Axes along which voxels are divided keep their voxels until the others are as long.
+fn most_levels_above(volume: &Volume, parts: [usize; 3]) -> Result<usize, MethodError> {
+    if parts == [1; 3] {
+        return Ok(volume.max_pyramid_levels(REDUCTION)? - 1);
+    }
+    let (mut dims, mut spacing, mut level_parts) = (volume.dims(), volume.spacing(), parts);
+    let mut above = 0;
+    while dims.iter().all(|&n| n >= 2) {
+        let next = [0, 1, 2].map(|axis| {
+            if level_parts[axis] == 1 { (dims[axis] as f64 / REDUCTION) as usize } else { dims[axis] }
+        });
+        spacing = [0, 1, 2].map(|axis| spacing[axis] * dims[axis] as f64 / next[axis].max(1) as f64);
+        dims = next;
+        level_parts = parts_on_coarse_level(parts, spacing, dims);
+        above += 1;
+    }
+    Ok(usize::max(above, 1) - 1)
 }
 
 /// Returns the map from the indices of parts of voxels to world space, given that from voxel indices.

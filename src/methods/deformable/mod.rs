@@ -11,6 +11,11 @@
 //! edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
 //! [`DeformableModel::restore`].
 //!
+//! # Elongated voxels
+//! The surface has the topology of the trilinearly interpolated image, also where voxels are up to 20 times as long as
+//! wide: voxels more than twice as long are divided into nearly cubic parts, which are computed when they are needed.
+//! Where voxels remain elongated, beyond 62 times as long, reports carry [`crate::warning::WarningCode::Anisotropic`].
+//!
 //! # Limits
 //! With `adaptivity: 0`, sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner
 //! than that are lost, on coarse levels those thinner than the contact distance there.
@@ -95,7 +100,8 @@ pub struct DeformableOptions {
     /// lost there.
     pub levels: usize,
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
-    /// default 1.53 times the side of a cube with the volume of a voxel.
+    /// default 1.53 times the side of a cube with the volume of a voxel. Voxels more than twice as long as wide are divided
+    /// into nearly cubic parts, whose volume counts instead.
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -510,7 +516,7 @@ impl DeformableModel {
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.pyramid.warnings(),
         }
     }
 

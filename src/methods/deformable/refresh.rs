@@ -37,9 +37,8 @@ impl DeformableModel {
     /// memory does not suffice; [`MethodError::TooManyVertices`].
     pub fn refresh(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
         self.check_is_whole()?;
-        if volume.dims() != self.pyramid.voxel_dims()
-            || self.pyramid.to_world(&volume.affine()) != self.to_world
-        {
+        let is_in_place = self.pyramid.to_world(&volume.affine()) == self.to_world;
+        if volume.dims() != self.pyramid.voxel_dims() || !is_in_place {
             let problem = "must have the dimensions and the affine transform of the model's volume";
             return Err(MethodError::invalid("volume", problem));
         }
