@@ -624,7 +624,7 @@ fn forces_in_elongated_voxels_are_those_of_the_upsampled_image() {
             [&volume, &upsampled].map(|volume| measure(&settled(volume, options.clone()).surface()));
         assert_eq!((found.euler, expected.euler), (2, 2));
         let ratio = found.volume / expected.volume;
-        assert!((ratio - 1.0).abs() < 0.02, "{levels} levels, gradient {gradient_normal}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.005, "{levels} levels, gradient {gradient_normal}: {ratio}");
     }
 }
 
@@ -687,63 +687,4 @@ fn elongated_voxels_of_a_sparse_volume_are_divided_too() {
     let [found, expected] = [&model, &in_memory].map(|model| measure(&model.surface()));
     assert_eq!((found.euler, expected.euler), (0, 0));
     assert!((found.volume / expected.volume - 1.0).abs() < VOLUME, "{} {}", found.volume, expected.volume);
-}
-
-#[test]
-#[ignore = "experiment"]
-fn experiment() {
-    for seed in 0..60 {
-        let mut case = case(seed);
-        if case.sides.iter().all(|&side| side <= 2.0) {
-            continue;
-        }
-        let voxel: f64 = case.sides.map(f64::from).iter().product();
-        let inside: Vec<u8> =
-            case.volume.grid(0).unwrap().values.iter().map(|&v| u8::from(v >= case.iso)).collect();
-        let count = inside.iter().filter(|&&v| v == 1).count();
-        let [x, y, z] = case.volume.dims();
-        let padded = [x + 2, y + 2, z + 2];
-        let mut grid = vec![false; padded.iter().product()];
-        inside.iter().enumerate().for_each(|(k, &v)| {
-            grid[1 + k % x + padded[0] * (1 + k / x % y + padded[1] * (1 + k / x / y))] = v == 1
-        });
-        let labels = Volume::new(VolumeInit {
-            affine: case.volume.affine(),
-            ..VolumeInit::new(Voxels::U8(inside), [x, y, z, 1])
-        });
-        let Ok(labels) = labels else { continue };
-        let mut surfaces = vesicle::methods::label_surfaces::LabelSurfaces::new(
-            &labels,
-            Some(vec![1.0]),
-            Default::default(),
-        )
-        .unwrap();
-        while !surfaces.step().unwrap().done {}
-        let surface = surfaces.mesh(1.0).unwrap();
-        let m = measure(&surface);
-        let euler = 2 * euler_6(&grid, padded);
-        println!(
-            "{}: labels: {count} voxels, euler {} of {euler}, volume {:+.2} %",
-            if m.euler == euler { "ok" } else { "LABELS WRONG" },
-            m.euler,
-            100.0 * (m.volume / voxel / count as f64 - 1.0)
-        );
-        // Enrichment.
-        let before = expected(&case);
-        let Ok(enriched) = case.volume.enrich_slices(None, Default::default()) else { continue };
-        case.sides = enriched.spacing().map(|s| s as f32);
-        case.volume = enriched;
-        let Some((topology, volume)) = expected(&case) else { continue };
-        let model = settled(&case.volume, case.options.1.clone());
-        let m = measure(&model.surface());
-        let found = Topology { components: model.mesh().component_count(), euler: m.euler };
-        println!(
-            "  {} {}: enriched {:?}: {:+.2} %; {found:?} for {topology:?}; against linear {:?}",
-            if found == topology { "ok" } else { "ENRICHED WRONG" },
-            case.name,
-            case.sides,
-            100.0 * (m.volume / volume - 1.0),
-            before.map(|(t, v)| (t == topology, m.volume / v))
-        );
-    }
 }

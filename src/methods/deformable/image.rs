@@ -191,16 +191,37 @@ impl LevelImage {
     /// called.
     #[inline]
     pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
-        let Some(field) = &self.gradient else { return Vec3::ZERO };
-        let gradient = field.sample(self.index(p)) / Vec3::from(self.parts.map(|n| n as f32));
+        let gradient = if self.parts != [1; 3] {
+            self.gradient_by_parts(p)
+        } else if let Some(field) = &self.gradient {
+            field.sample(self.index(p))
+        } else {
+            return Vec3::ZERO;
+        };
         let length = gradient.length();
         if length > bound { gradient * (bound / length) } else { gradient }
     }
 
-    /// Computes the gradient image that [`Self::gradient`] samples if a gradient force acts, unless that was done before.
+    /// Returns the gradient by the Sobel operator on the parts of voxels, which is not stored: interpolated between parts,
+    /// it is the operator applied to the image at distances of whole parts.
+    fn gradient_by_parts(&self, p: Vec3) -> Vec3 {
+        let at = self.index(p);
+        let step = Vec3::from(self.parts.map(|n| 1.0 / n as f32));
+        let mut gradient = Vec3::ZERO;
+        for k in 0..27 {
+            let shift = Vec3::from([k % 3, k / 3 % 3, k / 9].map(|i| f32::from(i as i8) - 1.0));
+            let weight = Vec3::splat(2.0) - shift.abs();
+            let across = Vec3::new(weight.y * weight.z, weight.z * weight.x, weight.x * weight.y);
+            gradient += shift * across * self.grid.sample(at + shift * step);
+        }
+        gradient * (1.0 / 32.0)
+    }
+
+    /// Computes the gradient image that [`Self::gradient`] samples if a gradient force acts, unless that was done before; none if
+    /// voxels are divided.
     pub(super) fn prepare_gradient_for(&mut self, params: &DeformableParams) -> Result<(), MethodError> {
         let is_needed = params.gradient_normal != 0.0 || params.gradient_tangent != 0.0;
-        if is_needed && self.gradient.is_none() {
+        if is_needed && self.parts == [1; 3] && self.gradient.is_none() {
             self.gradient = Some(self.grid.sobel()?);
         }
         Ok(())
