@@ -242,7 +242,8 @@ export class DeformableModel implements Stepper {
 
   /**
    * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. It is √3 times larger on each
-   * coarser level. With anisotropic voxels, both bounds hold on average over all directions.
+   * coarser level. With anisotropic voxels, both bounds hold on average over all directions; those
+   * more than twice as long as wide count as several.
    */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());

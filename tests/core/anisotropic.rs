@@ -163,6 +163,8 @@ enum Profile {
     Edge,
     /// The mean over the voxel of what is inside, as a scanner measures it.
     Partial,
+    /// 1 or 0 by the centre, as a mask.
+    Mask,
 }
 
 struct Case {
@@ -191,10 +193,11 @@ fn case(seed: u64) -> Case {
     let dims = sides.map(|side| if side < 2.5 { 40 } else { (70.0 / side) as usize }).map(|n| n.max(7));
     let half = Vec3::from([0, 1, 2].map(|k| 0.5 * (dims[k] - 2) as f32 * sides[k]));
     let (kind, shape) = shape(random, half);
-    let profile = [Profile::Distance, Profile::Edge, Profile::Partial][random.below(3)];
+    let profile = [Profile::Distance, Profile::Edge, Profile::Partial, Profile::Mask][random.below(4)];
     let value = |p: Vec3| match profile {
         Profile::Distance => shape.depth(p),
         Profile::Edge => shape.depth(p).clamp(-2.0, 2.0),
+        Profile::Mask => f32::from(u8::from(shape.depth(p) > 0.0)),
         Profile::Partial => {
             let mut sum = 0.0;
             for k in 0..27 {
@@ -213,7 +216,7 @@ fn case(seed: u64) -> Case {
     }
     let (iso, per_side) = match profile {
         Profile::Distance | Profile::Edge => (0.0, 1.0),
-        Profile::Partial => (0.5, 0.3),
+        Profile::Partial | Profile::Mask => (0.5, 0.3),
     };
     let mut affine = DAffine3::from_scale(DVec3::from(sides.map(f64::from)));
     if random.below(2) == 0 {
