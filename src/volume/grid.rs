@@ -225,7 +225,7 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
 
 /// Returns the weight of the values of a grid of `dims` voxels against those of its padding at a point, in voxel indices.
 #[inline]
-pub(super) fn share_of_values(dims: [usize; 3], p: Vec3) -> f32 {
+pub(crate) fn share_of_values(dims: [usize; 3], p: Vec3) -> f32 {
     let last = |n: usize| (n - 1) as f32;
     padding_weight(p.x, last(dims[0]))
         * padding_weight(p.y, last(dims[1]))

@@ -11,6 +11,7 @@
 #[path = "../common/mod.rs"]
 pub(crate) mod common;
 
+mod anisotropic;
 // Reads the source files.
 mod anywhere;
 #[cfg(not(target_arch = "wasm32"))]

@@ -7,7 +7,8 @@ use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::remesh::clustered;
-use crate::volume::{Grid, marching_cubes};
+use crate::volume::{Subdivided, marching_cubes_of_slices};
+use std::borrow::Cow;
 
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
@@ -55,7 +56,7 @@ impl ObjectIs {
 }
 
 /// Extracts the iso-surface of a pyramid level in model space, closed and facing away from the object. Closed parts, of
-/// the object or around cavities, that enclose less than `smallest_part` voxels of the finest level are left out; if
+/// the object or around cavities, that enclose less than `smallest_part`, in model units, are left out; if
 /// none remains, the mesh is empty.
 pub(super) fn contour(
     image: &LevelImage,
@@ -63,18 +64,20 @@ pub(super) fn contour(
     object: ObjectIs,
     smallest_part: f64,
 ) -> Result<TriangleMesh, MethodError> {
-    let (grid, position) = image.grid();
-    Ok(placed(contour_of_grid(grid, iso, object)?, position).without_components_below(smallest_part))
+    let (grid, position) = image.part_grid();
+    Ok(placed(contour_of_grid(&grid, iso, object)?, position).without_components_below(smallest_part))
 }
 
-/// Extracts the iso-surface of a grid in voxel indices, closed and facing away from the object.
-pub(super) fn contour_of_grid(grid: &Grid, iso: f32, object: ObjectIs) -> Result<TriangleMesh, MethodError> {
+/// Extracts the iso-surface of a grid in indices of the parts of its voxels, closed and facing away from the object.
+pub(super) fn contour_of_grid(
+    grid: &Subdivided,
+    iso: f32,
+    object: ObjectIs,
+) -> Result<TriangleMesh, MethodError> {
+    let negated = |z: usize| Cow::Owned(grid.slice(z).iter().map(|value| -value).collect());
     Ok(match object {
-        ObjectIs::Brighter => marching_cubes(grid, iso)?,
-        ObjectIs::Darker => {
-            let values = grid.values.iter().map(|value| -value).collect();
-            marching_cubes(&Grid { dims: grid.dims, values }, -iso)?
-        }
+        ObjectIs::Brighter => marching_cubes_of_slices(grid.dims(), iso, &|z| grid.slice(z))?,
+        ObjectIs::Darker => marching_cubes_of_slices(grid.dims(), -iso, &negated)?,
     })
 }
 
@@ -87,7 +90,9 @@ pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) 
         return contour;
     }
     let side = if side > 1.0 { side } else { 1.0 };
-    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| (image.index(p) / side).round().as_ivec3())
+    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| {
+        (image.part_index(p) / side).round().as_ivec3()
+    })
 }
 
 /// Returns a surface with its positions mapped by `position`, for conversions between voxel indices of a level and

@@ -11,6 +11,11 @@
 //! edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
 //! [`DeformableModel::restore`].
 //!
+//! # Elongated voxels
+//! The surface has the topology of the trilinearly interpolated image, also where voxels are up to 20 times as long as
+//! wide: voxels more than twice as long are divided into nearly cubic parts, which are computed when they are needed.
+//! Where voxels remain elongated, beyond 62 times as long, reports carry [`crate::warning::WarningCode::Anisotropic`].
+//!
 //! # Limits
 //! With `adaptivity: 0`, sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner
 //! than that are lost, on coarse levels those thinner than the contact distance there.
@@ -95,7 +100,8 @@ pub struct DeformableOptions {
     /// lost there.
     pub levels: usize,
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
-    /// default 1.53 times the side of a cube with the volume of a voxel.
+    /// default 1.53 times the side of a cube with the volume of a voxel. Voxels more than twice as long as wide are divided
+    /// into nearly cubic parts, whose volume counts instead.
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -248,8 +254,9 @@ impl DeformableModel {
         Self::from_pyramid(pyramid, volume.affine(), origin)
     }
 
-    fn from_pyramid(pyramid: Pyramid, to_world: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+    fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
+        let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
         let finest_delta = finest_delta(edge, voxel)?;
         let level = pyramid.levels.len() - 1;
@@ -261,7 +268,7 @@ impl DeformableModel {
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
             iso: pyramid.normalised(params.iso),
             object: ObjectIs::by(&params),
-            smallest_part: params.smallest_part,
+            smallest_part: params.smallest_part * pyramid.voxel(),
             dims: pyramid.dims(),
             domain,
             from_world: to_world.inverse(),
@@ -454,6 +461,11 @@ impl DeformableModel {
         changes
     }
 
+    /// Returns the least volume of a part in model units.
+    fn smallest_part(&self) -> f64 {
+        self.params.smallest_part * self.pyramid.voxel()
+    }
+
     fn sampling(&self) -> Sampling {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
@@ -508,7 +520,7 @@ impl DeformableModel {
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.pyramid.warnings(),
         }
     }
 
@@ -611,7 +623,8 @@ impl DeformableModel {
         self.pyramid.delta_at(self.finest_delta, self.level)
     }
 
-    /// The mesh in model space, the index space of the volume, where voxels are unit cubes.
+    /// The mesh in model space: the index space of the volume, or of the parts into which elongated voxels are divided,
+    /// where these are unit cubes.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }

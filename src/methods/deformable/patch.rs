@@ -11,7 +11,7 @@ use crate::math::order::{combined_rank, sort_by_rank, sort_distinct, sort_ranks}
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices};
 use crate::methods::MethodError;
-use crate::volume::Region;
+use crate::volume::{Region, Subdivided};
 use std::collections::BTreeMap;
 
 /// The distance, in voxels, between the box whose contour is inserted and the one along which the mesh is cut. With
@@ -336,9 +336,10 @@ struct Piece {
 
 impl Piece {
     fn new(image: &LevelImage, at: PatchBox, rule: ContourRule) -> Result<Self, MethodError> {
-        let part = image.grid().0.part(at.voxels)?;
+        let part = image.part_grid().0.region(at.voxels)?;
         let offset = Vec3::from(at.voxels.min.map(|k| k as f32));
-        let mut surface = placed(contour_of_grid(&part, rule.iso, rule.object)?, |p| p + offset);
+        let mut surface =
+            placed(contour_of_grid(&Subdivided::whole(&part), rule.iso, rule.object)?, |p| p + offset);
         let component = surface.component_of_each_vertex();
         let volumes = surface.enclosed_volumes(&component);
         let is_inside: Vec<bool> = surface.positions.iter().map(|&p| at.inner.contains(p)).collect();

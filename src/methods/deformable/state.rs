@@ -81,7 +81,10 @@ impl DeformableModel {
             (false, decode(&MAGIC, bytes)?)
         };
         if state.fingerprint != self.fingerprint() {
-            let problem = "the state belongs to another volume, frame or number of levels".into();
+            let problem =
+                "the state belongs to another volume, frame or number of levels, or to a version that did \
+                           not divide elongated voxels"
+                    .into();
             return Err(MethodError::BadState { field: "volume", problem });
         }
         self.check_state(&state)?;
