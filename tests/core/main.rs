@@ -41,3 +41,4 @@ mod thin_structures;
 mod tracking;
 mod tracking_fuzz;
 mod volume_files;
+mod voxel_meaning;

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::remesh::clustered;
-use crate::volume::{Grid, marching_cubes};
+use crate::volume::{Grid, Padding, marching_cubes};
 
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
@@ -44,13 +44,25 @@ impl ObjectIs {
         }
     }
 
-    /// Returns the normalised intensity of the background, which is assumed outside the image so that every object ends
-    /// at the border.
-    pub(super) fn background(self) -> f32 {
+    /// Returns whether the object is above the iso value.
+    pub(super) fn is_above(self) -> bool {
+        self == Self::Brighter
+    }
+
+    /// Returns the normalised intensity of the background far from any object: 0 or 1, or beyond the iso value if that is
+    /// there or further out.
+    pub(super) fn background(self, iso: f32) -> f32 {
         match self {
-            Self::Brighter => 0.0,
-            Self::Darker => 1.0,
+            Self::Brighter if iso > 0.0 => 0.0,
+            Self::Brighter => iso - 1.0,
+            Self::Darker if iso < 1.0 => 1.0,
+            Self::Darker => iso + 1.0,
         }
+    }
+
+    /// Returns what is assumed outside the image, so that every object ends at the border.
+    pub(super) fn outside(self, iso: f32) -> Padding {
+        Padding { background: self.background(iso), iso }
     }
 }
 

@@ -239,7 +239,7 @@ impl DeformableModel {
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
-        let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
+        let pyramid = Pyramid::new(volume, options.frame, options.levels, &params)?;
         let origin = Origin { frame: options.frame, start: options.start, edge: options.edge, params };
         Self::from_pyramid(pyramid, volume.affine(), origin)
     }
@@ -255,7 +255,7 @@ impl DeformableModel {
         let context = StartContext {
             image: &pyramid.levels[level],
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
-            iso: pyramid.normalised(params.iso),
+            iso: pyramid.iso(&params),
             object: ObjectIs::by(&params),
             smallest_part: params.smallest_part,
             dims: pyramid.dims(),
@@ -515,9 +515,14 @@ impl DeformableModel {
     /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         self.check_params(&params)?;
+        let adapted = self.pyramid.adapted(&params)?;
+        let image = adapted.map(|adapted| std::mem::replace(&mut self.pyramid, adapted));
         let before = std::mem::replace(&mut self.params, params);
         if let Err(error) = self.prepare_level() {
             self.params = before;
+            if let Some(image) = image {
+                self.pyramid = image;
+            }
             return Err(error);
         }
         self.wake_all();
@@ -579,11 +584,11 @@ impl DeformableModel {
         self.motion.forces.forget_image();
         self.needs_factor = self.pyramid.levels[self.level].bricks().is_some();
         if self.needs_factor {
-            self.level_iso = self.pyramid.normalised(self.params.iso);
+            self.level_iso = self.pyramid.iso(&self.params);
             return Ok(());
         }
         self.level_iso = if self.seeds_levels() || self.pyramid.is_sparse() {
-            self.pyramid.normalised(self.params.iso)
+            self.pyramid.iso(&self.params)
         } else {
             coarse::iso(&self.pyramid, &self.params, self.level)
         };

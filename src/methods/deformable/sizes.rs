@@ -124,7 +124,8 @@ impl DeformableModel {
     /// object.
     fn depth(&self, p: Vec3) -> f32 {
         let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
-        object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
+        let outside = object.outside(self.level_iso);
+        object.depth(image.intensity(p, outside, &mut CellCache::default()), self.level_iso)
     }
 
     /// Returns for each slot whether its vertex is in `members`.
