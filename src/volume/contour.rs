@@ -21,9 +21,8 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// The mesh is closed, at the volume's border half a voxel beyond the outermost voxel centres; its triangles are
 /// counter-clockwise seen from the side where intensities are below `iso`.
 ///
-/// NaN counts as outside the volume, whatever `iso` is; between voxels of the object and NaN the surface is halfway. +∞ is
-/// inside and −∞ outside; they count as just as far from `iso` as the furthest neighbour on its other side.
-/// Intensities are compared with `iso` in double precision where `f32` would round them too coarsely.
+/// NaN counts as outside the volume, whatever `iso` is; +∞ is inside and −∞ outside. The surface is halfway between such a
+/// voxel and a neighbour on the other side. Intensities are compared with `iso` in double precision where `f32` would round them too coarsely.
 ///
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].

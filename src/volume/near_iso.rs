@@ -16,9 +16,9 @@ use fixedbitset::FixedBitSet;
 const RESOLVED: f64 = 1.0 / 65536.0;
 
 /// The width of the window of intensities around an iso value, in differences between neighbouring voxels across it. If
-/// it were narrower, the surface beside voxels that are clamped would be off by more than 1/128 of a voxel; if it were
+/// it were narrower, the surface beside voxels that are clamped would be off by more than 1/512 of a voxel; if it were
 /// wider, the image would be fainter.
-const WINDOW: f64 = 256.0;
+const WINDOW: f64 = 1024.0;
 
 /// The share of the differences across an iso value that are smaller than the one that stands for all: most may be those
 /// to voxels with a fill value, which are much larger than those within the image.
@@ -61,67 +61,50 @@ impl NotFinite {
         Some(Self { nan, high, low })
     }
 
+    /// Gives the voxels of `grid` that are not finite a finite value: NaN outside of the object, which is above `iso` if
+    /// `is_above`, and infinite ones on their side of `iso`. It is as far from `iso` as the mean of those of the six
+    /// neighbours that are on the other side, so that the surface is about halfway; if there are none, it is the value
+    /// in `far` for its side, below or above `iso`.
+    pub(crate) fn replace(&self, grid: &mut Grid, iso: f32, is_above: bool, far: [f32; 2]) {
+        let mut found = Vec::new();
+        for (voxels, becomes_high) in [(&self.low, false), (&self.high, true), (&self.nan, !is_above)] {
+            let is_opposite = |value: f32| {
+                if is_above { (value < iso) == becomes_high } else { (value > iso) != becomes_high }
+            };
+            for voxel in voxels.ones() {
+                let (mut sum, mut count) = (0.0f64, 0u32);
+                for other in face_neighbours(grid.dims, voxel).filter(|&other| !self.contains(other)) {
+                    let value = grid.values[other];
+                    if is_opposite(value) {
+                        sum += f64::from((value - iso).abs());
+                        count += 1;
+                    }
+                }
+                let mean = if count > 0 { (sum / f64::from(count)) as f32 } else { 0.0 };
+                let value = if becomes_high { iso + mean } else { iso - mean };
+                let is_beyond = if becomes_high { value > iso } else { value < iso };
+                found.push((voxel, if is_beyond { value } else { far[usize::from(becomes_high)] }));
+            }
+        }
+        found.into_iter().for_each(|(voxel, value)| grid.values[voxel] = value);
+    }
+
     fn contains(&self, voxel: usize) -> bool {
         self.nan.contains(voxel) || self.high.contains(voxel) || self.low.contains(voxel)
     }
-
-    /// Gives every infinite voxel of `grid` a finite value on its side of `iso`, as far from it as the furthest of its
-    /// neighbours on the other side; without such neighbours, the value for its side in `far`, below and above `iso`.
-    pub(crate) fn replace_infinite(&self, grid: &mut Grid, iso: f32, far: [f32; 2]) {
-        for (voxels, is_high) in [(&self.low, false), (&self.high, true)] {
-            let furthest = |voxel: usize| {
-                let mut furthest = 0.0f32;
-                for k in (0..27).filter(|&k| k != 13) {
-                    let shift = [k % 3, k / 3 % 3, k / 9];
-                    let Some(other) = neighbour(grid.dims, voxel, shift) else { continue };
-                    let value = grid.values[other];
-                    if (value < iso) == is_high && !self.contains(other) {
-                        furthest = furthest.max((value - iso).abs());
-                    }
-                }
-                let opposite = if is_high { iso + furthest } else { iso - furthest };
-                let is_beyond = opposite.is_finite() && if is_high { opposite > iso } else { opposite < iso };
-                if is_beyond { opposite } else { far[usize::from(is_high)] }
-            };
-            let found: Vec<f32> = voxels.ones().map(furthest).collect();
-            voxels.ones().zip(found).for_each(|(voxel, value)| grid.values[voxel] = value);
-        }
-    }
-
-    /// Gives every NaN voxel of `grid` a finite value outside of the object, which is above `iso` if `is_above`: as far
-    /// from `iso` as the mean of those of its six neighbours that are object, or `far` if none is.
-    pub(crate) fn replace_nan(&self, grid: &mut Grid, iso: f32, is_above: bool, far: f32) {
-        let opposite = |voxel: usize| {
-            let (mut sum, mut count) = (0.0f64, 0u32);
-            for shift in [[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1, 2]] {
-                let Some(other) = neighbour(grid.dims, voxel, shift) else { continue };
-                let value = grid.values[other];
-                let is_object = if is_above { value >= iso } else { value <= iso };
-                if is_object && !self.nan.contains(other) {
-                    sum += f64::from((value - iso).abs());
-                    count += 1;
-                }
-            }
-            let mean = if count > 0 { (sum / f64::from(count)) as f32 } else { 0.0 };
-            let value = if is_above { iso - mean } else { iso + mean };
-            if (value < iso) == is_above && value != iso { value } else { far }
-        };
-        let found: Vec<f32> = self.nan.ones().map(opposite).collect();
-        self.nan.ones().zip(found).for_each(|(voxel, value)| grid.values[voxel] = value);
-    }
 }
 
-/// Returns the index of the voxel beside another, `shift` less one steps away along each axis; `None` outside the grid.
-fn neighbour(dims: [usize; 3], voxel: usize, shift: [usize; 3]) -> Option<usize> {
-    let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
-    let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + shift[axis]).wrapping_sub(1));
-    (x < dims[0] && y < dims[1] && z < dims[2]).then(|| x + dims[0] * (y + dims[1] * z))
+/// Returns the indices of the voxels that share a face with another.
+fn face_neighbours([nx, ny, nz]: [usize; 3], voxel: usize) -> impl Iterator<Item = usize> {
+    let axes = [(1, nx, voxel % nx), (nx, ny, voxel / nx % ny), (nx * ny, nz, voxel / nx / ny)];
+    axes.into_iter().flat_map(move |(step, n, at)| {
+        [(at > 0).then(|| voxel - step), (at + 1 < n).then(|| voxel + step)].into_iter().flatten()
+    })
 }
 
 impl Volume {
     /// Returns one frame for marching cubes, and the iso value in the units of the grid: intensities as they are if `f32`
-    /// shows them well enough near `iso`, otherwise their differences from `iso`. NaN is kept; infinite voxels
-    /// that have a neighbour on the other side of `iso` are finite.
+    /// shows them well enough near `iso`, otherwise their differences from `iso`. NaN and infinite voxels are kept.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
@@ -135,11 +118,7 @@ impl Volume {
         let values = each!(self.voxels.as_ref(), values => {
             self.shifted(&values[start..start + self.frame_len()], shift)?
         });
-        let mut grid = Grid { dims: self.dims(), values };
-        if let Some(not_finite) = self.not_finite(frame)? {
-            not_finite.replace_infinite(&mut grid, iso, [f32::NEG_INFINITY, f32::INFINITY]);
-        }
-        Ok((grid, iso))
+        Ok((Grid { dims: self.dims(), values }, iso))
     }
 
     /// Returns the intensities of stored values less `shift`, in `f32`; a shift is subtracted in `f64`.

@@ -97,7 +97,7 @@ fn the_object_ends_at_the_border_whatever_the_iso_value() {
     let darker = model(&volume, darker_than(300.0));
     assert_near(volume_of(&darker.surface()), full, 0.01, "darker");
     let bounds = Bounds::from_points(&darker.surface().positions);
-    assert!(bounds.min.min_element() > -0.55 && bounds.max.max_element() < n as f32 - 0.45, "{bounds:?}");
+    assert!(bounds.min.min_element() > -0.6 && bounds.max.max_element() < n as f32 - 0.4, "{bounds:?}");
     for (iso, params) in [(300.0, at(300.0)), (1e300, at(1e300)), (100.0, darker_than(100.0))] {
         assert_eq!(model(&volume, params).mesh().vertex_count(), 0, "{iso}");
     }
@@ -107,14 +107,14 @@ fn the_object_ends_at_the_border_whatever_the_iso_value() {
 #[test]
 fn nan_is_outside_whatever_the_iso_value() {
     let (n, inside) = (24, ball(24, 7.2));
-    let [count, tolerance] = [1568.0, 0.015];
+    let [count, tolerance] = [1555.0, 0.01];
     let masked = floats(n, |p| if inside(p) < 0.0 { f64::NAN } else { 100.0 + inside(p) });
     for iso in [99.0, 50.0, -1e9] {
         assert_found(&masked, iso, [count; 2], tolerance);
         assert_eq!(voxels_above(&masked, iso), 1568);
     }
     let darker = model(&masked, darker_than(200.0));
-    assert_near(volume_of(&darker.surface()), count, tolerance, "darker");
+    assert_near(volume_of(&darker.surface()), count, 0.02, "darker");
     // Half of the object is masked; the border is there, as if the image ended.
     let half = floats(n, |p| if p.z > 11.0 { f64::NAN } else { inside(p) });
     let cropped = Volume::new(VolumeInit::new(
@@ -138,9 +138,7 @@ fn infinite_voxels_are_on_their_side() {
     let high = floats(n, |p| if inside(p) > 0.0 { f64::INFINITY } else { inside(p) - 0.5 });
     let low = floats(n, |p| if inside(p) < 0.0 { f64::NEG_INFINITY } else { inside(p) + 0.5 });
     for volume in [high, low] {
-        let contour = marching_cubes_world(&volume, 0.0, 0).unwrap();
-        println!("{}", volume_of(&contour));
-        assert_found(&volume, 0.0, [523.0; 2], 0.06);
+        assert_found(&volume, 0.0, [539.0; 2], 0.03);
     }
 }
 
@@ -152,15 +150,14 @@ fn fill_values_do_not_take_the_precision() {
     let ordinary = assert_found(&of(-72.0), 0.0, [1545.0, 1523.0], 0.005);
     for fill in [-9999.0, -1e6, -1e10, -3.402_823_5e38, 3.402_823_5e38] {
         let volume = of(fill);
-        let slab = if fill > 0.0 { (2 * n * n) as f64 } else { 0.0 };
         let contour = marching_cubes_world(&volume, 0.0, 0).unwrap();
         let surface = model(&volume, at(0.0)).surface();
         println!("{fill}: {} {}", volume_of(&contour), volume_of(&surface));
         if fill < 0.0 {
-            assert_found(&volume, 0.0, ordinary, 0.003);
+            assert_found(&volume, 0.0, ordinary, 0.01);
         } else {
             assert_eq!(euler_of_parts(&surface), [2, 2]);
-            assert_near(volume_of(&surface) - slab, ordinary[1], 0.1, "model");
+            assert_near(volume_of(&surface), volume_of(&contour), 0.015, "model");
         }
     }
 }
@@ -173,7 +170,7 @@ fn the_iso_value_may_change_beside_fill_values() {
     let mut model = model(&volume, at(-5e9));
     model.set_params(at(0.0)).unwrap();
     run(&mut model);
-    assert_near(volume_of(&model.surface()), 1523.0, 0.005, "model");
+    assert_near(volume_of(&model.surface()), 1545.0, 0.01, "model");
     let state = model.save();
     let options = DeformableOptions { params: Some(at(-5e9)), ..Default::default() };
     let mut restored = DeformableModel::new(&volume, options).unwrap();
@@ -220,7 +217,48 @@ fn the_model_closes_objects_at_the_border_as_marching_cubes_does() {
         let volume = scenes::volume([20, 20, depth], disc);
         let contour = volume_of(&marching_cubes_world(&volume, 0.0, 0).unwrap());
         let surface = volume_of(&model(&volume, at(0.0)).surface());
-        assert_near(surface, contour, if depth == 1 { 0.1 } else { 0.05 }, "a disc");
+        assert_near(surface, contour, 0.05, "a disc");
+    }
+}
+
+/// Returns an image of objects of 1 to 8 voxels each, several of each size, and the number of objects.
+fn specks(object: u8, background: u8) -> (Volume, Vec<u8>) {
+    let (n, mut values) = (40, vec![background; 40 * 40 * 40]);
+    let mut counts = Vec::new();
+    for k in 0..64 {
+        let corner = [2 + 9 * (k % 4), 2 + 9 * (k / 4 % 4), 2 + 9 * (k / 16)];
+        let count = 1 + k % 8;
+        // Voxels of a block, in an order such that each has a neighbour before it.
+        for i in [0, 1, 3, 2, 6, 4, 5, 7].into_iter().take(count) {
+            let at = [0, 1, 2].map(|axis| corner[axis] + (i >> axis & 1));
+            values[at[0] + n * (at[1] + n * at[2])] = object;
+        }
+        counts.push(count as u8);
+    }
+    (cube(n, Voxels::U8(values)), counts)
+}
+
+/// Objects of a few voxels are found if the smallest part is one voxel, and those that are smaller than it are not.
+#[test]
+fn objects_of_a_few_voxels_are_found() {
+    for (object, background, iso, params) in [
+        (200, 0, 100.0, at(100.0)),
+        (200, 0, 40.0, at(40.0)),
+        (200, 0, 150.0, at(150.0)),
+        (0, 200, 100.0, darker_than(100.0)),
+    ] {
+        let (volume, counts) = specks(object, background);
+        // At other iso values than the middle, the volumes are not those of the voxels.
+        for smallest in if iso == 100.0 { vec![1, 4, 8] } else { vec![1] } {
+            let params = DeformableParams { smallest_part: f64::from(smallest), ..params.clone() };
+            let expected = counts.iter().filter(|&&count| count >= smallest).count();
+            let surface = model(&volume, params).surface();
+            assert_eq!(euler_of_parts(&surface), vec![2; expected], "{iso}, {smallest}");
+            if smallest == 1 && object > background {
+                let contour = volume_of(&marching_cubes_world(&volume, iso, 0).unwrap());
+                assert_near(volume_of(&surface), contour, 0.3, "objects of a few voxels");
+            }
+        }
     }
 }
 

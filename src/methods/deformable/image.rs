@@ -348,8 +348,7 @@ impl Pyramid {
         let (iso, object) = (self.iso(params), ObjectIs::by(params));
         let grid = &mut self.levels[0].grid;
         let far = [ObjectIs::Brighter, ObjectIs::Darker].map(|object| object.background(iso));
-        not_finite.replace_infinite(grid, iso, far);
-        not_finite.replace_nan(grid, iso, object.is_above(), object.background(iso));
+        not_finite.replace(grid, iso, object.is_above(), far);
     }
 
     /// Makes `above` levels from the finest, the only one.

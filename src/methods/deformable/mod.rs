@@ -95,7 +95,8 @@ pub struct DeformableOptions {
     /// lost there.
     pub levels: usize,
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
-    /// default 1.53 times the side of a cube with the volume of a voxel.
+    /// default 1.53 times the side of a cube with the volume of a voxel, or 0.85 times in images of less than four voxels
+    /// along an axis.
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -125,6 +126,13 @@ const MEAN_EDGE: f64 = 1.7;
 /// The default δ on the finest level in voxels. It is near the upper end of the range that the paper gives, 0.693 to 1
 /// voxels (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
+
+/// The number of voxels along an axis below which an image is thin: all of its objects are.
+const FEW_SLICES: usize = 4;
+
+/// The default δ in thin images, in voxels. With [`DEFAULT_DELTA`], the rim of a disc in a single slice is rounded off, and
+/// the disc loses a seventh of its volume; with less, there are more vertices, but the same volume.
+const DELTA_OF_THIN: f64 = 0.5;
 
 /// The accepted range of δ, the lower edge bound, on the finest level in voxels: with less, a mesh of the whole image
 /// does not fit into memory; with more, the mesh misses the object.
@@ -247,7 +255,7 @@ impl DeformableModel {
     fn from_pyramid(pyramid: Pyramid, to_world: DAffine3, origin: Origin) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
-        let finest_delta = finest_delta(edge, voxel)?;
+        let finest_delta = finest_delta(edge, voxel, pyramid.dims())?;
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
         let domain = Domain::new(pyramid.dims(), delta);
@@ -644,9 +652,13 @@ impl DeformableModel {
 }
 
 /// Converts the option `edge`, the mean edge length in world units, to δ on the finest level in voxels; `None` gives
-/// [`DEFAULT_DELTA`]. `voxel` is the side, in world units, of a cube with the volume of a voxel.
-fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
-    let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
+/// [`DEFAULT_DELTA`], or less in an image of few slices. `voxel` is the side, in world units, of a cube with the volume of
+/// a voxel.
+fn finest_delta(edge: Option<f64>, voxel: f64, dims: [usize; 3]) -> Result<f64, MethodError> {
+    let Some(edge) = edge else {
+        let is_thin = dims.into_iter().any(|n| n < FEW_SLICES);
+        return Ok(if is_thin { DELTA_OF_THIN } else { DEFAULT_DELTA });
+    };
     let delta = edge / voxel / MEAN_EDGE;
     if DELTA_RANGE.contains(&delta) {
         return Ok(delta);
