@@ -13,6 +13,7 @@ pub(crate) mod common;
 
 // Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]
+mod agreement;
 mod architecture;
 mod decimate;
 mod deformable;
