@@ -72,6 +72,8 @@ struct Field {
     dims: [usize; 3],
     values: Vec<f64>,
     iso: f64,
+    /// The difference from the iso value of what is outside, where no object is beside it.
+    far: f64,
 }
 
 type Distance = Box<dyn Fn(Vec3) -> f32>;
@@ -135,7 +137,8 @@ fn scene(random: &mut Random, kind: Kind) -> ([usize; 3], Distance) {
         }
         if kind == Kind::Border {
             // Cut at a depth of at least half of the radius, on one to three sides.
-            for axis in 0..1 + random.below(3) {
+            let first = random.below(3);
+            for axis in (first..first + 1 + random.below(2)).map(|axis| axis % 3) {
                 let depth = 0.4 * radius * (random.unit() - 0.5);
                 centre[axis] = if random.below(2) == 0 { depth } else { (dims[axis] - 1) as f32 - depth };
             }
@@ -187,7 +190,7 @@ fn field(seed: u64, voxel: Vec3) -> (Kind, Field) {
         _ => for_each_voxel(dims, |p| offset + scale * f64::from(distance(p).clamp(-6.0, 6.0))),
     };
     if kind == Kind::Masked {
-        mask(&mut random, dims, voxel, iso, &mut values);
+        mask(&mut random, dims, voxel, [iso, scale], &mut values);
     }
     // Numbers of other sizes and types.
     match random.below(5) {
@@ -208,10 +211,11 @@ fn field(seed: u64, voxel: Vec3) -> (Kind, Field) {
         }
         _ => (),
     }
-    (kind, Field { dims, values, iso })
+    let far = iso - values.iter().copied().filter(|value| value.is_finite()).fold(iso, f64::max);
+    (kind, Field { dims, values, iso, far })
 }
 
-fn mask(random: &mut Random, dims: [usize; 3], voxel: Vec3, iso: f64, values: &mut [f64]) {
+fn mask(random: &mut Random, dims: [usize; 3], voxel: Vec3, [iso, scale]: [f64; 2], values: &mut [f64]) {
     let middle = Vec3::from(dims.map(|n| 0.5 * (n - 1) as f32)) * voxel;
     let normal =
         Vec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5).normalize_or(Vec3::X);
@@ -225,6 +229,9 @@ fn mask(random: &mut Random, dims: [usize; 3], voxel: Vec3, iso: f64, values: &m
         };
         if is_masked {
             values[k] = f64::NAN;
+        } else if kind == 2 {
+            // All that is not NaN is clearly object.
+            values[k] += 6.0 * scale;
         }
         k += 1;
         0.0
@@ -244,7 +251,6 @@ impl Field {
         if is_within(voxel) && !self.at(voxel).is_nan() {
             return self.at(voxel) - self.iso;
         }
-        let far = -1e-3 * (1.0 + self.iso.abs());
         let mut beside = Vec::new();
         if is_within(voxel) {
             for axis in 0..3 {
@@ -261,7 +267,7 @@ impl Field {
             let value = self.at(nearest);
             beside.extend((value >= self.iso).then_some(value - self.iso));
         }
-        if beside.is_empty() { far } else { -beside.iter().sum::<f64>() / beside.len() as f64 }
+        if beside.is_empty() { self.far } else { -beside.iter().sum::<f64>() / beside.len() as f64 }
     }
 
     /// Counts the upsampled voxels that are object.
@@ -348,32 +354,40 @@ fn counted([nx, ny, nz]: [usize; 3], is_object: &[bool]) -> Figures {
     Figures { parts, euler: 2 * euler, volume: count as f64 / (UPSAMPLED * UPSAMPLED * UPSAMPLED) as f64 }
 }
 
-/// Returns the number of connected parts of the object, or of the background.
-fn parts_of(dims: [usize; 3], is_object: &[bool], of_object: bool) -> i64 {
-    let mut is_found: Vec<bool> = is_object.iter().map(|&object| object != of_object).collect();
+/// Returns the number of connected parts of the object, connected through faces, or of the background, also through edges
+/// and corners.
+fn parts_of([nx, ny, nz]: [usize; 3], is_object: &[bool], of_object: bool) -> i64 {
+    // The neighbours that come before a voxel.
+    let mut before = Vec::new();
+    for shift in 0..13usize {
+        let by = [shift % 3, shift / 3 % 3, shift / 9].map(|step| step as isize - 1);
+        if !of_object || by.iter().filter(|&&step| step != 0).count() == 1 {
+            before.push(by);
+        }
+    }
+    let mut groups: Vec<u32> = (0..is_object.len() as u32).collect();
+    fn find(groups: &mut [u32], mut k: u32) -> u32 {
+        while groups[k as usize] != k {
+            groups[k as usize] = groups[groups[k as usize] as usize];
+            k = groups[k as usize];
+        }
+        k
+    }
     let mut parts = 0;
-    let mut stack = Vec::new();
-    for first in 0..is_found.len() {
-        if is_found[first] {
+    for k in 0..is_object.len() {
+        if is_object[k] != of_object {
             continue;
         }
         parts += 1;
-        is_found[first] = true;
-        stack.push(first);
-        while let Some(k) = stack.pop() {
-            let at = [k % dims[0], k / dims[0] % dims[1], k / dims[0] / dims[1]];
-            for shift in 0..27 {
-                let by = [shift % 3, shift / 3 % 3, shift / 9];
-                let axes = by.iter().filter(|&&step| step != 1).count();
-                if axes == 0 || of_object && axes > 1 {
-                    continue;
-                }
-                let [x, y, z] = [0, 1, 2].map(|axis| (at[axis] + by[axis]).wrapping_sub(1));
-                if x < dims[0] && y < dims[1] && z < dims[2] {
-                    let other = x + dims[0] * (y + dims[1] * z);
-                    if !std::mem::replace(&mut is_found[other], true) {
-                        stack.push(other);
-                    }
+        let at = [k % nx, k / nx % ny, k / nx / ny];
+        for by in &before {
+            let [x, y, z] = [0, 1, 2].map(|axis| at[axis].wrapping_add_signed(by[axis]));
+            let other = x.wrapping_add(nx.wrapping_mul(y.wrapping_add(ny.wrapping_mul(z))));
+            if x < nx && y < ny && z < nz && is_object[other] == of_object {
+                let [a, b] = [k, other].map(|k| find(&mut groups, k as u32));
+                if a != b {
+                    groups[a as usize] = b;
+                    parts -= 1;
                 }
             }
         }

@@ -43,6 +43,7 @@
 //! ```
 
 mod awake;
+mod balance;
 mod coarse;
 mod contour;
 mod coverage;
