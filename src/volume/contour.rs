@@ -22,10 +22,17 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// The mesh is closed, at the volume's border half a voxel beyond the outermost voxel centres; its triangles are
 /// counter-clockwise seen from the side where intensities are below `iso`.
 ///
+/// NaN counts as outside the volume, whatever `iso` is; +∞ is inside and −∞ outside. The surface is halfway between such a
+/// voxel and a neighbour on the other side. Intensities are compared with `iso` in double precision where `f32` would round them too coarsely.
+///
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
 pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
-    let mut mesh = marching_cubes(&volume.grid(frame)?, iso as f32)?;
+    if !iso.is_finite() {
+        return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
+    }
+    let (grid, iso) = volume.grid_at(iso, frame)?;
+    let mut mesh = marching_cubes(&grid, iso)?;
     to_world(&mut mesh, &volume.affine(), volume.dims());
     Ok(mesh)
 }
@@ -33,7 +40,7 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
 /// Extracts the iso-surface of a grid at `iso` by marching cubes, in index coordinates (voxel centres at integers). The
 /// mesh is empty if no value reaches `iso`.
 ///
-/// Values of `iso` and above are inside (NaN is outside); triangles are counter-clockwise seen from outside and have
+/// Values of `iso` and above are inside (NaN is outside, and the surface halfway to it); triangles are counter-clockwise seen from outside and have
 /// nonzero area. Inside voxels that share only an edge or a corner are not connected by the surface.
 ///
 /// # Errors
@@ -253,9 +260,17 @@ impl<'a> MarchingCubes<'a> {
 }
 
 /// Returns the fraction of the way from a node of value `a` to one of value `b` at which linear interpolation reaches
-/// `iso`, kept [`MARGIN`] away from both ends.
+/// `iso`, kept [`MARGIN`] away from both ends; a half if one of them is not finite.
 fn fraction(a: f32, b: f32, iso: f32) -> f32 {
-    let t = (iso - a) / (b - a);
+    let difference = b - a;
+    let t = if difference.is_finite() {
+        (iso - a) / difference
+    } else if a.is_finite() && b.is_finite() {
+        // Their difference overflows.
+        (0.5 * iso - 0.5 * a) / (0.5 * b - 0.5 * a)
+    } else {
+        0.5
+    };
     if t > 1.0 - MARGIN {
         1.0 - MARGIN
     } else if t > MARGIN {

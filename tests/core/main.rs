@@ -13,8 +13,9 @@ pub(crate) mod common;
 
 mod anisotropic;
 // Reads the source files.
-mod anywhere;
 #[cfg(not(target_arch = "wasm32"))]
+mod agreement;
+mod anywhere;
 mod architecture;
 mod decimate;
 mod deformable;
@@ -45,3 +46,4 @@ mod tracking;
 mod tracking_fuzz;
 mod tracking_input;
 mod volume_files;
+mod voxel_meaning;

@@ -82,7 +82,7 @@ impl DeformableModel {
     /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
         self.check_is_whole()?;
-        let iso = self.pyramid.normalised(self.params.iso);
+        let iso = self.pyramid.iso(&self.params);
         let object = ObjectIs::by(&self.params);
         let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.smallest_part())?;
         let model = self.mesh.to_triangles();

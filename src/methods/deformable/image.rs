@@ -7,11 +7,12 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::DeformableParams;
+use super::contour::ObjectIs;
 use crate::math::order::median;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use crate::volume::{
-    BrickGrid, CellCache, Grid, Region, SparseVolume, Subdivided, VectorGrid, Volume, share_of_values,
+    BrickGrid, CellCache, Grid, NotFinite, Padding, Region, SparseVolume, Subdivided, VectorGrid, Volume,
 };
 use crate::warning::{Warning, WarningCode};
 
@@ -57,6 +58,10 @@ fn parts_of_whole(sides: [f64; 3], dims: [usize; 3]) -> [usize; 3] {
     }
     parts
 }
+/// The largest distance of the iso value from the range 0..1 of the normalised intensities where all of them are object.
+/// The object then ends half a voxel beyond its voxels whatever it is; with more, the image is so steep there
+/// that vertices oscillate, with 0, it is flat where the intensities are those at the end of the range.
+const MAX_BEYOND: f32 = 0.5;
 
 /// One level of the image pyramid, sampled at positions in model space.
 #[derive(Debug)]
@@ -156,33 +161,34 @@ impl LevelImage {
         p * self.part_scale + self.part_offset
     }
 
+    /// Returns the number of parts of voxels of this level per model unit, along each axis.
+    pub(super) fn part_scale(&self) -> Vec3 {
+        self.part_scale
+    }
+
     /// Returns the grid of the parts of voxels, and a map from its indices to model space.
     pub(super) fn part_grid(&self) -> (Subdivided<'_>, impl Fn(Vec3) -> Vec3) {
         (Subdivided::new(&self.grid, self.parts), |index| (index - self.part_offset) / self.part_scale)
     }
 
-    /// Returns Π, the trilinearly interpolated intensity in 0..1, at a position in model space, and `background`
-    /// outside the image, so that every object ends at its border. `known` caches the image cell of the last call for
+    /// Returns Π, the trilinearly interpolated intensity in 0..1, at a position in model space, in the image with
+    /// `outside` around it, so that every object ends at its border. `known` caches the image cell of the last call for
     /// the same vertex.
     #[inline]
-    pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
+    pub(super) fn intensity(&self, p: Vec3, outside: Padding, known: &mut CellCache) -> f32 {
+        let index = self.index(p);
         if self.parts == [1; 3] {
-            return self.intensity_at(self.index(p), background, known);
+            return match self.bricks() {
+                None => self.grid.sample_padded(index, outside, known),
+                Some(bricks) => bricks.sample_padded(index, outside, known),
+            };
         }
         // Padding by parts, as the contour has it, which ends half a voxel beyond the centres; padding by long voxels would
         // end more than that beyond the centres where the object is bright.
-        let last = Vec3::from(self.grid.dims.map(|n| (n - 1) as f32));
-        let share = share_of_values(self.part_grid().0.dims(), self.part_index(p));
-        let value = self.intensity_at(self.index(p).clamp(Vec3::ZERO, last), background, known);
-        background + share * (value - background)
-    }
-
-    /// Returns the intensity at an index in voxels of this level, and `background` outside.
-    #[inline]
-    fn intensity_at(&self, index: Vec3, background: f32, known: &mut CellCache) -> f32 {
+        let parts = (self.part_grid().0.dims(), self.part_index(p));
         match self.bricks() {
-            None => self.grid.sample_padded(index, background, known),
-            Some(bricks) => bricks.sample_padded(index, background, known),
+            None => self.grid.sample_padded_by(parts, index, outside, known),
+            Some(bricks) => bricks.sample_padded_by(parts, index, outside, known),
         }
     }
 
@@ -327,8 +333,19 @@ pub(super) struct Pyramid {
     spacing: [f64; 3],
     /// The numbers of parts into which the voxels of the volume are divided along each axis.
     parts: [usize; 3],
+    /// The intensity that is normalised to 0, and the range that is normalised to 0..1.
     low: f64,
     range: f64,
+    /// The lowest intensity of the volume, and its range: those above, unless differences across the iso value are too
+    /// small for that.
+    volume_range: [f64; 2],
+    /// The volume and the index of its frame, if what is normalised to 0..1 may depend on the iso value.
+    source: Option<(Volume, usize)>,
+    /// The voxels of the finest level that are not finite. Their values depend on the iso value and the side of it on
+    /// which the object is.
+    not_finite: Option<NotFinite>,
+    /// The iso value of the volume, and the side of it on which the object is, that `source` and `not_finite` were used for.
+    made_for: (f64, ObjectIs),
     /// The sum of the hashes of all voxels of the finest level, or of the coarsest of a sparse volume, by which a saved
     /// state is matched to its volume.
     hash: u64,
@@ -346,12 +363,20 @@ pub(super) struct SparseLevels {
 }
 
 impl Pyramid {
-    /// Builds the image pyramid of a frame, with `above` levels above the volume itself.
+    /// Builds the image pyramid of a frame, with `above` levels above the volume itself, for the iso value of `params`.
+    ///
+    /// Intensities are normalised by the range of the volume; if single precision then shows the image near the iso value
+    /// too coarsely, since a few voxels are far beyond all others, by a window around it.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for more levels than the volume allows; [`MethodError::Volume`] if there is no
     /// such frame or memory does not suffice.
-    pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
+    pub(super) fn new(
+        volume: &Volume,
+        frame: usize,
+        above: usize,
+        params: &DeformableParams,
+    ) -> Result<Self, MethodError> {
         let parts = parts_of_whole(volume.spacing(), volume.dims());
         let possible = most_levels_above(volume, parts)?;
         if above > possible {
@@ -359,25 +384,110 @@ impl Pyramid {
             let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
             return Err(MethodError::invalid("levels", problem));
         }
-        let mut grid = volume.normalised_grid(frame)?;
-        let mut spacing = volume.spacing();
+        let grid = volume.normalised_grid(frame)?;
+        let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
+        let volume_range = [volume.range()[0], volume.span()];
+        let divided = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
+        let mut pyramid = Self {
+            levels: vec![LevelImage::new(grid, parts, divided)],
+            spacing: volume.spacing(),
+            parts,
+            low: volume_range[0],
+            range: volume_range[1],
+            volume_range,
+            source: None,
+            not_finite: volume.not_finite(frame)?,
+            made_for: (params.iso, ObjectIs::by(params)),
+            hash,
+            sparse: None,
+        };
+        if let Some([low, high]) = volume.window_at(params.iso, frame)? {
+            [pyramid.low, pyramid.range] = [low, high - low];
+            pyramid.levels = vec![LevelImage::new(volume.grid_in([low, high], frame)?, parts, divided)];
+        }
+        if pyramid.is_windowed() || volume.is_wide(frame)? {
+            pyramid.source = Some((volume.clone(), frame));
+        }
+        pyramid.set_not_finite(params);
+        pyramid.build_levels(above)?;
+        Ok(pyramid)
+    }
+
+    /// Returns the pyramid for other parameters, if its voxels depend on them and differ; otherwise `None`.
+    ///
+    /// # Errors
+    /// [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn adapted(&self, params: &DeformableParams) -> Result<Option<Self>, MethodError> {
+        if self.made_for == (params.iso, ObjectIs::by(params)) {
+            return Ok(None);
+        }
+        let above = self.levels.len() - 1;
+        if let Some((volume, frame)) = &self.source
+            && (self.is_windowed() || volume.window_at(params.iso, *frame)?.is_some())
+        {
+            return Self::new(volume, *frame, above, params).map(Some);
+        }
+        if self.not_finite.is_none() {
+            return Ok(None);
+        }
+        let finest = LevelImage::new(self.levels[0].grid.clone(), self.parts, self.dims());
+        let mut adapted = Self {
+            levels: vec![finest],
+            source: self.source.clone(),
+            not_finite: self.not_finite.clone(),
+            made_for: (params.iso, ObjectIs::by(params)),
+            sparse: None,
+            ..*self
+        };
+        adapted.set_not_finite(params);
+        adapted.build_levels(above)?;
+        Ok(Some(adapted))
+    }
+
+    /// Returns whether the finest level has the values of [`Volume::normalised_grid`], each of which depends on its voxel
+    /// and the range of the volume only.
+    pub(super) fn is_as_normalised(&self) -> bool {
+        !self.is_windowed() && self.not_finite.is_none()
+    }
+
+    /// Returns whether a window around the iso value is normalised to 0..1, not the range of the volume.
+    fn is_windowed(&self) -> bool {
+        [self.low, self.range] != self.volume_range
+    }
+
+    /// Replaces the volume that other windows may be taken from.
+    pub(super) fn set_source(&mut self, volume: &Volume, frame: usize) {
+        if self.source.is_some() {
+            self.source = Some((volume.clone(), frame));
+        }
+    }
+
+    /// Gives values to the voxels of the finest level that are not finite: NaN is never object, infinite voxels are on
+    /// their side of the iso value.
+    fn set_not_finite(&mut self, params: &DeformableParams) {
+        let Some(not_finite) = &self.not_finite else { return };
+        let (iso, object) = (self.iso(params), ObjectIs::by(params));
+        let grid = &mut self.levels[0].grid;
+        let far = [ObjectIs::Brighter, ObjectIs::Darker].map(|object| object.background(iso));
+        not_finite.replace(grid, iso, object.is_above(), far);
+    }
+
+    /// Makes `above` levels from the finest, the only one.
+    fn build_levels(&mut self, above: usize) -> Result<(), MethodError> {
+        let mut spacing = self.spacing;
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
-        let mut levels = Vec::with_capacity(above + 1);
-        let finest = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
-        let mut level_parts = parts;
-        for _ in 0..above {
-            let (coarse, coarse_spacing) =
-                grid.reduce_along(level_parts.map(|n| n == 1), spacing, unit, REDUCTION)?;
-            levels.push(LevelImage::new(std::mem::replace(&mut grid, coarse), level_parts, finest));
+        let finest = self.dims();
+        let mut level_parts = self.parts;
+        for level in 0..above {
+            let grid = &self.levels[level].grid;
+            let along = level_parts.map(|n| n == 1);
+            let (coarse, coarse_spacing) = grid.reduce_along(along, spacing, unit, REDUCTION)?;
+            level_parts = parts_on_coarse_level(self.parts, coarse_spacing, coarse.dims);
+            self.levels.push(LevelImage::new(coarse, level_parts, finest));
             spacing = coarse_spacing;
             unit *= REDUCTION;
-            level_parts = parts_on_coarse_level(parts, spacing, grid.dims);
         }
-        levels.push(LevelImage::new(grid, level_parts, finest));
-        let spacing = volume.spacing();
-        let hash = hash_of(&levels[0].grid, Region { min: [0; 3], dims: volume.dims() });
-        let (low, range) = (volume.range()[0], volume.span());
-        Ok(Self { levels, spacing, parts, low, range, hash, sparse: None })
+        Ok(())
     }
 
     /// Makes the pyramid of a sparse volume from its level `finest` on, the coarsest level whole.
@@ -415,7 +525,20 @@ impl Pyramid {
         }
         IS_ANY_SPARSE.store(true, Ordering::Relaxed);
         let sparse = Some(SparseLevels { volume: volume.clone(), finest, reach: super::sparse::REACH });
-        Ok(Self { levels, spacing, parts, low: volume.range()[0], range: volume.span(), hash, sparse })
+        let volume_range = [volume.range()[0], volume.span()];
+        Ok(Self {
+            levels,
+            spacing,
+            parts,
+            low: volume_range[0],
+            range: volume_range[1],
+            volume_range,
+            source: None,
+            not_finite: None,
+            made_for: (0.0, ObjectIs::Brighter),
+            hash,
+            sparse,
+        })
     }
 
     /// Returns whether this is the pyramid of a sparse volume.
@@ -489,20 +612,31 @@ impl Pyramid {
         self.hash
     }
 
-    /// Returns whether intensities are normalised by the range of `volume`.
+    /// Returns whether the range of `volume` is that of the volume of the pyramid.
     pub(super) fn has_range_of(&self, volume: &Volume) -> bool {
-        [self.low, self.range] == [volume.range()[0], volume.span()]
+        self.volume_range == [volume.range()[0], volume.span()]
     }
 
-    /// Maps an intensity in the volume's units such that the range of the volume becomes 0..1. Results are clamped to
+    /// Returns the iso value π_I, normalised as intensities are. If all of these are object, it is [`MAX_BEYOND`] from them
+    /// at most.
+    pub(super) fn iso(&self, params: &DeformableParams) -> f32 {
+        let iso = self.normalised(params.iso);
+        match ObjectIs::by(params) {
+            ObjectIs::Brighter if iso < -MAX_BEYOND => -MAX_BEYOND,
+            ObjectIs::Darker if iso > 1.0 + MAX_BEYOND => 1.0 + MAX_BEYOND,
+            _ => iso,
+        }
+    }
+
+    /// Maps an intensity in the volume's units such that the range of the pyramid becomes 0..1. Results are clamped to
     /// ±[`MAX_NORMALISED`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
         ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }
 
-    /// Returns the intensity in the volume's units that is normalised to 0, and the range that is normalised to 0..1.
-    pub(super) fn range(&self) -> [f64; 2] {
-        [self.low, self.range]
+    /// Returns the lowest intensity of the volume, and its range.
+    pub(super) fn volume_range(&self) -> [f64; 2] {
+        self.volume_range
     }
 
     /// Returns the lengths of a model unit along the axes, in world units.

@@ -43,17 +43,21 @@ impl DeformableModel {
             return Err(MethodError::invalid("volume", problem));
         }
         let new = volume.normalised_region(region, self.frame)?;
-        if !self.pyramid.has_range_of(volume) {
+        let is_local = self.pyramid.is_as_normalised() && volume.is_finite_in(region, self.frame)?;
+        if !is_local || !self.pyramid.has_range_of(volume) {
             return self.refresh_range(volume, region);
         }
+        self.pyramid.set_source(volume, self.frame);
         let Some((changed, new)) = self.pyramid.changes(region, &new)? else { return Ok(()) };
         self.refresh_changed(changed, &new)
     }
 
-    /// Adapts the model to a volume whose range has changed, by which all intensities are normalised.
+    /// Adapts the model to a volume whose range has changed, by which all intensities are normalised, or in which
+    /// voxels depend on others than themselves.
     fn refresh_range(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
         let levels = self.pyramid.levels.len() - 1;
-        let before = std::mem::replace(&mut self.pyramid, Pyramid::new(volume, self.frame, levels)?);
+        let new = Pyramid::new(volume, self.frame, levels, &self.params)?;
+        let before = std::mem::replace(&mut self.pyramid, new);
         if let Err(error) = self.prepare_level() {
             self.pyramid = before;
             return Err(error);

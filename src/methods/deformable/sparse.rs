@@ -366,12 +366,13 @@ impl DeformableModel {
     /// Returns the factor on α_I, the strength of the image force, of a sparse level, by the steepness of the image at the
     /// vertices.
     pub(super) fn measured_factor(&self) -> f32 {
-        let (image, background) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params).background());
+        let image = &self.pyramid.levels[self.level];
+        let outside = ObjectIs::by(&self.params).outside(self.level_iso);
         let half = 0.5 / image.voxels_per_unit();
         let mut steepness = Vec::new();
         for v in self.followed_vertices() {
             let (p, offset) = (self.mesh.position(v), self.mesh.unit_normal(v) * half);
-            let at = |p: Vec3| image.intensity(p, background, &mut CellCache::default());
+            let at = |p: Vec3| image.intensity(p, outside, &mut CellCache::default());
             let [inside, outside] = [at(p - offset), at(p + offset)];
             if (inside < self.level_iso) != (outside < self.level_iso) {
                 steepness.push((inside - outside).abs() / (2.0 * half));

@@ -177,6 +177,8 @@ impl DeformableModel {
     }
 
     fn resolve_sized(&mut self) -> Result<(), MethodError> {
+        let all: Vec<_> = self.mesh.vertices().collect();
+        self.set_sizes_of_small_parts(&all);
         self.resolve_everywhere()?;
         // A contour of the finest level is close to the result. Other starts are sized once they have settled.
         if self.level == 0 && self.set_sizes() {
