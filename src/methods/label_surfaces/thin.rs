@@ -23,11 +23,11 @@ const UNBALANCED: f64 = 5e-3;
 /// The relative difference that is left then.
 const BALANCED: f64 = 2e-3;
 /// The largest number of times that a label is balanced by itself; each leaves about half of the difference.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 40;
 /// The number of times that volumes are measured for this.
-const MEASURES: usize = 3;
+const MEASURES: usize = 5;
 /// The share of the difference that has to be left by a round for another one to be made.
-const PROGRESS: f64 = 0.97;
+const PROGRESS: f64 = 0.99;
 /// Least displacement along the normal, in voxels, for which a cell must have room to take part.
 const ROOM: f32 = 0.02;
 
