@@ -3,8 +3,9 @@
 //!
 //! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
 //! (`nets`), whose vertices are smoothed within the grid's cells (`smooth`), so that each voxel stays on its side of
-//! every surface. What smoothing takes from the volume of a label is given back (`balance`), and intersections are
-//! resolved (`untangle`). All of this is local: after a change of some voxels, only cells nearby are touched.
+//! every surface. What smoothing takes from the volume of a label is given back (`balance`; `thin` for labels of a voxel
+//! or two), and intersections are resolved (`untangle`). A label whose volume is still more than 1 % off is named in a
+//! warning. All of this is local: after a change of some voxels, only cells nearby are touched.
 //!
 //! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
 
@@ -381,7 +382,8 @@ impl LabelSurfaces {
         let warning = |(&number, error): (&u16, &f64)| {
             let label = self.nets.grid.value(number);
             let text = format!(
-                "label {label}: the volume of its surface is {:.1} % {} than that of its voxels, of which it is too thin",
+                "label {label}: the volume of its surface is {:.1} % {} than that of its voxels; parts of it are as thin as a \
+                 voxel, or its edges are long",
                 error.abs() * 100.0,
                 if *error < 0.0 { "less" } else { "more" }
             );

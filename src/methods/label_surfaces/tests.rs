@@ -156,8 +156,8 @@ fn slanted_layers_of_two_voxels_have_their_volume() {
         [DVec3::ONE, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(5.0, 2.0, 1.0)]
     {
         for others in [[1, 3], [0, 0], [1, 0]] {
-            // In steps of whole voxels along an axis, two voxels are as thin as this.
-            let thickness = 2.0 * across.min_element().max(1.0) / across.length();
+            // Two voxels along the axis nearest to the direction.
+            let thickness = 2.0 * across.max_element() / across.length();
             let what = format!("{across}, between {others:?}");
             let volume = layers(24, across, thickness, others);
             let mut surfaces = settled(&volume);
