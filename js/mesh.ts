@@ -453,7 +453,8 @@ export class Mesh {
    *
    * @param edge - Bounds of edge lengths, world units: `min` above 0, `max` more than twice `min`.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
-   *   `too-large` where more than eight million vertices would be needed.
+   *   `too-large` where more than eight million vertices would be needed; `precision` where `max` is below 64 times the
+   *   spacing of single-precision numbers at the largest coordinate.
    */
   remesh(edge: { min: number; max: number }): void {
     const [min, max] = edgeBounds(edge);
@@ -472,8 +473,8 @@ export class Mesh {
    * Entry points with one method lack it.
    *
    * @param options - `iterations`: 0 to 10,000. `keepVolume`: whether each connected component keeps the volume that it
-   *   encloses, by a small offset along the normals; default true. Where its vertices cannot move without
-   *   self-intersections, the volume may differ.
+   *   encloses; default true. Volume is given back where it was lost, so that thin parts stay and lengths are kept. Where
+   *   vertices cannot move without self-intersections, the volume may differ.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
    */
   smooth(options: { iterations: number; keepVolume?: boolean }): void {

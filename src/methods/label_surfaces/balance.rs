@@ -14,7 +14,7 @@ const AVERAGES: usize = 24;
 /// Share of the difference to each neighbour that a cell adopts in one average; below one sixth, which keeps it stable.
 const SHARE: f32 = 1.0 / 7.0;
 /// Largest displacement at once, in voxels.
-const MOST: f32 = 0.25;
+pub const MOST: f32 = 0.25;
 
 /// The surface around a cell in which two labels meet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,7 +30,8 @@ impl Zone {
     /// Moves the cells so that volumes are nearer those of the voxels.
     pub fn balance(&mut self) {
         let around = self.measure_around();
-        let gains = self.averaged(around.iter().map(|around| around.gain).collect());
+        let links = self.links.iter().map(|links| &links.alike);
+        let gains = averaged(around.iter().map(|around| around.gain).collect(), links);
         for (i, (around, [gain, size])) in around.iter().zip(gains).enumerate() {
             if size > 0.0 {
                 let shift = around.area.normalize_or_zero() * (gain / size).clamp(-MOST, MOST);
@@ -58,26 +59,33 @@ impl Zone {
 
     /// Returns the volume that the label of lower number has gained at a polygon, and the polygon's area, normal to it
     /// and away from that label.
-    fn gain(&self, polygon: &Polygon) -> (f32, Vec3) {
-        let corners = self.corners(polygon);
-        let halves =
-            halves(corners.map(|(middle, offset)| middle + offset)).map(|half| half.map(|i| corners[i]));
-        let area = halves.iter().map(|half| area_of(half.map(|(middle, offset)| middle + offset))).sum();
-        (halves.iter().map(swept).sum(), area)
+    pub fn gain(&self, polygon: &Polygon) -> (f32, Vec3) {
+        gain_of(self.corners(polygon))
     }
+}
 
-    /// Returns gains averaged with those of neighbours where the same two labels meet, again and again. What one cell
-    /// gives, another one gets, so that sums are kept.
-    fn averaged(&self, mut gains: Vec<[f32; 2]>) -> Vec<[f32; 2]> {
-        for _ in 0..AVERAGES {
-            let next = gains.iter().zip(&self.links).map(|(&own, links)| {
-                let others = links.alike.map(|j| gains[j as usize]);
-                [0, 1].map(|k| others.iter().fold(own[k], |sum, other| sum + (other[k] - own[k]) * SHARE))
-            });
-            gains = next.collect();
-        }
-        gains
+/// Returns the volume that a polygon has swept since its corners, given with their displacements, were in the middle of
+/// their cells, and its area, normal to it.
+pub fn gain_of(corners: [(Vec3, Vec3); 4]) -> (f32, Vec3) {
+    let halves = halves(corners.map(|(middle, offset)| middle + offset)).map(|half| half.map(|i| corners[i]));
+    let area = halves.iter().map(|half| area_of(half.map(|(middle, offset)| middle + offset))).sum();
+    (halves.iter().map(swept).sum(), area)
+}
+
+/// Returns gains averaged with those of neighbours, which `links` name for each, again and again. What one gives, another
+/// one gets, so that sums are kept.
+pub fn averaged<'a>(
+    mut gains: Vec<[f32; 2]>,
+    links: impl Iterator<Item = &'a [u32; 6]> + Clone,
+) -> Vec<[f32; 2]> {
+    for _ in 0..AVERAGES {
+        let next = gains.iter().zip(links.clone()).map(|(&own, links)| {
+            let others = links.map(|j| gains[j as usize]);
+            [0, 1].map(|k| others.iter().fold(own[k], |sum, other| sum + (other[k] - own[k]) * SHARE))
+        });
+        gains = next.collect();
     }
+    gains
 }
 
 /// Returns the volume that a triangle sweeps while its corners, given with their displacements, move straight, positive

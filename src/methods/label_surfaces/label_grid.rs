@@ -57,6 +57,11 @@ impl LabelGrid {
         self.values[usize::from(number) - 1]
     }
 
+    /// Returns the number of voxels of the label that `number`, which is not [`BACKGROUND`], stands for.
+    pub fn voxels(&self, number: u16) -> usize {
+        self.voxels.get(usize::from(number) - 1).copied().unwrap_or(0)
+    }
+
     /// Returns the number that stands for a label, if the volume has, or had, voxels of it that get a surface.
     pub fn number(&self, value: f64) -> Option<u16> {
         self.by_rank.get(&rank_f64(value)).copied()

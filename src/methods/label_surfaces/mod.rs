@@ -3,8 +3,9 @@
 //!
 //! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
 //! (`nets`), whose vertices are smoothed within the grid's cells (`smooth`), so that each voxel stays on its side of
-//! every surface. What smoothing takes from the volume of a label is given back (`balance`), and intersections are
-//! resolved (`untangle`). All of this is local: after a change of some voxels, only cells nearby are touched.
+//! every surface. What smoothing takes from the volume of a label is given back (`balance`; `thin` for labels of a voxel
+//! or two), and intersections are resolved (`untangle`). A label whose volume is still more than 1 % off is named in a
+//! warning. All of this is local: after a change of some voxels, only cells nearby are touched.
 //!
 //! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
 
@@ -20,6 +21,7 @@ mod nets;
 mod params;
 mod smooth;
 mod state;
+mod thin;
 mod untangle;
 mod versions;
 mod zone;
@@ -32,11 +34,13 @@ use crate::methods::method::method;
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
 use crate::remesh::Changes;
 use crate::volume::{Region, Volume, listed};
+use crate::warning::{Place, Warning, WarningCode};
 use cells::CellBox;
 use components::Components;
 use counts::Counts;
 use label_grid::LabelGrid;
 use nets::Nets;
+use std::collections::{BTreeMap, BTreeSet};
 use versions::Versions;
 use zone::Zone;
 
@@ -49,6 +53,11 @@ const WORK: usize = 200_000;
 const BETWEEN: u32 = 4;
 /// Number of times that volumes are balanced at the end.
 const BALANCES: u32 = 3;
+/// The relative error of a label's volume above which there is a warning.
+const WARNED: f64 = 0.01;
+/// The relative error of a thin label's volume, as far as it is quickly seen, above which it is balanced by itself, and
+/// measured. With half of it, labels are changed that are right; with twice as much, errors of 1 % may be missed.
+const NOTED: f64 = 0.004;
 /// Distance from a change, in cells, up to which surfaces are smoothed again.
 const HALO: u32 = 6;
 /// Largest distance of the volume from the origin of world space, in voxels: positions in single precision are then as
@@ -71,6 +80,8 @@ pub struct LabelSurfaces {
     label_counts: Vec<Counts>,
     components: Components,
     versions: Versions,
+    /// The relative error of the volume of each label for which it is above [`WARNED`], by number.
+    off: BTreeMap<u16, f64>,
     clock: fn() -> f64,
 }
 
@@ -123,6 +134,7 @@ impl LabelSurfaces {
             steps: 0,
             residual: f64::NAN,
             versions: Versions::default(),
+            off: BTreeMap::new(),
             clock: || 0.0,
         };
         surfaces.recount();
@@ -265,6 +277,9 @@ impl LabelSurfaces {
             let mut reconnected = self.nets.no_labels();
             self.coarsen(self.nets.everywhere(), &[], &mut reconnected);
             self.versions.record(&[], &reconnected);
+            if self.zone.is_none() {
+                self.measure_all();
+            }
         }
         Ok(())
     }
@@ -287,6 +302,7 @@ impl LabelSurfaces {
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
             let (offsets, diagonals) = (zone.offsets.clone(), zone.diagonals());
+            let mut noted = Vec::new();
             self.timed("smoothing", &mut times, |surfaces| {
                 for i in 1..=wanted {
                     surfaces.residual = zone.smooth();
@@ -298,7 +314,13 @@ impl LabelSurfaces {
             self.timed("volumes", &mut times, |surfaces| {
                 let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
                 (0..balances).for_each(|_| zone.balance());
+                if is_last {
+                    noted = surfaces.noted(&zone);
+                }
                 zone.write(&mut surfaces.nets);
+                if balances > 0 && !noted.is_empty() {
+                    zone.balance_thin(&mut surfaces.nets, &noted);
+                }
             });
             let area = zone.area.grown(1, self.nets.grid.dims());
             let mut untangled = Vec::new();
@@ -311,13 +333,72 @@ impl LabelSurfaces {
                 // Diagonals around these are not known, as far as they are outside the zone.
                 surfaces.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
             });
+            let seen = if is_last { zone.numbers() } else { Vec::new() };
             self.zone = (!is_last).then_some(zone);
             self.timed("coarsening", &mut times, |surfaces| {
                 surfaces.coarsen(area, &untangled, &mut reconnected);
             });
+            if is_last {
+                self.timed("volumes", &mut times, |surfaces| surfaces.measure(&seen, &noted));
+            }
             self.versions.record(&moved, &reconnected);
         }
         Ok(self.report(times))
+    }
+
+    /// Returns the labels in a zone that are thin and whose volumes may be off, and those that meet them, in ascending
+    /// order.
+    fn noted(&self, zone: &Zone) -> Vec<u16> {
+        let gains = zone.gains(self.label_counts.len());
+        let is_off = |number: &u16| {
+            let voxels = self.nets.grid.voxels(*number);
+            let triangles = self.label_counts[usize::from(*number) - 1].triangles;
+            let gain = gains[usize::from(*number)].abs();
+            Nets::is_sheet(voxels, triangles)
+                || Nets::is_thin(voxels, triangles) && gain > NOTED * voxels as f64
+        };
+        let numbers = zone.numbers().into_iter().filter(is_off);
+        let mut noted: BTreeSet<u16> = numbers.collect();
+        if !noted.is_empty() {
+            zone.add_neighbours(&mut noted);
+        }
+        noted.into_iter().collect()
+    }
+
+    /// Measures the labels in a zone whose volumes may be off: those noted, and with longer edges all that were seen.
+    fn measure(&mut self, seen: &[u16], noted: &[u16]) {
+        let measured = if self.params.edge > 1.0 { seen } else { noted };
+        for number in seen {
+            self.off.remove(number);
+        }
+        for &number in measured {
+            let voxels = self.nets.grid.voxels(number) as f64;
+            let error = self.nets.volume(number) / voxels - 1.0;
+            if voxels > 0.0 && error.abs() > WARNED {
+                self.off.insert(number, error);
+            }
+        }
+    }
+
+    /// Measures all labels, when nothing is to be smoothed any more.
+    fn measure_all(&mut self) {
+        let all: Vec<u16> = (1..=self.label_counts.len() as u16).collect();
+        self.measure(&all, &all);
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        let off = self.off.iter().filter(|&(&number, _)| self.nets.grid.voxels(number) > 0);
+        let warning = |(&number, error): (&u16, &f64)| {
+            let label = self.nets.grid.value(number);
+            let text = format!(
+                "label {label}: the volume of its surface is {:.1} % {} than that of its voxels; parts of it are as thin as a \
+                 voxel, or its edges are long",
+                error.abs() * 100.0,
+                if *error < 0.0 { "less" } else { "more" }
+            );
+            Warning::at(WarningCode::ThinLabel, Place::Label(label), text)
+        };
+        off.map(warning).collect()
     }
 
     fn timed(&mut self, part: &'static str, times: &mut Times, work: impl FnOnce(&mut Self)) {
@@ -348,7 +429,7 @@ impl LabelSurfaces {
             euler: self.counts.euler() as i32,
             events: Changes::default(),
             times,
-            warnings: Vec::new(),
+            warnings: if done { self.warnings() } else { Vec::new() },
         }
     }
 }

@@ -86,6 +86,10 @@ impl LabelSurfaces {
             self.coarsen(CellBox { low, high }, &[], &mut []);
         }
         (self.iterations, self.steps, self.residual) = (state.iterations, state.steps, state.residual);
+        self.off.clear();
+        if self.zone.is_none() {
+            self.measure_all();
+        }
         self.versions.record_all(self.nets.grid.values().len());
         Ok(())
     }

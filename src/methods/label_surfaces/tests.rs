@@ -5,6 +5,7 @@ use crate::math::{DAffine3, DVec3, Random, Vec3};
 use crate::mesh::{measure, report};
 use crate::spatial::TriangleTree;
 use crate::volume::{VolumeInit, Voxels, voxels_inside};
+use crate::warning::Place;
 use nets::NetVertex;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -110,6 +111,137 @@ fn surfaces_have_the_volume_and_the_voxels_of_their_labels() {
             assert!(label.voxels < 500 || error.abs() < 0.005, "label {}: {error}", label.value);
         }
     }
+}
+
+/// Returns a label map of layers across a direction: label 2 is as thick as given, between the labels `below` and `above`.
+fn layers(n: usize, across: DVec3, thickness: f64, [below, above]: [u8; 2]) -> Volume {
+    let middle = DVec3::splat(n as f64 / 2.0);
+    let label = |p: DVec3| {
+        let height = (p - middle).dot(across.normalize()) - 0.01;
+        if height < -thickness / 2.0 {
+            below
+        } else if height < thickness / 2.0 {
+            2
+        } else {
+            above
+        }
+    };
+    volume([n; 3], (0..n * n * n).map(|i| label(centre_of(i, n))).collect())
+}
+
+/// Asserts that the volume of each label's surface is that of its voxels, to 1 %, or that there is a warning which names the
+/// label and the difference, and that there is none otherwise; returns the number of warnings.
+fn check_volumes(surfaces: &mut LabelSurfaces, volume: &Volume, what: &str) -> usize {
+    let warnings = surfaces.step().unwrap().warnings;
+    let voxel = volume.affine().matrix3.determinant().abs();
+    for label in volume.labels(0).unwrap() {
+        let off = measure(&surfaces.mesh(label.value).unwrap()).volume / (label.voxels as f64 * voxel) - 1.0;
+        let warning = warnings.iter().find(|warning| warning.place == Some(Place::Label(label.value)));
+        let (off, is_warned) = (off * 100.0, warning.is_some());
+        assert!((off.abs() > 0.999) <= is_warned, "{what}: label {} is {off} % off", label.value);
+        let text = warning.map_or("", |warning| &warning.text);
+        assert!(
+            !is_warned || off.abs() > 0.999 && text.contains(&format!("{:.1} %", off.abs())),
+            "{what}: {off} {text}"
+        );
+    }
+    warnings.len()
+}
+
+/// Between two others, labels share most of their cells with both, and volume can only be given to the other cells.
+#[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+fn slanted_layers_of_two_voxels_have_their_volume() {
+    for across in
+        [DVec3::ONE, DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(5.0, 2.0, 1.0)]
+    {
+        for others in [[1, 3], [0, 0], [1, 0]] {
+            // Two voxels along the axis nearest to the direction.
+            let thickness = 2.0 * across.max_element() / across.length();
+            let what = format!("{across}, between {others:?}");
+            let volume = layers(24, across, thickness, others);
+            let mut surfaces = settled(&volume);
+            check(&surfaces, &what);
+            assert_voxels_are_inside(&surfaces, &volume);
+            let warnings = check_volumes(&mut surfaces, &volume, &what);
+            println!("{what}: {warnings} warnings");
+            assert_eq!(warnings, 0, "{what}");
+        }
+    }
+}
+
+/// Returns a random label map of layers, threads, single voxels, balls, slices and noise, with voxels of random shape.
+fn random_thin(seed: u64) -> Volume {
+    let mut random = Random::new(seed);
+    let n = 10 + random.below(8) as usize;
+    let dims = match random.below(6) {
+        0 => [n, n, 1],
+        1 => [n, n, 2],
+        _ => [n, n, n],
+    };
+    let mut signed = || 2.0 * random.unit() - 1.0;
+    let across = DVec3::new(signed(), signed(), signed()).normalize();
+    let (middle, shift) = (DVec3::from(dims.map(|n| n as f64 / 2.0)), signed());
+    let thickness = 0.6 + 2.0 * random.unit();
+    let others = [[1, 3], [0, 0], [1, 0], [4, 4]][random.below(4) as usize];
+    let kind = random.below(5);
+    let label = |p: DVec3, random: &mut Random| {
+        let p = p - middle;
+        let (height, beside) = (p.dot(across) + shift, p.reject_from(across).length());
+        let is_inside = match kind {
+            0 => height.abs() < thickness / 2.0,
+            1 => beside < thickness / 2.0 + 0.3,
+            2 => (p.length() - 4.0).abs() < thickness / 2.0,
+            3 => random.below(30) == 0,
+            _ => (p.length() - 1.0).abs() < thickness,
+        };
+        if is_inside { 2 } else { others[usize::from(height > 0.0)] }
+    };
+    let mut voxels = Vec::new();
+    for z in 0..dims[2] {
+        for y in 0..dims[1] {
+            for x in 0..dims[0] {
+                voxels.push(label(DVec3::from([x, y, z].map(|n| n as f64)), &mut random));
+            }
+        }
+    }
+    // Some label is needed.
+    voxels[0] = 5;
+    let spacing =
+        [DVec3::ONE, DVec3::new(1.0, 1.0, 8.0), DVec3::new(0.3, 0.5, 2.0)][random.below(3) as usize];
+    let [x, y, z] = dims;
+    let init = VolumeInit::new(Voxels::U8(voxels), [x, y, z, 1]);
+    Volume::new(VolumeInit { affine: DAffine3::from_scale(spacing), ..init }).unwrap()
+}
+
+fn check_random_thin(seeds: std::ops::Range<u64>) {
+    let (mut warned, mut labels) = (0, 0);
+    for seed in seeds {
+        let what = format!("seed {seed}");
+        let volume = random_thin(seed);
+        let params = LabelParams { edge: [1.0, 1.0, 1.0, 2.0][seed as usize % 4], ..LabelParams::default() };
+        let mut surfaces = LabelSurfaces::new(&volume, None, params).unwrap();
+        settle(&mut surfaces);
+        check(&surfaces, &what);
+        let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+        other.restore(&surfaces.save()).unwrap();
+        assert_eq!(other.step().unwrap().warnings, surfaces.step().unwrap().warnings, "{what}");
+        warned += check_volumes(&mut surfaces, &volume, &what);
+        labels += surfaces.labels().len();
+    }
+    println!("{warned} of {labels} labels are warned about");
+}
+
+#[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+fn random_thin_labels_have_their_volume_or_a_warning() {
+    check_random_thin(0..40);
+}
+
+#[test]
+#[ignore = "long: npm run test:all"]
+fn many_random_thin_labels_have_their_volume_or_a_warning() {
+    check_random_thin(40..240);
 }
 
 #[test]

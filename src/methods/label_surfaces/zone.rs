@@ -2,6 +2,7 @@
 
 use super::cells::{Cell, CellBox};
 use super::cube_loops;
+use super::label_grid::BACKGROUND;
 use super::nets::{Nets, halves};
 use crate::math::Vec3;
 
@@ -86,6 +87,19 @@ impl Zone {
     /// Returns the number of cells that move.
     pub fn moving(&self) -> usize {
         self.links.len()
+    }
+
+    /// Returns the numbers of the labels of its polygons, in ascending order.
+    pub fn numbers(&self) -> Vec<u16> {
+        let mut is_seen = Vec::new();
+        for number in self.polygons.iter().flat_map(|polygon| polygon.labels.map(usize::from)) {
+            if number >= is_seen.len() {
+                is_seen.resize(number + 1, false);
+            }
+            is_seen[number] = true;
+        }
+        let numbers = (0..=u16::MAX).zip(is_seen).filter_map(|(number, is_seen)| is_seen.then_some(number));
+        numbers.filter(|&number| number != BACKGROUND).collect()
     }
 
     /// Returns the slots of the cells whose positions are not those in `offsets` any more.
