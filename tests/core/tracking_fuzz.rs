@@ -16,7 +16,7 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 fn random_volume(random: &mut Random) -> Volume {
     let mut size = || 4 + random.below(10);
     let [nx, ny] = [size(), size()];
-    let (nz, nt) = (1 + random.below(9), 2 + random.below(4));
+    let (nz, nt) = (3 + random.below(7), 2 + random.below(4));
     let count = nx * ny * nz;
     let blobs: Vec<[DVec3; 2]> = (0..1 + random.below(3))
         .map(|_| {

@@ -102,11 +102,14 @@ fn size(ball: Ball) -> f64 {
 
 use WarningCode::{BeginsInFrame, EndsInFrame, SmallObject, UnevenBrightness};
 
+/// The balls in each frame, the volumes expected, and the warnings.
+type Case<'a> = (&'a [&'a Vec<Ball>], &'a [f64], &'a [(WarningCode, u32)]);
+
 #[test]
 fn frames_without_the_object_have_an_empty_surface_and_are_told() {
     let (ball, none) = (vec![BALL], Vec::new());
     let v = size(BALL);
-    let cases: [(&[&Vec<Ball>], &[f64], &[(WarningCode, u32)]); 5] = [
+    let cases: [Case; 5] = [
         (&[&ball, &ball, &none, &none], &[v, v, 0.0, 0.0], &[(EndsInFrame, 2)]),
         (&[&none, &none, &ball, &ball], &[0.0, 0.0, v, v], &[(BeginsInFrame, 2)]),
         (&[&ball, &none, &ball], &[v, 0.0, v], &[(EndsInFrame, 1), (BeginsInFrame, 2)]),

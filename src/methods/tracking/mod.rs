@@ -340,7 +340,7 @@ impl SurfaceTracker {
             for face in list {
                 let (position, later) = self.region.face(direction, face.voxel);
                 let at = self.region.to_space(position);
-                let [x, y, z] = self.region.space.to_relative(at).to_array();
+                let [x, y, z] = self.region.space.relative(at).to_array();
                 points.push([x, y, z, frame as f32 + later, face.weight]);
             }
         }

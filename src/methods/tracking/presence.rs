@@ -22,8 +22,9 @@ use crate::remesh::Changes;
 use crate::volume::voxels_inside;
 use fixedbitset::FixedBitSet;
 
-/// Smallest share of a surface's vertices on a boundary of the frame for an object to be there. Noise reaches one in a
-/// hundred; a surface of a ventricle, of which a third has no boundary behind muscles and at valves, stays above a half.
+/// Smallest share of a surface's vertices on a boundary of the frame for an object to be there. Below it, noise and a
+/// neighbouring object could hold a surface; above it, one with gaps in its boundary would end. The surface of a whole
+/// chest has votes near three quarters of its vertices, and intensity falls at half of them.
 const MIN_PRESENT: f64 = 0.1;
 
 /// Share of the vertices without a boundary, or with rejected projections, from which [`MIN_PRESENT`] is tested at all.
@@ -76,6 +77,9 @@ impl SurfaceTracker {
         from: Option<&SpaceTimeSamples>,
         frame: usize,
     ) -> Option<Tracked> {
+        if self.region.is_blank(frame) {
+            return None;
+        }
         let edge = tracker.edge;
         self.voting.ensure_levels(&self.region, frame);
         let first = self.tracked(mesh.clone(), tracker, from, frame, &self.voting);
@@ -95,6 +99,9 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
     pub(super) fn begin(&mut self, last: &Mesh, frame: usize) -> Result<Option<Tracked>, MethodError> {
+        if self.region.is_blank(frame) {
+            return Ok(None);
+        }
         self.voting.ensure_levels(&self.region, frame);
         if let Some(found) = self.begin_with(last, frame, &self.voting)? {
             return Ok(Some(found));

@@ -50,7 +50,7 @@ impl WorkingSpace {
     }
 
     /// Returns the position relative to the origin, in world units, of a position in the working space.
-    pub fn to_relative(&self, p: Vec3) -> Vec3 {
+    pub fn relative(&self, p: Vec3) -> Vec3 {
         p * (1.0 / self.scale) as f32
     }
 
