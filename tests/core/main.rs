@@ -11,9 +11,9 @@
 #[path = "../common/mod.rs"]
 pub(crate) mod common;
 
+mod agreement;
 // Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]
-mod agreement;
 mod architecture;
 mod decimate;
 mod deformable;

@@ -12,9 +12,10 @@ use crate::mesh::{TriangleMesh, VertexId, measure};
 use crate::methods::MethodError;
 use crate::volume::Region;
 
-/// The least share of its volume that a component lacks, or has in excess, at which it is moved: half of the accuracy
-/// that is aimed at. With more, components may miss that; with less, more surfaces change, which are right.
-const LEAST_SHARE: f64 = 0.005;
+/// The least share of its volume that a component lacks, or has in excess, at which it is moved. The contour itself lacks
+/// up to a percent of linear interpolation; with more, components lack more than that; with less, more surfaces
+/// change, which are right.
+const LEAST_SHARE: f64 = 0.002;
 
 /// The largest volume of a component that is compared, in voxels of the finest level. A ball of this size lacks half a
 /// percent; with more, the contour of large objects is extracted once more.
@@ -64,6 +65,10 @@ impl DeformableModel {
     /// Returns the distance by which a component has to move outwards to enclose the volume of its contour; 0 if it
     /// does so almost, is large, or does not correspond to one part of the contour.
     fn distance_to_volume(&self, component: &[VertexId]) -> Result<f32, MethodError> {
+        // A vertex has about a square voxel of the surface.
+        if component.len() as f64 > LARGEST_VOLUME {
+            return Ok(0.0);
+        }
         let surface = self.surface_of(component);
         let found = measure(&surface);
         if found.volume.abs() > LARGEST_VOLUME || found.area == 0.0 {
