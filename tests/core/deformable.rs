@@ -9,7 +9,7 @@ use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
 };
 use vesicle::methods::{MethodError, StepReport};
-use vesicle::volume::{Volume, VolumeInit, Voxels};
+use vesicle::volume::{Volume, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -619,37 +619,14 @@ fn a_volume_whose_mesh_exceeds_memory_is_refused_at_once() {
     assert!(matches!(refusal, MethodError::TooManyVertices { .. }), "{refusal}");
 }
 
-/// Returns the first frame of a volume with a layer of its lowest intensity around it.
-#[cfg(not(target_arch = "wasm32"))]
-fn with_margin(volume: &Volume) -> Volume {
-    let inner = volume.dims();
-    let dims = inner.map(|n| n + 2);
-    let grid = volume.grid(0).unwrap();
-    let value = |k: usize| {
-        let at = [k % dims[0], k / dims[0] % dims[1], k / dims[0] / dims[1]].map(|k| k.wrapping_sub(1));
-        let is_within = (0..3).all(|axis| at[axis] < inner[axis]);
-        if is_within {
-            grid.values[at[0] + inner[0] * (at[1] + inner[1] * at[2])]
-        } else {
-            volume.range()[0] as f32
-        }
-    };
-    let voxels = Voxels::F32((0..dims.iter().product()).map(value).collect());
-    Volume::new(VolumeInit {
-        affine: volume.affine(),
-        ..VolumeInit::new(voxels, [dims[0], dims[1], dims[2], 1])
-    })
-    .unwrap()
-}
-
 /// Regression: on a coarse level, some vertices of this tooth are where the image is so steep that they oscillated
-/// forever under the forces of coarse levels.
+/// forever under the forces of coarse levels. They are at the border of the image, which is less steep since objects end
+/// half a voxel beyond it.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
 fn oscillations_on_a_coarse_level_converge() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/tooth.nrrd");
     let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
-    let volume = with_margin(&volume);
     let mut model = DeformableModel::new(
         &volume,
         DeformableOptions {
@@ -665,7 +642,6 @@ fn oscillations_on_a_coarse_level_converge() {
         assert!(report.iteration < 2000, "{} on level {}", report.iteration, model.level());
         report = model.step().unwrap();
     }
-    assert!(report.iteration > 600, "nothing swings any more: {} iterations", report.iteration);
 }
 
 /// Regression: with a strong image force, vertices oscillated across intensity steps of noisy images; this took 1,399

@@ -1,4 +1,4 @@
-//! What voxels mean: outside the image and NaN are never object, infinite voxels are on their side of every iso value, and
+//! The meaning of voxels: outside the image and NaN are never object, infinite voxels are on their side of every iso value, and
 //! neither fill values nor large offsets take the precision of the others; for marching cubes, the model and thresholds.
 
 use super::common::{euler_of_parts, scenes};

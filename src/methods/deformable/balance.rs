@@ -1,7 +1,7 @@
 //! Giving back volume at the end of a run.
 //!
 //! A surface of long edges settles a little inside a convex contour, by some hundredths of a voxel: rigidity evens it out,
-//! it rounds off edges, and it is at rest before the last of the way. Of a large object that is nothing, but a ball
+//! it rounds off edges, and a run converges before the last of the way. Of a large object that is nothing, but a ball
 //! of seven voxels' radius lacks 1.5 % of its volume. So small components are compared with the contour around them, and
 //! where the volumes differ, they move by the same distance everywhere; what rigidity has evened out stays so.
 

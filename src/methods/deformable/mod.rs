@@ -20,7 +20,7 @@
 //! that of single voxels by a tenth. The topology is that of linear interpolation between voxels: voxels of the object
 //! are connected through faces, those of the background also through edges and corners.
 //!
-//! What is outside of the image and what is NaN is never object. An object ends half a voxel beyond its outermost voxels
+//! Neither the outside of the image nor NaN is ever object. An object ends half a voxel beyond its outermost voxels
 //! there.
 //!
 //! # Example
