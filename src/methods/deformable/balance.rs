@@ -8,7 +8,7 @@
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour_of_grid, placed};
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{TriangleMesh, VertexId, measure};
+use crate::mesh::{TriangleMesh, VertexId, measure, sort_distinct};
 use crate::methods::MethodError;
 use crate::volume::Region;
 
@@ -56,6 +56,7 @@ impl DeformableModel {
             moving.extend(component);
         }
         if !moving.is_empty() {
+            sort_distinct(&mut moving);
             let sampling = self.sampling();
             self.resolver.move_some(&mut self.mesh, sampling, &moving, &mut displacements);
         }
@@ -99,7 +100,7 @@ impl DeformableModel {
     fn surface_of(&self, component: &[VertexId]) -> TriangleMesh {
         let corners: Vec<[VertexId; 3]> = self.mesh.triangles_at(component).into_iter().collect();
         let mut vertices = component.to_vec();
-        crate::mesh::sort_distinct(&mut vertices);
+        sort_distinct(&mut vertices);
         let index = |v: VertexId| vertices.binary_search(&v).unwrap_or_default() as u32;
         TriangleMesh {
             positions: vertices.iter().map(|&v| self.mesh.position(v)).collect(),
