@@ -48,7 +48,7 @@ impl Default for CellCache {
     }
 }
 
-/// What a grid is surrounded by where it is sampled beyond its border: background, so that every object ends there.
+/// The surroundings of a grid where it is sampled beyond its border: background, so that every object ends there.
 ///
 /// One layer of voxels around the grid continues its outermost voxels. Beside a voxel of the object its value is as far
 /// from the iso value as that voxel, on the other side, so that the object ends half a voxel beyond its outermost

@@ -1,6 +1,6 @@
 //! Intensities near an iso value: how finely single precision shows them, and what voxels without a finite value count as.
 //!
-//! What is outside of a volume and what is NaN is never part of an object, whatever the iso value. An infinite voxel is
+//! Neither the outside of a volume nor NaN is ever part of an object, whatever the iso value. An infinite voxel is
 //! on its side of every iso value. A surface ends halfway between a voxel of the object and one that is outside or NaN.
 
 use super::error::{VolumeError, reserve};

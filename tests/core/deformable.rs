@@ -620,7 +620,8 @@ fn a_volume_whose_mesh_exceeds_memory_is_refused_at_once() {
 }
 
 /// Regression: on a coarse level, some vertices of this tooth are where the image is so steep that they oscillated
-/// forever under the forces of coarse levels.
+/// forever under the forces of coarse levels. They are at the border of the image, which is less steep since objects end
+/// half a voxel beyond it.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
 fn oscillations_on_a_coarse_level_converge() {
@@ -641,7 +642,6 @@ fn oscillations_on_a_coarse_level_converge() {
         assert!(report.iteration < 2000, "{} on level {}", report.iteration, model.level());
         report = model.step().unwrap();
     }
-    assert!(report.iteration > 600, "nothing swings any more: {} iterations", report.iteration);
 }
 
 /// Regression: with a strong image force, vertices oscillated across intensity steps of noisy images; this took 1,399

@@ -11,11 +11,11 @@
 #[path = "../common/mod.rs"]
 pub(crate) mod common;
 
+mod agreement;
 mod anisotropic;
+mod anywhere;
 // Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]
-mod agreement;
-mod anywhere;
 mod architecture;
 mod decimate;
 mod deformable;

@@ -323,7 +323,7 @@ fn bits_after_two_hundred_steps_are_the_same_on_every_platform() {
         model.step().unwrap();
     }
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "b68397c8ac5b3b1f");
+    assert_eq!(format!("{found:016x}"), "983ab96c7e195cd7");
 }
 
 /// The same at the default settings, coarse to fine, until it converges.
@@ -335,5 +335,5 @@ fn bits_at_the_defaults_are_the_same_on_every_platform() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     while !model.step().unwrap().done {}
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "1846ab98aaad72ea");
+    assert_eq!(format!("{found:016x}"), "62e5c83dba6c564f");
 }

@@ -1,20 +1,21 @@
 //! Giving back volume at the end of a run.
 //!
 //! A surface of long edges settles a little inside a convex contour, by some hundredths of a voxel: rigidity evens it out,
-//! it rounds off edges, and it is at rest before the last of the way. Of a large object that is nothing, but a ball
+//! it rounds off edges, and a run converges before the last of the way. Of a large object that is nothing, but a ball
 //! of seven voxels' radius lacks 1.5 % of its volume. So small components are compared with the contour around them, and
 //! where the volumes differ, they move by the same distance everywhere; what rigidity has evened out stays so.
 
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour_of_grid, placed};
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{TriangleMesh, VertexId, measure};
+use crate::mesh::{TriangleMesh, VertexId, measure, sort_distinct};
 use crate::methods::MethodError;
 use crate::volume::{Region, Subdivided};
 
-/// The least share of its volume that a component lacks, or has in excess, at which it is moved: half of the accuracy
-/// that is aimed at. With more, components may miss that; with less, more surfaces change, which are right.
-const LEAST_SHARE: f64 = 0.005;
+/// The least share of its volume that a component lacks, or has in excess, at which it is moved. The contour itself lacks
+/// up to a percent of linear interpolation; with more, components lack more than that; with less, more surfaces
+/// change, which are right.
+const LEAST_SHARE: f64 = 0.002;
 
 /// The largest volume of a component that is compared, in voxels of the finest level. A ball of this size lacks half a
 /// percent; with more, the contour of large objects is extracted once more.
@@ -55,6 +56,7 @@ impl DeformableModel {
             moving.extend(component);
         }
         if !moving.is_empty() {
+            sort_distinct(&mut moving);
             let sampling = self.sampling();
             self.resolver.move_some(&mut self.mesh, sampling, &moving, &mut displacements);
         }
@@ -64,6 +66,10 @@ impl DeformableModel {
     /// Returns the distance by which a component has to move outwards to enclose the volume of its contour; 0 if it
     /// does so almost, is large, or does not correspond to one part of the contour.
     fn distance_to_volume(&self, component: &[VertexId]) -> Result<f32, MethodError> {
+        // A vertex has about a square voxel of the surface.
+        if component.len() as f64 > LARGEST_VOLUME {
+            return Ok(0.0);
+        }
         let surface = self.surface_of(component);
         let found = measure(&surface);
         if found.volume.abs() > LARGEST_VOLUME || found.area == 0.0 {
@@ -94,7 +100,7 @@ impl DeformableModel {
     fn surface_of(&self, component: &[VertexId]) -> TriangleMesh {
         let corners: Vec<[VertexId; 3]> = self.mesh.triangles_at(component).into_iter().collect();
         let mut vertices = component.to_vec();
-        crate::mesh::sort_distinct(&mut vertices);
+        sort_distinct(&mut vertices);
         let index = |v: VertexId| vertices.binary_search(&v).unwrap_or_default() as u32;
         TriangleMesh {
             positions: vertices.iter().map(|&v| self.mesh.position(v)).collect(),

@@ -20,6 +20,14 @@
 //! With `adaptivity: 0`, sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner
 //! than that are lost, on coarse levels those thinner than the contact distance there.
 //!
+//! Features of less than four voxels are rounded off: the volume of thin sheets and strands, and of what is left of an
+//! object that the border of the image or a mask cuts off, may differ by some percent from that of the contour, and
+//! that of single voxels by a tenth. The topology is that of linear interpolation between voxels: voxels of the object
+//! are connected through faces, those of the background also through edges and corners.
+//!
+//! Neither the outside of the image nor NaN is ever object. An object ends half a voxel beyond its outermost voxels
+//! there.
+//!
 //! # Example
 //! ```
 //! use vesicle::math::{DAffine3, DVec3};
