@@ -6,7 +6,7 @@ import { RawAnimation } from './vesicle.js';
 /**
  * Encodes a sequence of meshes as an animated glb (binary glTF), one mesh a frame. The meshes need not have the same
  * connectivity; each keeps its normals, texture coordinates, colours and texture. Viewers that play animations show one
- * frame at a time, others the first.
+ * frame at a time, others the first that has triangles; nothing is shown in a frame without any.
  *
  * Frames equal to the previous one are stored once, and so are equal textures. Each stored frame takes 24 bytes a
  * vertex and 12 a triangle, plus 8 bytes a vertex with texture coordinates and 12 with colours; all of it is in memory
@@ -15,8 +15,8 @@ import { RawAnimation } from './vesicle.js';
  * @param frames - At least one. The live mesh of a model has only the present state of the model: add a `clone()` of it
  *   for each frame.
  * @param options - `frameSeconds`: duration of each frame in seconds, 0.001 to 1000; default 0.1.
- * @throws {@link VesicleError} `invalid-argument`: no frames, an entry that is no mesh or has no triangles, a duration
- *   out of range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`: a mesh that was
+ * @throws {@link VesicleError} `invalid-argument`: no frame with triangles, an entry that is no mesh, a duration out of
+ *   range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`: a mesh that was
  *   freed.
  */
 export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {

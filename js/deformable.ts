@@ -166,7 +166,10 @@ export interface DeformableOptions {
    * Outside of it the surface is that of level `outside`, by default the coarsest.
    */
   box?: { min: Vec3; max: Vec3; outside?: number };
-  /** Target edge length at the finest level, world units; default from the voxel size. */
+  /**
+   * Target edge length at the finest level, world units; default from the voxel size. If voxels are more than twice as
+   * long as wide, the shorter sides count.
+   */
   edge?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
@@ -239,7 +242,8 @@ export class DeformableModel implements Stepper {
 
   /**
    * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. It is √3 times larger on each
-   * coarser level. With anisotropic voxels, both bounds hold on average over all directions.
+   * coarser level. With anisotropic voxels, both bounds hold on average over all directions; those
+   * more than twice as long as wide count as several.
    */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());

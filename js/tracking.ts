@@ -75,7 +75,7 @@ export interface TrackingOptions {
 
 /** Statistics of the surface in one tracked frame, as listed by {@link SurfaceTracker.statistics}. */
 export interface FrameStatistics {
-  /** Volume enclosed by the surface, world units cubed. */
+  /** Volume enclosed by the surface, world units cubed; 0 in a frame without the object, as are all other numbers. */
   volume: number;
   /** Surface area, world units squared. */
   area: number;
@@ -122,6 +122,11 @@ const FRAME_SECONDS = 0.1;
  * by frame. Each step finds the boundary in one more frame; once all are found, each step tracks the surface into one
  * more frame. The surface is in the volume's world space; it stays closed and free of self-intersections.
  *
+ * In frames in which the image has no object where the surface was, the surface is empty; it begins again where an
+ * object appears. {@link StepReport.warnings} names these frames (`ends-in-frame`, `begins-in-frame`), those in which the
+ * object is too small for the radius of plane fits (`small-object`), and those whose intensities at the surface differ
+ * too much from frames nearby (`uneven-brightness`). Voxels that are NaN or negative infinity are outside.
+ *
  * @throws All methods: {@link VesicleError} `freed` after {@link SurfaceTracker.free}.
  */
 export class SurfaceTracker implements Stepper {
@@ -134,8 +139,9 @@ export class SurfaceTracker implements Stepper {
   /**
    * Creates a tracker; the work begins with the first step.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few
-   *   voxels, without contrast or with slanted axes, a box outside of it, a start that is empty, inside out, outside
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, without
+   *   contrast or with slanted axes, one or a box with fewer than 5 voxels along two axes, or along the third fewer than
+   *   2 or less than three times the shortest side of a voxel, such as a single slice, a box outside of it, a start that is empty, inside out, outside
    *   the box or with a mean edge below a tenth of a voxel; `not-closed`, `self-intersecting` for a start that is;
    *   `too-large`.
    */
@@ -166,6 +172,14 @@ export class SurfaceTracker implements Stepper {
     return this.#handle.use((raw) => raw.frame());
   }
 
+  /**
+   * Origin of the surfaces and boundary points in world space, to which their coordinates are relative: 0 unless the
+   * volume is far from the world's origin for its size, where single precision would be too coarse.
+   */
+  get origin(): Vec3 {
+    return this.#handle.use((raw) => [...raw.origin()] as unknown as Vec3);
+  }
+
   /** Number of frames of the volume. */
   get frames(): number {
     return this.#counts()[0];
@@ -180,8 +194,9 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Cycle closure error of a cyclic sequence, undefined until all frames are done: the mean distance between the last
-   * frame's surface, tracked on into the first frame, and the first frame's surface, world units.
+   * Cycle closure error of a cyclic sequence, undefined until all frames are done, and if the surface is empty in the
+   * first or the last: the mean distance between the last frame's surface, tracked on into the first frame, and the first
+   * frame's surface, world units.
    */
   get cycleClosureError(): number | undefined {
     return this.#statistics().cycleClosureError;
@@ -211,7 +226,7 @@ export class SurfaceTracker implements Stepper {
    *
    * @returns The last report, with the events of all steps.
    * @throws {@link VesicleError} `invalid-argument`: naming `threshold`, and the value that it must be below, if no
-   *   boundary is found; naming `box` if there is no surface in the first frame; while a {@link SurfaceTracker.run} is
+   *   boundary is found; naming `box` if there is no surface in any frame; while a {@link SurfaceTracker.run} is
    *   in progress. `too-large`.
    */
   step(iterations = 1): StepReport {
@@ -247,8 +262,8 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Returns the boundary votes as weighted space-time points, five numbers each: x, y, z in world space, t in frames,
-   * and the weight w, the fraction of windows that separate the two voxels of a face. A face between a voxel in this
+   * Returns the boundary votes as weighted space-time points, five numbers each: x, y, z relative to
+   * {@link SurfaceTracker.origin}, t in frames, and the weight w, the fraction of windows that separate the two voxels of a face. A face between a voxel in this
    * frame and the same voxel in the next has t half a frame later.
    *
    * @param frame - Index of the frame; default the newest with a boundary. A frame whose boundary is not found yet has
@@ -262,7 +277,7 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Returns a copy of the surface in a frame.
+   * Returns a copy of the surface in a frame; without triangles where the image has no object.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame, or one that is not tracked yet.
    */
@@ -276,16 +291,16 @@ export class SurfaceTracker implements Stepper {
     );
   }
 
-  /** Returns the enclosed volume of each frame tracked so far, world units cubed. */
+  /** Returns the enclosed volume of each frame tracked so far, world units cubed; 0 for those without the object. */
   volumes(): Float64Array {
     return this.#handle.use((raw) => raw.volumes());
   }
 
   /**
    * Encodes the frames tracked so far as an animated glb: one node per frame, shown in turn, each for the frame time of
-   * the volume or 0.1 s.
+   * the volume or 0.1 s. Nothing is shown in frames without the object.
    *
-   * @throws {@link VesicleError} `invalid-argument` if no frame is tracked yet; `too-large`.
+   * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
   toGlb(): Uint8Array {
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);

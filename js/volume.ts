@@ -166,7 +166,7 @@ export class Volume {
     return this.#handle.use((raw) => raw.space() as Space);
   }
 
-  /** What to know about the volume before relying on it; empty if there is nothing. */
+  /** Notes to read before relying on the volume; empty if there is nothing to note. */
   get warnings(): Warning[] {
     return this.#handle.use((raw) => raw.warnings() as Warning[]);
   }

@@ -4,13 +4,17 @@ export type WarningCode =
   | 'ends-in-frame'
   /** A part of the surface begins in this frame: the image had no object there before. */
   | 'begins-in-frame'
+  /** An intensity step at the surface that differs so much from that in frames around it that the surface may be off. */
+  | 'uneven-brightness'
+  /** An object so small that its volume is uncertain. */
+  | 'small-object'
   /** A label so thin that the volume of its surface is not that of its voxels. */
   | 'thin-label'
   /** Positions or intensities that had to be rounded more than the result should suffer. */
   | 'precision'
   /** A surface that was moved towards the origin, since where it is it could not be represented. */
   | 'recentred'
-  /** Voxels so much longer along one axis that the shape between the slices is a guess. */
+  /** Voxels that are far longer along one axis, so that the shape between the slices is a guess. */
   | 'anisotropic';
 
 /** Something to know about a volume or a result before relying on it. */

@@ -161,6 +161,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     ...STEPPER,
     frame: 'value',
     frames: 'value',
+    origin: 'value',
     noise: 'value',
     cycleClosureError: 'value',
     statistics: 'value',

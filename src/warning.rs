@@ -49,13 +49,17 @@ pub enum WarningCode {
     EndsInFrame,
     /// A part of the surface begins in this frame: there was no object in the image before.
     BeginsInFrame,
+    /// The intensity step at the surface differs so much from that in the frames around it that the surface may be off.
+    UnevenBrightness,
+    /// The object is so small that its volume is uncertain.
+    SmallObject,
     /// A label is so thin that the volume of its surface is not that of its voxels.
     ThinLabel,
     /// Positions or intensities are rounded more than the result should suffer.
     Precision,
     /// The surface was moved towards the origin, since where it is it could not be represented.
     Recentred,
-    /// Voxels of the volume are so much longer along one axis than along the others that the shape between the slices is
-    /// a guess.
+    /// Voxels of the volume are far longer along one axis than along the others, so that the shape between the slices is a
+    /// guess.
     Anisotropic,
 }

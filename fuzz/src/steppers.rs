@@ -358,7 +358,8 @@ pub fn tracking(data: &[u8]) {
         assert_eq!(tracker.mesh().check(), Ok(()));
         if let Some(mesh) = tracker.meshes().last() {
             let found = measure(mesh);
-            assert_eq!((found.components, count_self_intersections(mesh)), (parts, 0));
+            // None in a frame without an object, and one where another begins.
+            assert!(found.components <= parts && count_self_intersections(mesh) == 0);
         }
         if bytes.chance(8) {
             let saved = tracker.save();

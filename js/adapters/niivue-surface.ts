@@ -89,7 +89,7 @@ export class NiivueSurface {
     return this.#adapter.mesh;
   }
 
-  /** What to know about the surface as it is shown: `recentred` if it is not where the mesh is; empty otherwise. */
+  /** Notes on the surface in NiiVue: `recentred` if it is not where the mesh is; empty otherwise. */
   get warnings(): Warning[] {
     if (this.#origin.every((coordinate) => coordinate === 0)) return [];
     const text = `The surface is shown at the origin, and is at ${this.#origin.join(', ')}: too far for NiiVue to draw it.`;

@@ -202,7 +202,7 @@ export class ThreeSurface {
     return true;
   }
 
-  // A position that is the caller's stays as it is: near the origin, that of the mesh is 0.
+  // A mesh near the origin has none of its own; then the position is the caller's.
   #move([x, y, z]: Vec3): void {
     const moved = x !== 0 || y !== 0 || z !== 0;
     if (moved || this.#moved) this.#object.position?.set(x, y, z);

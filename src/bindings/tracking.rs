@@ -73,6 +73,11 @@ impl RawTracker {
         self.0.borrow().frame()
     }
 
+    /// Returns the origin in world space of the surfaces and boundary points, three numbers.
+    pub fn origin(&self) -> Vec<f64> {
+        self.0.borrow().origin().to_array().to_vec()
+    }
+
     /// Returns three numbers of frames: all in the volume, those in which the image boundary has been found, and those
     /// with a tracked surface.
     pub fn counts(&self) -> Vec<u32> {
@@ -80,8 +85,8 @@ impl RawTracker {
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
-    /// Returns the boundary points of the image found in a frame, five numbers each: x, y, z in world space, t in
-    /// frames, and the weight by boundary votes. Empty until the boundary of the frame is found.
+    /// Returns the boundary points of the image found in a frame, five numbers each: x, y, z relative to the
+    /// origin, t in frames, and the weight by boundary votes. Empty until the boundary of the frame is found.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
         self.0.borrow().boundary(frame).into_iter().flatten().collect()
     }

@@ -18,11 +18,11 @@ const MAX_FRAME_SECONDS: f64 = 1e3;
 /// Returns the bytes of an animated GLB that shows the meshes in order, `frame_seconds` (0.001 to 1000) each. Every
 /// mesh is stored as by [`write_mesh`](super::write_mesh), with its texture, normals, texture coordinates and colours.
 ///
-/// A mesh equal to the previous frame's is not stored again; nor is a texture equal to an earlier one.
+/// A mesh equal to the previous frame's is not stored again; nor is a texture equal to an earlier one. Nothing is shown
+/// in a frame whose mesh has no triangles, such as one in which a tracked surface has ended.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] if there are no frames, if a mesh is not valid or has no triangles, or if the time is
-/// out of range; [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
+/// [`MeshError::InvalidArgument`] if no frame has triangles, if a mesh is not valid, or if the time is out of range; [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
 pub fn write_animation<M: Borrow<TriangleMesh>>(
     frames: impl IntoIterator<Item = M>,
     frame_seconds: f64,
@@ -37,8 +37,9 @@ pub fn write_animation<M: Borrow<TriangleMesh>>(
 #[derive(Default)]
 pub struct AnimationWriter {
     parts: DocumentBuilder,
-    /// For each mesh stored in the file, the index of the first animation frame that shows it.
-    starts: Vec<usize>,
+    /// For each mesh stored in the file, the index of the first animation frame that shows it, and of the first after
+    /// that which does not.
+    shown: Vec<[usize; 2]>,
     /// The origin of each mesh stored in the file.
     origins: Vec<DVec3>,
     frames: usize,
@@ -52,12 +53,14 @@ impl AnimationWriter {
     /// As [`write_animation`]; after an error the frame is not added.
     pub fn add(&mut self, mesh: &TriangleMesh) -> Result<(), MeshError> {
         mesh.validate()?;
+        let frame = self.frames;
         if mesh.triangles.is_empty() {
-            return Err(invalid_argument("frames", format!("number {} has no triangles", self.frames)));
-        }
-        if self.last.as_ref() != Some(mesh) {
+            self.last = None;
+        } else if self.last.as_ref() == Some(mesh) {
+            self.shown.iter_mut().last().into_iter().for_each(|[_, end]| *end = frame + 1);
+        } else {
             self.parts.mesh(mesh)?;
-            self.starts.push(self.frames);
+            self.shown.push([frame, frame + 1]);
             self.origins.push(mesh.origin);
             self.last = Some(mesh.clone());
         }
@@ -70,8 +73,8 @@ impl AnimationWriter {
     /// # Errors
     /// As [`write_animation`].
     pub fn finish(mut self, frame_seconds: f64) -> Result<Vec<u8>, MeshError> {
-        if self.frames == 0 {
-            return Err(invalid_argument("frames", "must contain at least one frame".into()));
+        if self.shown.is_empty() {
+            return Err(invalid_argument("frames", "must contain at least one frame with triangles".into()));
         }
         if !(MIN_FRAME_SECONDS..=MAX_FRAME_SECONDS).contains(&frame_seconds) {
             let problem =
@@ -79,7 +82,7 @@ impl AnimationWriter {
             return Err(invalid_argument("frameSeconds", problem));
         }
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
-        for mesh in 0..self.starts.len() {
+        for mesh in 0..self.shown.len() {
             let (times, sizes) = self.track(mesh, frame_seconds);
             let input = self.parts.times(&times);
             let output = self.parts.vectors(sizes.iter().map(|&size| Vec3::splat(size)), None, "");
@@ -94,15 +97,20 @@ impl AnimationWriter {
     }
 
     /// Returns the animation track that shows and hides mesh number `mesh`: the times in seconds at which its scale
-    /// changes, and the scales (1 shown, 0 hidden). The last mesh has a key at the end as well: without it the
-    /// animation would end when its last frame begins.
+    /// changes, and the scales (1 shown, 0 hidden). The last mesh has a key at the end in any case: without it the
+    /// animation would end when its last change of scale begins.
     fn track(&self, mesh: usize, frame_seconds: f64) -> (Vec<f32>, Vec<f32>) {
         let seconds = |frame: usize| (frame as f64 * frame_seconds) as f32;
-        let next = self.starts.get(mesh + 1);
-        let mut track = vec![(seconds(self.starts[mesh]), 1.0)];
-        track.push(next.map_or((seconds(self.frames), 1.0), |&next| (seconds(next), 0.0)));
-        if mesh > 0 {
+        let [start, end] = self.shown[mesh];
+        let mut track = vec![(seconds(start), 1.0)];
+        if start > 0 {
             track.insert(0, (0.0, 0.0));
+        }
+        if end < self.frames {
+            track.push((seconds(end), 0.0));
+        }
+        if mesh + 1 == self.shown.len() {
+            track.push((seconds(self.frames), if end < self.frames { 0.0 } else { 1.0 }));
         }
         track.into_iter().unzip()
     }

@@ -19,7 +19,7 @@ pub mod vectors;
 
 pub use bounds::{Bounds, BoxTree, Ray};
 pub use conjugate_gradients::ConjugateGradients;
-pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
+pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 pub use groups::Groups;
 pub use growth::{make_room, resize, resize_within};
 pub use min_max::{higher, lower};

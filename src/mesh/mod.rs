@@ -146,7 +146,7 @@ impl Mesh {
         self.origin
     }
 
-    /// Sets the origin, which moves the mesh in world space; positions stay as they are.
+    /// Sets the origin, which moves the mesh in world space; positions are unchanged.
     pub fn set_origin(&mut self, origin: DVec3) {
         self.origin = origin;
         self.geometry_version = self.geometry_version.wrapping_add(1);

@@ -32,7 +32,7 @@ pub struct StepReport {
     pub events: Changes,
     /// The time spent in each part of the step, in milliseconds; all 0 if the model has no clock.
     pub times: Times,
-    /// What a user should know about the result so far; empty if it can be relied on.
+    /// Notes to read before relying on the result so far; empty if there is nothing to note.
     pub warnings: Vec<Warning>,
 }
 

@@ -26,6 +26,7 @@ mod sampling;
 mod small_components;
 mod smooth;
 mod unit_scale;
+mod volume_balance;
 
 pub use changes::Changes;
 pub use clustering::clustered;

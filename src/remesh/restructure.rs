@@ -32,6 +32,11 @@ pub(super) const MAX_VERTICES: usize = 8_000_000;
 /// estimates its size.
 const BYTES_PER_VERTEX: f64 = 250.0;
 
+/// The shortest upper bound of edge lengths, in spacings of single-precision numbers at the largest coordinate. Below a
+/// few spacings, edges cannot become as short as the bound, however often they are split, and triangles degenerate; at
+/// 64, positions are rounded by less than 1 % of an edge. With more, a mesh of 100,000 edges in a row is refused.
+const SPACINGS: f32 = 64.0;
+
 /// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length), to estimate the size of
 /// a result: 2 / √3.
 const VERTICES_PER_AREA: f64 = 1.1547;
@@ -42,7 +47,8 @@ impl EdgeBounds {
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
-    /// [`MeshError::TooLarge`] if more than eight million vertices would be needed.
+    /// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest
+    /// coordinate; [`MeshError::TooLarge`] if more than eight million vertices would be needed.
     pub fn check_for(self, mesh: &Mesh) -> Result<(), MeshError> {
         let Self { min, max } = self;
         // Also rejects NaN.
@@ -56,10 +62,25 @@ impl EdgeBounds {
         let length: f64 = mesh.edges().map(length).sum();
         let [min, max] = [min, max].map(f64::from);
         let vertices = VERTICES_PER_AREA * area / (min * max) + length / max;
-        if vertices < MAX_VERTICES as f64 {
+        if vertices >= MAX_VERTICES as f64 {
+            return Err(MeshError::TooLarge { bytes: bytes(vertices) });
+        }
+        self.check_precision(mesh)
+    }
+
+    /// Returns an error unless positions of the mesh are much finer than the longest edges allowed.
+    fn check_precision(self, mesh: &Mesh) -> Result<(), MeshError> {
+        let largest = mesh.vertices().map(|v| mesh.position(v).abs().max_element()).fold(0.0, f32::max);
+        let least = SPACINGS * f32::EPSILON * largest;
+        if self.max >= least {
             return Ok(());
         }
-        Err(MeshError::TooLarge { bytes: bytes(vertices) })
+        let problem = format!(
+            "edge: max must be at least {least}, got {}: coordinates of up to {largest} have no finer positions in single \
+             precision; move the mesh nearer to the origin, or allow longer edges",
+            self.max
+        );
+        Err(MeshError::Precision { problem })
     }
 }
 
@@ -140,6 +161,10 @@ const MAX_VALENCE: usize = 16;
 /// The largest number of passes of splits or flips in one call. Each pass of splits halves the longest edges, so this
 /// many reach any bound; flips never needed more than six.
 const PASSES: usize = 24;
+
+/// The squared length of each half of an edge to be split, relative to that of the edge, is less than this; it is 0.25
+/// unless the edge is as short as the spacing of coordinates.
+const HALVED: f32 = 0.5;
 
 /// Performs one round of restructuring: collapses short edges, splits long ones, and flips edges to bring valences near
 /// six. Rejected edits are skipped. Returns the numbers of edits.
@@ -223,8 +248,14 @@ fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, removed: VertexId) 
 pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
     // Squares avoid square roots; the comparison is false for NaN.
-    cosine > 0.0
-        && cosine * cosine > MIN_COSINE * MIN_COSINE * before.length_squared() * after.length_squared()
+    let least = MIN_COSINE * MIN_COSINE * before.length_squared() * after.length_squared();
+    if least.is_normal() && cosine.is_normal() {
+        return cosine > 0.0 && cosine * cosine > least;
+    }
+    // Fourth powers of edges below 10⁻⁹ or above 10⁹ are beyond the range of single precision.
+    let [before, after] = [before, after].map(Vec3::as_dvec3);
+    let (cosine, least) = (before.dot(after), f64::from(MIN_COSINE));
+    cosine > 0.0 && cosine * cosine > least * least * before.length_squared() * after.length_squared()
 }
 
 /// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (Kobbelt, Bareuther
@@ -239,11 +270,17 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
         let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
         sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
         sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
-        for (_, (u, v)) in long {
+        for (square, (u, v)) in long {
             if mesh.vertex_count() >= most {
                 return changes;
             }
-            let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
+            let ends = [u, v].map(|end| mesh.position(end));
+            let middle = (ends[0] + ends[1]) * 0.5;
+            // Rounded towards one end, it makes no progress. Also rejects NaN.
+            let is_halved = |end: Vec3| end.distance_squared(middle) < HALVED * square;
+            if !ends.into_iter().all(is_halved) {
+                continue;
+            }
             if let Ok(fresh) = edits.attempt(mesh, |mesh| mesh.split(u, v, middle)) {
                 edits.was_split(fresh, u);
                 changes.creations += 1;

@@ -21,6 +21,9 @@ const LONGEST: f32 = 2.5;
 /// triangle and its nearest corner.
 const CONTACT: f32 = 1.443_375_7;
 
+/// The size less 1 below which the local δ at a vertex is that of a small component: sizes by curvature are 0.7 at least.
+const MEANT_SMALL: f32 = -0.31;
+
 impl Sampling {
     /// Creates a uniform sampling with δ = `delta`, a positive length.
     pub fn new(delta: f32) -> Self {
@@ -33,7 +36,7 @@ impl Sampling {
     }
 
     /// Returns this sampling with a local δ at each vertex: δ times 1 + the scalar attribute `sizes`, which must be
-    /// above −1. Also where the local δ is larger, small components are measured by δ itself, and contacts are found
+    /// above −1. Unless sizes are below 0.69, small components are measured by δ itself, and where they are above 1, contacts are found
     /// only up to the contact distance of δ itself.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
@@ -71,5 +74,16 @@ impl Sampling {
     #[inline]
     pub fn smallest_volume(self) -> f32 {
         self.delta * self.delta * self.delta
+    }
+
+    /// Returns the volume below which the small closed component of a vertex is removed: δ³, or that of the local δ if it
+    /// is so short that the component is meant to be small.
+    pub(super) fn smallest_volume_at(self, mesh: &Mesh, v: VertexId) -> f32 {
+        let size = self.sizes.map_or(0.0, |sizes| mesh.scalar(sizes)[v.index()]);
+        if size < MEANT_SMALL {
+            Self::new(self.delta * (1.0 + size)).smallest_volume()
+        } else {
+            self.smallest_volume()
+        }
     }
 }

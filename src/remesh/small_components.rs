@@ -80,7 +80,7 @@ impl Resolver {
         if members.len() > MAX_VERTICES {
             return false;
         }
-        let (volume, least) = (volume(mesh, &members), sampling.smallest_volume());
+        let (volume, least) = (volume(mesh, &members), sampling.smallest_volume_at(mesh, v));
         if volume >= least || volume <= -least && guide.has_content(mesh, &members, false) {
             return false;
         }
@@ -131,7 +131,6 @@ impl Resolver {
         guide: &dyn TopologyGuide,
     ) {
         self.small.find_again(mesh, &self.edited);
-        let least = SMALLEST_SPHERE * sampling.smallest_volume();
         for (v, is_solid) in std::mem::take(&mut self.small.components) {
             if !mesh.is_live(v) {
                 continue;
@@ -139,7 +138,8 @@ impl Resolver {
             let is_left = || {
                 let members = mesh.component_of(v, MAX_VERTICES);
                 let volume = volume(mesh, &members);
-                volume <= -least || kept_volume(mesh, &members, volume, guide) >= sampling.smallest_volume()
+                let least = sampling.smallest_volume_at(mesh, v);
+                volume <= -SMALLEST_SPHERE * least || kept_volume(mesh, &members, volume, guide) >= least
             };
             if !is_solid && !is_left() {
                 self.remove_component(mesh, v);
@@ -199,7 +199,8 @@ fn is_crushed(
     sampling: Sampling,
     guide: &dyn TopologyGuide,
 ) -> bool {
-    let is_flat = kept_volume(mesh, members, volume, guide) < SMALLEST_SPHERE * sampling.smallest_volume();
+    let least = sampling.smallest_volume_at(mesh, members[0]);
+    let is_flat = kept_volume(mesh, members, volume, guide) < SMALLEST_SPHERE * least;
     let is_empty = || volume > 0.0 && !guide.has_content(mesh, members, true);
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }

@@ -3,7 +3,7 @@
 //! A missing brick is a question, never a value: reads of it are recorded, and whoever reads has to discard the result.
 
 use super::error::{VolumeError, filled};
-use super::grid::{CellCache, share_of_values};
+use super::grid::{CellCache, Padding, share_of_padded, share_of_values};
 use super::sampling::{blend, locate};
 use super::voxels::{VoxelNumber, Voxels, each, map_each};
 use super::{Grid, Normalisation, Region};
@@ -268,24 +268,39 @@ impl BrickGrid {
         missed
     }
 
-    /// Returns the trilinearly interpolated value at `p` as [`Grid::sample_padded`] does, with the same bits; `padding`
+    /// Returns the trilinearly interpolated value at `p` as [`Grid::sample_padded`] does, with the same bits; background
     /// if a brick that it needs is missing, which is recorded.
     #[inline]
-    pub fn sample_padded(&self, p: Vec3, padding: f32, cache: &mut CellCache) -> f32 {
-        let share = share_of_values(self.dims, p);
-        if share > 0.0 {
-            let located = [0, 1, 2].map(|axis| locate(p[axis], self.dims[axis]));
-            let voxel = located.map(|(index, _)| index);
-            if !cache.is_at(voxel_key(voxel)) {
-                match self.corners(voxel) {
-                    Some(corners) => *cache = CellCache::new(voxel_key(voxel), corners),
-                    None => return padding,
-                }
-            }
-            padding + share * (blend(located.map(|(_, fraction)| fraction), cache.corners()) - padding)
-        } else {
-            padding
+    pub fn sample_padded(&self, p: Vec3, padding: Padding, cache: &mut CellCache) -> f32 {
+        self.sample_padded_by((self.dims, p), p, padding, cache)
+    }
+
+    /// As [`Self::sample_padded`], with padding as wide as parts of voxels; see [`Grid::sample_padded_by`].
+    #[inline]
+    pub(crate) fn sample_padded_by(
+        &self,
+        (dims, part): ([usize; 3], Vec3),
+        p: Vec3,
+        padding: Padding,
+        cache: &mut CellCache,
+    ) -> f32 {
+        let share = share_of_values(dims, part);
+        if share <= 0.0 && share_of_padded(dims, part) <= 0.0 {
+            return padding.background;
         }
+        let located = [0, 1, 2].map(|axis| locate(p[axis], self.dims[axis]));
+        let voxel = located.map(|(index, _)| index);
+        if !cache.is_at(voxel_key(voxel)) {
+            match self.corners(voxel) {
+                Some(corners) => *cache = CellCache::new(voxel_key(voxel), corners),
+                None => return padding.background,
+            }
+        }
+        let fraction = located.map(|(_, fraction)| fraction);
+        if share < 1.0 {
+            return padding.beyond(dims, part, share, cache.corners(), |values| blend(fraction, values));
+        }
+        padding.background + share * (blend(fraction, cache.corners()) - padding.background)
     }
 
     /// Returns the values of the cell whose lowest voxel is given, x fastest; `None` if one is missing.
@@ -370,6 +385,9 @@ fn padded<T: VoxelNumber>(values: &[T], region: Region, dims: [usize; 3]) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PADDING: Padding = Padding { background: 0.25, iso: 0.4 };
+
     use crate::math::Random;
     use crate::volume::{Volume, VolumeInit};
     #[cfg(target_arch = "wasm32")]
@@ -425,9 +443,9 @@ mod tests {
                 let p = random_point(&mut random);
                 let nearby = p + Vec3::splat(0.01);
                 for p in [p, nearby] {
-                    let expected = grid.sample_padded(p, 0.25, &mut cache);
+                    let expected = grid.sample_padded(p, PADDING, &mut cache);
                     assert_eq!(
-                        bricks.sample_padded(p, 0.25, &mut other).to_bits(),
+                        bricks.sample_padded(p, PADDING, &mut other).to_bits(),
                         expected.to_bits(),
                         "at {p}"
                     );
@@ -450,13 +468,13 @@ mod tests {
         let mut cache = CellCache::default();
         for _ in 0..4000 {
             let p = random_point(&mut random);
-            let sample = bricks.sample_padded(p, 0.25, &mut cache);
+            let sample = bricks.sample_padded(p, PADDING, &mut cache);
             let absent = bricks.take_missed();
             if absent.is_empty() {
                 found += 1;
                 assert_eq!(
                     sample.to_bits(),
-                    grid.sample_padded(p, 0.25, &mut CellCache::default()).to_bits()
+                    grid.sample_padded(p, PADDING, &mut CellCache::default()).to_bits()
                 );
             } else {
                 missed += 1;

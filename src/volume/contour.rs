@@ -9,6 +9,7 @@ use super::error::VolumeError;
 use super::{Grid, Volume};
 use crate::math::{DAffine3, Vec3};
 use crate::mesh::{TriangleMesh, grid_origin};
+use std::borrow::Cow;
 use std::collections::TryReserveError;
 
 /// Smallest distance of an iso-surface vertex from the ends of the grid edge on which it lies, in voxels: vertices that
@@ -21,10 +22,17 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// The mesh is closed, at the volume's border half a voxel beyond the outermost voxel centres; its triangles are
 /// counter-clockwise seen from the side where intensities are below `iso`.
 ///
+/// NaN counts as outside the volume, whatever `iso` is; +∞ is inside and −∞ outside. The surface is halfway between such a
+/// voxel and a neighbour on the other side. Intensities are compared with `iso` in double precision where `f32` would round them too coarsely.
+///
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
 pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
-    let mut mesh = marching_cubes(&volume.grid(frame)?, iso as f32)?;
+    if !iso.is_finite() {
+        return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
+    }
+    let (grid, iso) = volume.grid_at(iso, frame)?;
+    let mut mesh = marching_cubes(&grid, iso)?;
     to_world(&mut mesh, &volume.affine(), volume.dims());
     Ok(mesh)
 }
@@ -32,19 +40,34 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
 /// Extracts the iso-surface of a grid at `iso` by marching cubes, in index coordinates (voxel centres at integers). The
 /// mesh is empty if no value reaches `iso`.
 ///
-/// Values of `iso` and above are inside (NaN is outside); triangles are counter-clockwise seen from outside and have
+/// Values of `iso` and above are inside (NaN is outside, and the surface halfway to it); triangles are counter-clockwise seen from outside and have
 /// nonzero area. Inside voxels that share only an edge or a corner are not connected by the surface.
 ///
 /// # Errors
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
 pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError> {
+    grid.check()?;
+    let plane = grid.dims[0] * grid.dims[1];
+    marching_cubes_of_slices(grid.dims, iso, &|z| grid.values[z * plane..(z + 1) * plane].into())
+}
+
+/// Extracts the iso-surface as [`marching_cubes`], of a grid given slice by slice: `slice` returns the values of the
+/// voxels with an index z, and is called once for each, in ascending order.
+///
+/// # Errors
+/// `iso` not finite; [`VolumeError::TooLarge`].
+pub(crate) fn marching_cubes_of_slices<'a>(
+    dims: [usize; 3],
+    iso: f32,
+    slice: &dyn Fn(usize) -> Cow<'a, [f32]>,
+) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
         return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
-    grid.check()?;
-    let mut marching = MarchingCubes::new(grid, iso)?;
-    for z in 0..=grid.dims[2] {
-        marching.layer(z)?;
+    let mut marching = MarchingCubes::new(dims, iso)?;
+    for z in 0..=dims[2] {
+        let next = if z < dims[2] { slice(z) } else { Cow::default() };
+        marching.layer(z, next)?;
     }
     Ok(marching.mesh)
 }
@@ -76,7 +99,10 @@ fn to_world(mesh: &mut TriangleMesh, affine: &DAffine3, dims: [usize; 3]) {
 /// State of marching cubes over one grid, processed layer by layer along z. Nodes are voxels of the padded grid: node
 /// (x, y, z) is voxel (x-1, y-1, z-1).
 struct MarchingCubes<'a> {
-    grid: &'a Grid,
+    dims: [usize; 3],
+    /// The values of the voxels in the two slices of nodes around the current layer of cubes, node slice z at index z % 2;
+    /// empty in the padding.
+    slices: [Cow<'a, [f32]>; 2],
     iso: f32,
     cases: &'static [Case],
     /// Number of nodes (voxels of the padded grid) along x and along y.
@@ -94,11 +120,12 @@ struct MarchingCubes<'a> {
 }
 
 impl<'a> MarchingCubes<'a> {
-    fn new(grid: &'a Grid, iso: f32) -> Result<Self, VolumeError> {
-        let size = [grid.dims[0] + 2, grid.dims[1] + 2];
+    fn new(dims: [usize; 3], iso: f32) -> Result<Self, VolumeError> {
+        let size = [dims[0] + 2, dims[1] + 2];
         let plane = size[0] * size[1];
         Ok(Self {
-            grid,
+            dims,
+            slices: [Cow::default(), Cow::default()],
             iso,
             cases: cases(),
             size,
@@ -109,8 +136,10 @@ impl<'a> MarchingCubes<'a> {
         })
     }
 
-    /// Adds the surface in all cubes between the node slices `z` and `z + 1` to the mesh.
-    fn layer(&mut self, z: usize) -> Result<(), VolumeError> {
+    /// Adds the surface in all cubes between the node slices `z` and `z + 1` to the mesh; `next` are the values of the
+    /// voxels in the latter.
+    fn layer(&mut self, z: usize, next: Cow<'a, [f32]>) -> Result<(), VolumeError> {
+        self.slices[(z + 1) % 2] = next;
         self.classify(z + 1);
         let offsets = self.edge_offsets(z);
         for y in 0..self.size[1] - 1 {
@@ -126,11 +155,8 @@ impl<'a> MarchingCubes<'a> {
         let [width, height] = self.size;
         let pairs = &mut self.pairs[z % 2];
         pairs.fill(0);
-        if z > self.grid.dims[2] {
-            return;
-        }
-        for y in 1..height - 1 {
-            let values = self.grid.row(y - 1, z - 1);
+        let rows = self.slices[z % 2].chunks_exact(self.dims[0]);
+        for (y, values) in (1..height - 1).zip(rows) {
             let (before, here) = pairs[(y - 1) * width..(y + 1) * width].split_at_mut(width);
             let nodes = before[1..].iter_mut().zip(&mut here[1..]);
             for ((before, here), &value) in nodes.zip(values) {
@@ -217,9 +243,9 @@ impl<'a> MarchingCubes<'a> {
 
     /// Returns the grid's value at a node, or `None` in the padding.
     fn value(&self, node: [usize; 3]) -> Option<f32> {
-        let [nx, ny, nz] = self.grid.dims;
-        let [x, y, z] = node.map(|k| k.wrapping_sub(1));
-        if x < nx && y < ny && z < nz { self.grid.values.get((z * ny + y) * nx + x).copied() } else { None }
+        let [nx, ny, _] = self.dims;
+        let [x, y] = [node[0], node[1]].map(|k| k.wrapping_sub(1));
+        if x < nx && y < ny { self.slices[node[2] % 2].get(y * nx + x).copied() } else { None }
     }
 
     /// Returns, for each of the twelve edges of a cube between the slices `z` and `z + 1`, its index in `vertices`
@@ -234,9 +260,17 @@ impl<'a> MarchingCubes<'a> {
 }
 
 /// Returns the fraction of the way from a node of value `a` to one of value `b` at which linear interpolation reaches
-/// `iso`, kept [`MARGIN`] away from both ends.
+/// `iso`, kept [`MARGIN`] away from both ends; a half if one of them is not finite.
 fn fraction(a: f32, b: f32, iso: f32) -> f32 {
-    let t = (iso - a) / (b - a);
+    let difference = b - a;
+    let t = if difference.is_finite() {
+        (iso - a) / difference
+    } else if a.is_finite() && b.is_finite() {
+        // Their difference overflows.
+        (0.5 * iso - 0.5 * a) / (0.5 * b - 0.5 * a)
+    } else {
+        0.5
+    };
     if t > 1.0 - MARGIN {
         1.0 - MARGIN
     } else if t > MARGIN {

@@ -48,6 +48,49 @@ impl Default for CellCache {
     }
 }
 
+/// What a grid is surrounded by where it is sampled beyond its border: background, so that every object ends there.
+///
+/// One layer of voxels around the grid continues its outermost voxels. Beside a voxel of the object its value is as far
+/// from the iso value as that voxel, on the other side, so that the object ends half a voxel beyond its outermost
+/// voxel centres, as in [`marching_cubes`](super::marching_cubes); beside others, and beyond, it is `background`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Padding {
+    /// The value far outside; the object is on the other side of `iso`.
+    pub background: f32,
+    /// The iso value at which the object ends.
+    pub iso: f32,
+}
+
+impl Padding {
+    /// Returns the value beside a voxel of the outermost layer of a grid.
+    #[inline]
+    fn beside(&self, value: f32) -> f32 {
+        let is_object = if self.background < self.iso { value >= self.iso } else { value <= self.iso };
+        if is_object { 2.0 * self.iso - value } else { self.background }
+    }
+
+    /// Returns the value at a point, in voxel indices, of which `share`, below 1, is [`share_of_values`]; `corners` are the
+    /// values of the cell at the border next to it, between which `blend` interpolates.
+    pub(super) fn beyond(
+        &self,
+        dims: [usize; 3],
+        p: Vec3,
+        share: f32,
+        corners: &[f32; 8],
+        blend: impl Fn(&[f32; 8]) -> f32,
+    ) -> f32 {
+        let beside = corners.map(|value| self.beside(value));
+        if beside.iter().all(|&value| value == self.background) {
+            return self.background + share * (blend(corners) - self.background);
+        }
+        if share > 0.0 {
+            let values = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| beside[k] + share * (corners[k] - beside[k]));
+            return blend(&values);
+        }
+        self.background + share_of_padded(dims, p) * (blend(&beside) - self.background)
+    }
+}
+
 /// A vector field, such as the gradient of an image: one vector per voxel, x fastest, then y, z. Positions are
 /// continuous voxel indices, voxel centres at integers.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,23 +147,38 @@ impl Grid {
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Returns the trilinearly interpolated value at `p`, in continuous voxel indices, in the grid padded with voxels
-    /// of value `padding` on all sides. Faster if `p` is in the same cell as in the previous call with this `cache`,
-    /// which must only be used with one grid.
+    /// Returns the trilinearly interpolated value at `p`, in continuous voxel indices, in the grid with `padding` on all
+    /// sides. Faster if `p` is in the same cell as in the previous call with this `cache`, which must only be used with one
+    /// grid.
     ///
     /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]
-    pub fn sample_padded(&self, p: Vec3, padding: f32, cache: &mut CellCache) -> f32 {
-        let share = share_of_values(self.dims, p);
-        if share > 0.0 {
-            let cell = Cell::at(self.dims, p);
-            if !cache.is_at(cell.base() as u64) {
-                *cache = CellCache::new(cell.base() as u64, cell.corners(|index| self.values[index]));
-            }
-            padding + share * (cell.blend(&cache.corners) - padding)
-        } else {
-            padding
+    pub fn sample_padded(&self, p: Vec3, padding: Padding, cache: &mut CellCache) -> f32 {
+        self.sample_padded_by((self.dims, p), p, padding, cache)
+    }
+
+    /// As [`Self::sample_padded`], with padding as wide as parts of voxels: `dims` are their numbers along the axes, and
+    /// `part` is the position in them.
+    #[inline]
+    pub(crate) fn sample_padded_by(
+        &self,
+        (dims, part): ([usize; 3], Vec3),
+        p: Vec3,
+        padding: Padding,
+        cache: &mut CellCache,
+    ) -> f32 {
+        let share = share_of_values(dims, part);
+        if share <= 0.0 && share_of_padded(dims, part) <= 0.0 {
+            return padding.background;
         }
+        let cell = Cell::at(self.dims, p);
+        if !cache.is_at(cell.base() as u64) {
+            *cache = CellCache::new(cell.base() as u64, cell.corners(|index| self.values[index]));
+        }
+        if share < 1.0 {
+            return padding.beyond(dims, part, share, &cache.corners, |values| cell.blend(values));
+        }
+        padding.background + share * (cell.blend(&cache.corners) - padding.background)
     }
 
     /// Returns the Sobel gradient in intensity per voxel: central differences over two voxels, smoothed by [1 2 1] in
@@ -225,11 +283,18 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
 
 /// Returns the weight of the values of a grid of `dims` voxels against those of its padding at a point, in voxel indices.
 #[inline]
-pub(super) fn share_of_values(dims: [usize; 3], p: Vec3) -> f32 {
+pub(crate) fn share_of_values(dims: [usize; 3], p: Vec3) -> f32 {
     let last = |n: usize| (n - 1) as f32;
     padding_weight(p.x, last(dims[0]))
         * padding_weight(p.y, last(dims[1]))
         * padding_weight(p.z, last(dims[2]))
+}
+
+/// Returns the weight of a grid of `dims` voxels and one layer of voxels around it against what is beyond, at a point in
+/// voxel indices.
+#[inline]
+pub(super) fn share_of_padded(dims: [usize; 3], p: Vec3) -> f32 {
+    share_of_values(dims.map(|n| n + 2), p + Vec3::ONE)
 }
 
 /// Returns the weight of a grid's values against those of its padding at coordinate `x` of one axis, in voxel indices:
@@ -262,6 +327,9 @@ mod tests {
         }
         Grid::new(dims, values).unwrap()
     }
+
+    /// Padding of zeros: no voxel is object.
+    const ZERO: Padding = Padding { background: 0.0, iso: f32::INFINITY };
 
     fn ramp(p: Vec3) -> f32 {
         1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z
@@ -320,9 +388,45 @@ mod tests {
             let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
             let p = p - Vec3::splat(1.9);
             let expected = padded.sample(p + Vec3::splat(2.0));
-            assert!((g.sample_padded(p, 0.0, &mut CellCache::default()) - expected).abs() < 1e-4, "at {p}");
+            assert!((g.sample_padded(p, ZERO, &mut CellCache::default()) - expected).abs() < 1e-4, "at {p}");
         }
-        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), 0.0, &mut CellCache::default()), 0.0);
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), ZERO, &mut CellCache::default()), 0.0);
+    }
+
+    /// Beside object voxels the padding is their mirror image on the iso value; the padded grid is sampled as it would be
+    /// if it had these voxels.
+    #[test]
+    fn padding_ends_objects_half_a_voxel_beyond_the_border() {
+        let mut random = Random::new(6);
+        let dims = [4, 3, 5];
+        let g = Grid { dims, values: (0..60).map(|_| random.unit() as f32).collect() };
+        for padding in [Padding { background: 0.0, iso: 0.3 }, Padding { background: 1.0, iso: 0.6 }] {
+            let at = |p: Vec3| g.sample_padded(p, padding, &mut CellCache::default());
+            for (k, &value) in g.values.iter().enumerate() {
+                let p = Vec3::new((k % 4) as f32, (k / 4 % 3) as f32, (k / 12) as f32);
+                let is_object = if padding.background < padding.iso {
+                    value >= padding.iso
+                } else {
+                    value <= padding.iso
+                };
+                for axis in 0..3 {
+                    let out = if p[axis] == 0.0 {
+                        -1.0
+                    } else if p[axis] == (dims[axis] - 1) as f32 {
+                        1.0
+                    } else {
+                        continue;
+                    };
+                    let mut step = Vec3::ZERO;
+                    step[axis] = out;
+                    let beside = if is_object { 2.0 * padding.iso - value } else { padding.background };
+                    assert!((at(p + step) - beside).abs() < 1e-5 && (at(p) - value).abs() < 1e-5);
+                    assert!((at(p + step * 0.5) - 0.5 * (value + beside)).abs() < 1e-5);
+                    assert!((at(p + step * 1.75) - 0.25 * beside - 0.75 * padding.background).abs() < 1e-5);
+                    assert_eq!(at(p + step * 2.0), padding.background);
+                }
+            }
+        }
     }
 
     #[test]
@@ -333,8 +437,8 @@ mod tests {
             let t = i as f32;
             let p = Vec3::new((t * 0.013) % 8.0, (t * 0.007) % 6.0, (t * 0.011) % 5.0) - 1.0;
             assert_eq!(
-                g.sample_padded(p, 0.0, &mut cache).to_bits(),
-                g.sample_padded(p, 0.0, &mut CellCache::default()).to_bits(),
+                g.sample_padded(p, ZERO, &mut cache).to_bits(),
+                g.sample_padded(p, ZERO, &mut CellCache::default()).to_bits(),
                 "at {p}"
             );
         }

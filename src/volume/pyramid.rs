@@ -105,8 +105,24 @@ impl Grid {
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
     pub fn reduce(&self, spacing: [f64; 3], unit: f64, factor: f64) -> Result<(Grid, [f64; 3]), VolumeError> {
-        let dims = reduced_dims(self.dims, factor);
-        let coarse = self.resample(&self.reduction(spacing, unit, factor)?, dims)?;
+        self.reduce_along([true; 3], spacing, unit, factor)
+    }
+
+    /// Returns the next coarser level as [`Self::reduce`], but with fewer voxels only along the axes that `axes` marks; it
+    /// is smoothed along the others, too.
+    ///
+    /// # Errors
+    /// As [`Self::reduce`].
+    pub(crate) fn reduce_along(
+        &self,
+        axes: [bool; 3],
+        spacing: [f64; 3],
+        unit: f64,
+        factor: f64,
+    ) -> Result<(Grid, [f64; 3]), VolumeError> {
+        let taps = self.reduction(axes, spacing, [unit, factor])?;
+        let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
+        let coarse = self.resample(&taps, dims)?;
         let next = [0, 1, 2].map(|axis| spacing[axis] * self.dims[axis] as f64 / dims[axis] as f64);
         Ok((coarse, next))
     }
@@ -122,9 +138,24 @@ impl Grid {
         coarse: &mut Grid,
         changed: Region,
         spacing: [f64; 3],
-        [unit, factor]: [f64; 2],
+        steps: [f64; 2],
     ) -> Result<Option<Region>, VolumeError> {
-        let taps = self.reduction(spacing, unit, factor)?;
+        self.update_reduced_along([true; 3], coarse, changed, spacing, steps)
+    }
+
+    /// Updates a level that [`Self::reduce_along`] returned, as [`Self::update_reduced`]; `steps` are `unit` and `factor`.
+    ///
+    /// # Errors
+    /// As [`Self::reduce`].
+    pub(crate) fn update_reduced_along(
+        &self,
+        axes: [bool; 3],
+        coarse: &mut Grid,
+        changed: Region,
+        spacing: [f64; 3],
+        steps: [f64; 2],
+    ) -> Result<Option<Region>, VolumeError> {
+        let taps = self.reduction(axes, spacing, steps)?;
         let parts = [0, 1, 2].map(|axis| {
             let first = changed.min[axis];
             taps[axis].part(first..first + changed.dims[axis])
@@ -143,17 +174,20 @@ impl Grid {
 
     fn reduction(
         &self,
+        axes: [bool; 3],
         spacing: [f64; 3],
-        unit: f64,
-        factor: f64,
+        [unit, factor]: [f64; 2],
     ) -> Result<[ResamplingWeights; 3], VolumeError> {
         check_factor(factor)?;
         let positive = |v: f64| v > 0.0 && v.is_finite();
         if !spacing.iter().all(|&s| positive(s)) || !positive(unit) {
             return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
         }
-        let dims = reduced_dims(self.dims, factor);
-        Ok([0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis])))
+        let reduced = reduced_dims(self.dims, factor);
+        Ok([0, 1, 2].map(|axis| {
+            let (from, unit) = (self.dims[axis], unit / spacing[axis]);
+            ResamplingWeights::new(from, if axes[axis] { reduced[axis] } else { from }, unit)
+        }))
     }
 
     fn resample(&self, taps: &[ResamplingWeights; 3], dims: [usize; 3]) -> Result<Grid, VolumeError> {

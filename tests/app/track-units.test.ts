@@ -70,6 +70,8 @@ describe('a heartbeat', () => {
       ejection: 0.6,
     });
     expect(beatOf([5])).toBeUndefined();
+    // Nothing is ejected from an object that is not there.
+    expect(beatOf([90, 0, 60])).toBeUndefined();
   });
 
   test('is suspect if triangles fold or the area jumps', () => {

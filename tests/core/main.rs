@@ -11,8 +11,11 @@
 #[path = "../common/mod.rs"]
 pub(crate) mod common;
 
+mod anisotropic;
 // Reads the source files.
 #[cfg(not(target_arch = "wasm32"))]
+mod agreement;
+mod anywhere;
 mod architecture;
 mod decimate;
 mod deformable;
@@ -38,6 +41,9 @@ mod remesh;
 mod scenes;
 mod textured_meshes;
 mod thin_structures;
+mod tool_scales;
 mod tracking;
 mod tracking_fuzz;
+mod tracking_input;
 mod volume_files;
+mod voxel_meaning;

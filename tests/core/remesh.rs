@@ -5,7 +5,7 @@ use super::common::shapes::HOSTILE_SCALES;
 use super::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure, report};
-use vesicle::remesh::{EdgeBounds, remesh};
+use vesicle::remesh::{EdgeBounds, Unchecked, remesh, restructure};
 use vesicle::spatial::surface_distance;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -239,4 +239,28 @@ fn vertices_stay_on_the_surface() {
         assert!(off.abs() < 1e-6, "{p}");
     }
     assert!(cube.corners().map(triangle::area).sum::<f64>() > 5.9);
+}
+
+/// Edges below the spacing of single-precision coordinates cannot be made: remeshing and restructuring would split for
+/// ever.
+#[test]
+fn edges_finer_than_coordinates_are_refused() {
+    for (at, radius, edge) in [(5.4e6, 5.0, 0.3), (1e-6, 1e-12, 1e-13), (1e12, 1e7, 1e6), (-1e20, 1e14, 1e12)]
+    {
+        let mesh = Mesh::icosphere(Vec3::ZERO, radius, radius * 0.3).unwrap();
+        let mut far = mesh.to_triangles();
+        far.positions.iter_mut().for_each(|p| *p += Vec3::X * at);
+        let mut far = Mesh::from_triangles(&far).unwrap();
+        let before = far.clone();
+        let refused = remesh(&mut far, about(edge));
+        let is_known = matches!(refused, Err(MeshError::Precision { .. } | MeshError::TooLarge { .. }));
+        assert!(is_known, "{at}: {refused:?}");
+        assert!(far == before);
+        restructure(&mut far, about(edge), &mut Unchecked);
+        far.check().unwrap();
+        println!("{at}: {} vertices", far.vertex_count());
+        assert!(far.vertex_count() < 50_000, "{at}: {}", far.vertex_count());
+    }
+    let near = Mesh::icosphere(Vec3::X * 1e4, 5.0, 1.0).unwrap();
+    assert_eq!(about(0.3).check_for(&near), Ok(()));
 }

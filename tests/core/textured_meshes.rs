@@ -272,6 +272,27 @@ fn the_first_frame_of_an_animation_is_its_static_pose() {
 }
 
 #[test]
+fn an_animation_shows_nothing_in_frames_without_triangles() {
+    let (a, b, none) = (tetrahedron(0.0, None), tetrahedron(2.0, None), TriangleMesh::default());
+    for frames in [
+        vec![&none, &none, &a, &b],
+        vec![&a, &none, &b, &b],
+        vec![&a, &b, &none, &none],
+        vec![&a, &none, &a, &none],
+    ] {
+        let bytes = write_animation(frames.iter().copied(), 0.5).unwrap();
+        let file = gltf::Gltf::from_slice(&bytes).unwrap();
+        let tracks = tracks(&file, &file.blob.clone().unwrap());
+        let end = tracks.iter().flatten().fold(0.0, |end: f32, &(time, _)| end.max(time));
+        assert_eq!(end, 2.0, "{tracks:?}");
+        for (frame, mesh) in frames.iter().enumerate() {
+            let shown: f32 = tracks.iter().map(|track| size_at(track, 0.5 * frame as f32 + 0.1)).sum();
+            assert_eq!(shown, if mesh.triangles.is_empty() { 0.0 } else { 1.0 }, "{frame} {tracks:?}");
+        }
+    }
+}
+
+#[test]
 fn invalid_animations_are_refused() {
     let frame = tetrahedron(0.0, None);
     let mut broken = frame.clone();
@@ -279,7 +300,7 @@ fn invalid_animations_are_refused() {
     let none: [&TriangleMesh; 0] = [];
     for (frames, seconds, named) in [
         (&none[..], 0.1, "frames"),
-        (&[&frame, &TriangleMesh::default()], 0.1, "frames"),
+        (&[&TriangleMesh::default()], 0.1, "frames"),
         (&[&frame, &broken], 0.1, "indices"),
         (&[&frame], 0.0, "frameSeconds"),
         (&[&frame], f64::NAN, "frameSeconds"),

@@ -117,7 +117,7 @@ export interface MeshArrays {
   uvs?: Float32Array;
   /** rgb, 0..1 */
   colors?: Float32Array;
-  /** What positions are relative to, if that was asked for. */
+  /** The point that positions are relative to, if that was asked for. */
   origin?: Vec3;
 }
 export interface MeshInfo {
@@ -158,7 +158,7 @@ export class Mesh {
   /** Increases when connectivity changes / when any vertex moves. */
   readonly topologyVersion: number;
   readonly geometryVersion: number;
-  /** What the mesh keeps positions relative to; 0 unless it is far away for its size. */
+  /** The point that positions are kept relative to; 0 unless the mesh is far away for its size. */
   readonly origin: Vec3;
   arrays(options?: { relative?: boolean }): MeshArrays;
   /** Copies into the caller's buffers, which are replaced only when too small; returns the counts written. */
@@ -441,8 +441,9 @@ export class SurfaceTracker implements Stepper {
   readonly mesh: Mesh; // of the current frame
   readonly frame: number;
   readonly frames: number;
+  readonly origin: Vec3; // of surfaces and boundary points in world space; 0 unless the volume is far from it
   readonly noise: number; // standard deviation, intensity units
-  readonly cycleClosureError: number | undefined; // for cyclic sequences: distance of the closed cycle from its first surface, world units
+  readonly cycleClosureError: number | undefined; // for cyclic sequences with a surface in the first and the last frame: distance of the closed cycle from its first surface, world units
   readonly statistics: FrameStatistics[];
   readonly params: Required<TrackingParams>;
   setParams(params: TrackingParams): void;

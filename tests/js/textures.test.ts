@@ -132,7 +132,7 @@ test.each([
   ['no frames', 'frames', () => animationGlb([])],
   ['no list', 'frames', () => animationGlb(wrong(textured()))],
   ['no mesh', 'frames[1]', () => animationGlb([textured(), wrong({})])],
-  ['a frame without triangles', 'frames', () => animationGlb([textured(), NOTHING()])],
+  ['no frame with triangles', 'frames', () => animationGlb([NOTHING(), NOTHING()])],
   ['no time', 'frameSeconds', () => animationGlb([textured()], { frameSeconds: 0 })],
   ['NaN', 'frameSeconds', () => animationGlb([textured()], { frameSeconds: Number.NaN })],
   ['a misspelled option', 'fps', () => animationGlb([textured()], wrong({ fps: 10 }))],

@@ -204,6 +204,58 @@ test('an animation of a volume without times, and of the frames done so far', as
   expect(animations[0]?.duration).toBeCloseTo(2 * 0.1, 6);
 });
 
+/** Returns a sequence with a ball in the given frames, and none in the others. */
+function appearing(frames: readonly boolean[], origin: Vec3 = [0, 0, 0]): Volume {
+  const side = 20;
+  const data = new Uint8Array(frames.length * side ** 3);
+  data.forEach((_, i) => {
+    const p = [i % side, Math.floor(i / side) % side, Math.floor(i / side ** 2) % side];
+    const depth = 6.5 - Math.hypot(...p.map((x) => x - 9.5));
+    if (frames[Math.floor(i / side ** 3)]) data[i] = 200 * Math.min(1, Math.max(0, depth));
+  });
+  return new Volume({ data, dims: [side, side, side, frames.length], origin });
+}
+
+test('frames without the object have no surface, and are told', async () => {
+  const shown = [false, true, true, false, true];
+  const one = tracked({ volume: appearing(shown) });
+  for (const [frame, volume] of one.volumes().entries()) {
+    const mesh = one.meshAt(frame);
+    const size = shown[frame] ? (4 / 3) * Math.PI * 6 ** 3 : 0;
+    expect(Math.abs(volume - size)).toBeLessThanOrEqual(0.02 * size);
+    expect(mesh.info().volume).toBeCloseTo(volume, 6);
+    expect(mesh.triangleCount > 0).toBe(shown[frame]);
+    expect(one.statistics[frame]?.triangles).toBe(mesh.triangleCount);
+    mesh.free();
+  }
+  const { warnings } = one.step();
+  expect(warnings.map(({ code, where }) => [code, where])).toEqual([
+    ['begins-in-frame', { frame: 1 }],
+    ['ends-in-frame', { frame: 3 }],
+    ['begins-in-frame', { frame: 4 }],
+  ]);
+  const resumed = tracker({ volume: appearing(shown) });
+  resumed.restore(one.save());
+  expect([[...resumed.volumes()], resumed.step().warnings]).toEqual([[...one.volumes()], warnings]);
+  const { scene, animations } = await new GLTFLoader().parseAsync(one.toGlb().buffer as ArrayBuffer, '');
+  const mixer = new AnimationMixer(scene);
+  mixer.clipAction(animations[0] as never).play();
+  for (const [frame, isShown] of shown.entries()) {
+    mixer.setTime((frame + 0.5) * 0.1);
+    expect(scene.children.filter(({ scale }) => scale.x > 0)).toHaveLength(isShown ? 1 : 0);
+  }
+});
+
+test('a surface far from the origin has an origin of its own', () => {
+  const near = tracked({ volume: appearing([true, true]) });
+  const far = tracked({ volume: appearing([true, true], [2e6, -2e6, 0]) });
+  expect(near.origin).toEqual([0, 0, 0]);
+  expect(apart(far.origin, [2e6, -2e6, 0])).toBeLessThan(40);
+  expect(far.volumes()[1]).toBeCloseTo(near.volumes()[1] as number, 2);
+  const [x, y, z] = far.boundary(0);
+  expect(Math.hypot(x as number, y as number, z as number)).toBeLessThan(40);
+});
+
 test.each([0, 2, 3, 4, 5, 6])('a state after %i steps continues bit for bit', (steps) => {
   const more = { volume: short, params: { cyclic: true } };
   const [saved, resumed] = [tracker(more), tracker(more)];
@@ -539,6 +591,12 @@ const REFUSED: [string, string, string, () => unknown][] = [
   ['a frame before all', 'invalid-argument', 'frame', () => tracked({ volume: short }).meshAt(-1)],
   ['no frame', 'invalid-argument', 'frame', () => tracker().meshAt(wrong(undefined))],
   ['a boundary too far', 'invalid-argument', 'frame', () => tracker({ volume: short }).boundary(3)],
+  [
+    'a single slice',
+    'invalid-argument',
+    'volume',
+    () => tracker({ volume: new Volume({ data: new Uint8Array(1800).map((_, i) => i % 7), dims: [30, 30, 1, 2] }) }),
+  ],
   ['an animation of nothing', 'invalid-argument', 'frames', () => tracker().toGlb()],
 ];
 

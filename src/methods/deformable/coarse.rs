@@ -66,7 +66,7 @@ const HALVING_ITERATIONS: u32 = 100;
 /// seeding: on coarse levels it is moved by [`MARGIN`] towards the background. In all runs the enclosing start surface
 /// is made around the voxels brighter than this value.
 pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) -> f32 {
-    let iso = pyramid.normalised(params.iso);
+    let iso = pyramid.iso(params);
     let outside =
         if level > 0 { pyramid.levels[level].mean_beyond(iso, params.iso_force > 0.0) } else { None };
     outside.map_or(iso, |outside| iso + MARGIN * (outside - iso))
@@ -138,7 +138,7 @@ mod tests {
             Voxels::F32((0..40 * 40 * 40).map(value).collect()),
             [40, 40, 40, 1],
         ));
-        Pyramid::new(&volume.unwrap(), 0, 1).unwrap()
+        Pyramid::new(&volume.unwrap(), 0, 1, &params(-1.0, 0.2)).unwrap()
     }
 
     fn params(iso_force: f64, rigidity: f64) -> DeformableParams {

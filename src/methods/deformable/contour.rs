@@ -3,11 +3,13 @@
 
 use super::DeformableParams;
 use super::image::LevelImage;
-use crate::math::Vec3;
+use crate::math::order::sort_by_rank;
+use crate::math::{Bounds, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::remesh::clustered;
-use crate::volume::{Grid, marching_cubes};
+use crate::volume::{Padding, Subdivided, marching_cubes_of_slices, voxels_inside};
+use std::borrow::Cow;
 
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
@@ -44,18 +46,35 @@ impl ObjectIs {
         }
     }
 
-    /// Returns the normalised intensity of the background, which is assumed outside the image so that every object ends
-    /// at the border.
-    pub(super) fn background(self) -> f32 {
+    /// Returns whether the object is above the iso value.
+    pub(super) fn is_above(self) -> bool {
+        self == Self::Brighter
+    }
+
+    /// Returns the normalised intensity of the background far from any object: 0 or 1, or beyond the iso value if that is
+    /// there or further out.
+    pub(super) fn background(self, iso: f32) -> f32 {
         match self {
-            Self::Brighter => 0.0,
-            Self::Darker => 1.0,
+            Self::Brighter if iso > 0.0 => 0.0,
+            Self::Brighter => iso - 1.0,
+            Self::Darker if iso < 1.0 => 1.0,
+            Self::Darker => iso + 1.0,
         }
+    }
+
+    /// Returns what is assumed outside the image, so that every object ends at the border.
+    pub(super) fn outside(self, iso: f32) -> Padding {
+        Padding { background: self.background(iso), iso }
     }
 }
 
+/// The number of voxels up to which parts are measured by the voxels in them, not by the volume that they enclose: corners
+/// and edges of voxels are outside of a contour, most of a single voxel. A mesh follows parts up to this size
+/// if those of that size count; larger limits of the size would change which parts of other images are noise.
+pub(super) const SMALL_PART: f64 = 8.0;
+
 /// Extracts the iso-surface of a pyramid level in model space, closed and facing away from the object. Closed parts, of
-/// the object or around cavities, that enclose less than `smallest_part` voxels of the finest level are left out; if
+/// the object or around cavities, that enclose less than `smallest_part`, in model units, are left out; if
 /// none remains, the mesh is empty.
 pub(super) fn contour(
     image: &LevelImage,
@@ -63,18 +82,61 @@ pub(super) fn contour(
     object: ObjectIs,
     smallest_part: f64,
 ) -> Result<TriangleMesh, MethodError> {
-    let (grid, position) = image.grid();
-    Ok(placed(contour_of_grid(grid, iso, object)?, position).without_components_below(smallest_part))
+    let (grid, position) = image.part_grid();
+    let surface = contour_of_grid(&grid, iso, object)?;
+    if smallest_part > SMALL_PART {
+        return Ok(placed(surface, position).without_components_below(smallest_part));
+    }
+    let component = surface.component_of_each_vertex();
+    let part = 1.0 / image.part_scale().as_dvec3().element_product();
+    let sizes = sizes_of_parts(&surface, &component, smallest_part / part);
+    let kept = surface.components_where(|v| sizes[component[v as usize] as usize] >= smallest_part / part);
+    Ok(placed(kept, position))
 }
 
-/// Extracts the iso-surface of a grid in voxel indices, closed and facing away from the object.
-pub(super) fn contour_of_grid(grid: &Grid, iso: f32, object: ObjectIs) -> Result<TriangleMesh, MethodError> {
+/// Returns the size of each closed part of a contour in voxel indices, in voxels, at the index of its lowest vertex; the
+/// volume that it encloses, but the number of voxels in it if it encloses less than `smallest`, and that is at
+/// most [`SMALL_PART`].
+pub(super) fn sizes_of_parts(surface: &TriangleMesh, component: &[u32], smallest: f64) -> Vec<f64> {
+    let mut sizes = surface.enclosed_volumes(component);
+    sizes.iter_mut().for_each(|volume| *volume = volume.abs());
+    if smallest > SMALL_PART {
+        return sizes;
+    }
+    let part = |triangle: &[u32; 3]| component[triangle[0] as usize];
+    let mut small: Vec<[u32; 3]> = surface.triangles.clone();
+    small.retain(|triangle| sizes[part(triangle) as usize] < smallest);
+    sort_by_rank(&mut small, |triangle| u64::from(part(triangle)));
+    for triangles in small.chunk_by(|a, b| part(a) == part(b)) {
+        sizes[part(&triangles[0]) as usize] = voxels_in(surface, triangles) as f64;
+    }
+    sizes
+}
+
+/// Returns the number of voxels inside a part of a contour in voxel indices, given by its triangles.
+fn voxels_in(surface: &TriangleMesh, triangles: &[[u32; 3]]) -> usize {
+    let corners: Vec<Vec3> = triangles.iter().flatten().map(|&v| surface.positions[v as usize]).collect();
+    let bounds = Bounds::from_points(&corners);
+    let first = bounds.min.floor();
+    let part = TriangleMesh {
+        positions: corners.iter().map(|&p| p - first).collect(),
+        triangles: (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        ..TriangleMesh::default()
+    };
+    let dims = (bounds.max - first).ceil().to_array().map(|n| n as usize + 1);
+    voxels_inside(&part, dims).count_ones(..)
+}
+
+/// Extracts the iso-surface of a grid in indices of the parts of its voxels, closed and facing away from the object.
+pub(super) fn contour_of_grid(
+    grid: &Subdivided,
+    iso: f32,
+    object: ObjectIs,
+) -> Result<TriangleMesh, MethodError> {
+    let negated = |z: usize| Cow::Owned(grid.slice(z).iter().map(|value| -value).collect());
     Ok(match object {
-        ObjectIs::Brighter => marching_cubes(grid, iso)?,
-        ObjectIs::Darker => {
-            let values = grid.values.iter().map(|value| -value).collect();
-            marching_cubes(&Grid { dims: grid.dims, values }, -iso)?
-        }
+        ObjectIs::Brighter => marching_cubes_of_slices(grid.dims(), iso, &|z| grid.slice(z))?,
+        ObjectIs::Darker => marching_cubes_of_slices(grid.dims(), -iso, &negated)?,
     })
 }
 
@@ -87,7 +149,9 @@ pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) 
         return contour;
     }
     let side = if side > 1.0 { side } else { 1.0 };
-    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| (image.index(p) / side).round().as_ivec3())
+    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| {
+        (image.part_index(p) / side).round().as_ivec3()
+    })
 }
 
 /// Returns a surface with its positions mapped by `position`, for conversions between voxel indices of a level and

@@ -10,7 +10,7 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
 /// The distance to the other surface, of model and iso-surface, up to which a point is covered, in voxels of the finest
-/// level.
+/// level, or in the parts into which elongated ones are divided.
 const COVERED_DISTANCE: f64 = 1.0;
 
 /// The largest side of the pieces into which triangles are divided to measure coverage, in voxels of the finest level:
@@ -82,9 +82,9 @@ impl DeformableModel {
     /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
         self.check_is_whole()?;
-        let iso = self.pyramid.normalised(self.params.iso);
+        let iso = self.pyramid.iso(&self.params);
         let object = ObjectIs::by(&self.params);
-        let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.params.smallest_part)?;
+        let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.smallest_part())?;
         let model = self.mesh.to_triangles();
         Ok(CoverageSurvey {
             to_world: self.to_world,

@@ -5,7 +5,7 @@ use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator, RestLength};
 use crate::math::{Mat3, Vec3, resize};
 use crate::mesh::{Ring, VertexId};
-use crate::volume::CellCache;
+use crate::volume::{CellCache, Padding};
 
 /// The speed along the normal, in δ per unit of time, above which the tangential parts of rigidity and of the
 /// attractors act in full; at lower speeds they fade out.
@@ -39,7 +39,7 @@ pub(super) struct LocalAttractor {
 pub(super) struct ForceScale {
     iso: f32,
     iso_force: f32,
-    background: f32,
+    outside: Padding,
     gradient_across: f32,
     gradient_along: f32,
     gradient_bound: f32,
@@ -66,7 +66,7 @@ impl ForceScale {
             needs_slope: yields || params.integrator == Integrator::Implicit,
             iso,
             iso_force: params.iso_force as f32 * gain,
-            background: ObjectIs::by(params).background(),
+            outside: ObjectIs::by(params).outside(iso),
             gradient_across: (params.gradient_normal - params.gradient_tangent) as f32,
             gradient_along: params.gradient_tangent as f32,
             gradient_bound: params.gradient_bound as f32,
@@ -229,7 +229,7 @@ impl Forces {
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
-        let at = |p| image.intensity(p, scale.background, &mut CellCache::default());
+        let at = |p| image.intensity(p, scale.outside, &mut CellCache::default());
         (at(x + half) - at(x - half)).abs()
     }
 
@@ -259,7 +259,7 @@ impl Forces {
             None => &mut self.cells[v],
             Some(_) => &mut CellCache::default(),
         };
-        scale.iso - image.intensity(p, scale.background, known)
+        scale.iso - image.intensity(p, scale.outside, known)
     }
 
     /// Returns the image force, which moves a vertex along its normal n towards the iso-surface: f_I = δ α_I (π_I −

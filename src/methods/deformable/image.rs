@@ -1,15 +1,20 @@
 //! Images: levels of the pyramid, with intensities normalised to 0..1, as forces and topology changes sample them.
 //!
-//! Model space is the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second way);
-//! the volume's affine transform maps it to world space.
+//! Model space is the index space of the finest level, where every voxel counts as a cube of side 1 (section 4.4, second
+//! way); an affine map leads to world space. Voxels that are too long for that are divided into equal parts along their
+//! long sides, and the parts count as cubes. Their intensities are those of trilinear interpolation, and are not stored.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::DeformableParams;
-use crate::math::Vec3;
+use super::contour::ObjectIs;
 use crate::math::order::median;
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
-use crate::volume::{BrickGrid, CellCache, Grid, Region, SparseVolume, VectorGrid, Volume};
+use crate::volume::{
+    BrickGrid, CellCache, Grid, NotFinite, Padding, Region, SparseVolume, Subdivided, VectorGrid, Volume,
+};
+use crate::warning::{Warning, WarningCode};
 
 /// The reduction factor ρ = √3: δ and the shortest side of a voxel grow by it with each level of the pyramid. It is
 /// that of √3 refinement, by which the mesh gets finer (15).
@@ -18,6 +23,45 @@ pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 /// The largest absolute value of an intensity given by the caller, such as the iso value π_I, once it is normalised;
 /// within it no force overflows.
 pub(super) const MAX_NORMALISED: f64 = 100.0;
+
+/// The largest ratio of a side of a voxel to the shortest one up to which the voxel is not divided along it. With more,
+/// edges of the mesh along the long side bridge what the image shows, and a surface oblique to it is made of steps; with
+/// less, the meshes of usual computed tomographies, which are right without it, would have more vertices.
+const MAX_RATIO: f64 = 2.0;
+
+/// The largest number of parts into which a voxel is divided along a side; an odd number. With more, a few slices far
+/// apart would get meshes as large as those of whole volumes; with less than 21, voxels of 1 × 1 × 20 are not cubes.
+const MAX_PARTS: usize = 31;
+
+/// The largest number of parts of all voxels of a level, which the search for missing parts marks in two bits each. On
+/// wasm32, indices of four times as many do not fit into a `usize`.
+const MOST_PARTS: usize = 1 << 30;
+
+/// Returns the number of parts along each axis into which voxels with the given sides are divided: 1, or the odd number
+/// that makes them most nearly as long as the shortest side.
+fn parts_of(sides: [f64; 3]) -> [usize; 3] {
+    let shortest = sides.into_iter().fold(f64::INFINITY, f64::min);
+    sides.map(|side| {
+        let ratio = side / shortest;
+        if ratio <= MAX_RATIO { 1 } else { (2 * (ratio / 2.0) as usize + 1).min(MAX_PARTS) }
+    })
+}
+
+/// Returns numbers of parts as [`parts_of`], but smaller ones if `dims` voxels would have more than [`MOST_PARTS`].
+fn parts_of_whole(sides: [f64; 3], dims: [usize; 3]) -> [usize; 3] {
+    let mut parts = parts_of(sides);
+    let count =
+        |parts: [usize; 3]| (0..3).map(|axis| dims[axis] as f64 * parts[axis] as f64).product::<f64>();
+    while parts != [1; 3] && count(parts) > MOST_PARTS as f64 {
+        let most = parts.into_iter().max().unwrap_or(1);
+        parts = parts.map(|n| if n == most { n - 2 } else { n });
+    }
+    parts
+}
+/// The largest distance of the iso value from the range 0..1 of the normalised intensities where all of them are object.
+/// The object then ends half a voxel beyond its voxels whatever it is; with more, the image is so steep there
+/// that vertices oscillate, with 0, it is flat where the intensities are those at the end of the range.
+const MAX_BEYOND: f32 = 0.5;
 
 /// One level of the image pyramid, sampled at positions in model space.
 #[derive(Debug)]
@@ -30,6 +74,11 @@ pub(super) struct LevelImage {
     /// Maps positions in model space to this level, together with `offset`: voxel index = position · scale + offset.
     scale: Vec3,
     offset: Vec3,
+    /// The numbers of parts into which voxels are divided along each axis.
+    parts: [usize; 3],
+    /// As `scale` and `offset`, with parts instead of voxels.
+    part_scale: Vec3,
+    part_offset: Vec3,
 }
 
 /// Whether there has been a pyramid of a sparse volume. Only the function that makes one sets this: a module that does not
@@ -56,9 +105,33 @@ impl Clone for LevelImage {
 }
 
 impl LevelImage {
-    fn new(grid: Grid, finest: [usize; 3]) -> Self {
-        let scale = Vec3::from([0, 1, 2].map(|axis| grid.dims[axis] as f32 / finest[axis] as f32));
-        Self { grid, bricks: None, gradient: None, scale, offset: (scale - Vec3::ONE) * 0.5 }
+    /// Makes a level whose voxels are divided into `parts`; `finest` is the number of parts of the finest level along each
+    /// axis.
+    fn new(grid: Grid, parts: [usize; 3], finest: [usize; 3]) -> Self {
+        let scale_of =
+            |dims: [usize; 3]| Vec3::from([0, 1, 2].map(|axis| dims[axis] as f32 / finest[axis] as f32));
+        let [scale, part_scale] =
+            [grid.dims, [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis])].map(scale_of);
+        let [offset, part_offset] = [scale, part_scale].map(|scale| (scale - Vec3::ONE) * 0.5);
+        Self { grid, bricks: None, gradient: None, scale, offset, parts, part_scale, part_offset }
+    }
+
+    /// Makes a sparse level, of `dims` voxels divided into `parts`; voxel index = position · scale + offset.
+    fn of_bricks(dims: [usize; 3], parts: [usize; 3], [scale, offset]: [Vec3; 2]) -> Self {
+        let of_part = |axis: usize| match parts[axis] as f32 {
+            1.0 => [scale[axis], offset[axis]],
+            parts => [scale[axis] * parts, (offset[axis] + 0.5) * parts - 0.5],
+        };
+        Self {
+            grid: Grid { dims, values: Vec::new() },
+            bricks: Some(BrickGrid::default()),
+            gradient: None,
+            scale,
+            offset,
+            parts,
+            part_scale: Vec3::from([0, 1, 2].map(|axis| of_part(axis)[0])),
+            part_offset: Vec3::from([0, 1, 2].map(|axis| of_part(axis)[1])),
+        }
     }
 
     /// Returns the loaded bricks of a sparse level, while the model computes; `None` for a level that is there as a whole.
@@ -72,42 +145,89 @@ impl LevelImage {
         if is_any_sparse() { self.bricks.as_mut() } else { None }
     }
 
-    /// Returns the length of the side of a cube with the volume of a voxel of this level, in model units.
+    /// Returns the length of the side of a cube with the volume of a part of a voxel of this level, in model units.
     pub(super) fn side(&self) -> f64 {
-        1.0 / libm::cbrt(self.scale.as_dvec3().element_product())
+        1.0 / libm::cbrt(self.part_scale.as_dvec3().element_product())
     }
 
+    /// Returns the index, in voxels, of a position in model space.
     #[inline]
     pub(super) fn index(&self, p: Vec3) -> Vec3 {
         p * self.scale + self.offset
     }
 
-    /// Returns Π, the trilinearly interpolated intensity in 0..1, at a position in model space, and `background`
-    /// outside the image, so that every object ends at its border. `known` caches the image cell of the last call for
+    /// Returns the index, in parts of voxels, of a position in model space.
+    pub(super) fn part_index(&self, p: Vec3) -> Vec3 {
+        p * self.part_scale + self.part_offset
+    }
+
+    /// Returns the number of parts of voxels of this level per model unit, along each axis.
+    pub(super) fn part_scale(&self) -> Vec3 {
+        self.part_scale
+    }
+
+    /// Returns the grid of the parts of voxels, and a map from its indices to model space.
+    pub(super) fn part_grid(&self) -> (Subdivided<'_>, impl Fn(Vec3) -> Vec3) {
+        (Subdivided::new(&self.grid, self.parts), |index| (index - self.part_offset) / self.part_scale)
+    }
+
+    /// Returns Π, the trilinearly interpolated intensity in 0..1, at a position in model space, in the image with
+    /// `outside` around it, so that every object ends at its border. `known` caches the image cell of the last call for
     /// the same vertex.
     #[inline]
-    pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut CellCache) -> f32 {
+    pub(super) fn intensity(&self, p: Vec3, outside: Padding, known: &mut CellCache) -> f32 {
+        let index = self.index(p);
+        if self.parts == [1; 3] {
+            return match self.bricks() {
+                None => self.grid.sample_padded(index, outside, known),
+                Some(bricks) => bricks.sample_padded(index, outside, known),
+            };
+        }
+        // Padding by parts, as the contour has it, which ends half a voxel beyond the centres; padding by long voxels would
+        // end more than that beyond the centres where the object is bright.
+        let parts = (self.part_grid().0.dims(), self.part_index(p));
         match self.bricks() {
-            None => self.grid.sample_padded(self.index(p), background, known),
-            Some(bricks) => bricks.sample_padded(self.index(p), background, known),
+            None => self.grid.sample_padded_by(parts, index, outside, known),
+            Some(bricks) => bricks.sample_padded_by(parts, index, outside, known),
         }
     }
 
     /// Returns ∇Π, the gradient of the intensity by the Sobel operator, at a position in model space, for the gradient
-    /// force; per voxel of this level and with a length of at most `bound`; zero if [`Self::prepare_gradient_for`] was not
+    /// force; per part of a voxel of this level and with a length of at most `bound`; zero if [`Self::prepare_gradient_for`] was not
     /// called.
     #[inline]
     pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
-        let Some(field) = &self.gradient else { return Vec3::ZERO };
-        let gradient = field.sample(self.index(p));
+        let gradient = if self.parts != [1; 3] {
+            self.gradient_by_parts(p)
+        } else if let Some(field) = &self.gradient {
+            field.sample(self.index(p))
+        } else {
+            return Vec3::ZERO;
+        };
         let length = gradient.length();
         if length > bound { gradient * (bound / length) } else { gradient }
     }
 
-    /// Computes the gradient image that [`Self::gradient`] samples if a gradient force acts, unless that was done before.
+    /// Returns the gradient by the Sobel operator on the parts of voxels, which is not stored: interpolated between parts,
+    /// it is the operator applied to the image at distances of whole parts.
+    fn gradient_by_parts(&self, p: Vec3) -> Vec3 {
+        let at = self.index(p);
+        let step = Vec3::from(self.parts.map(|n| 1.0 / n as f32));
+        let mut gradient = Vec3::ZERO;
+        for k in 0..27 {
+            let shift = Vec3::from([k % 3, k / 3 % 3, k / 9].map(|i| f32::from(i as i8) - 1.0));
+            let weight = Vec3::splat(2.0) - shift.abs();
+            let across = Vec3::new(weight.y * weight.z, weight.z * weight.x, weight.x * weight.y);
+            gradient += shift * across * self.grid.sample(at + shift * step);
+        }
+        gradient * (1.0 / 32.0)
+    }
+
+    /// Computes the gradient image that [`Self::gradient`] samples if a gradient force acts, unless that was done before; none if
+    /// voxels are divided.
     pub(super) fn prepare_gradient_for(&mut self, params: &DeformableParams) -> Result<(), MethodError> {
         let is_needed = params.gradient_normal != 0.0 || params.gradient_tangent != 0.0;
-        if is_needed && self.gradient.is_none() {
+        if is_needed && self.parts == [1; 3] && self.gradient.is_none() {
             self.gradient = Some(self.grid.sobel()?);
         }
         Ok(())
@@ -121,15 +241,18 @@ impl LevelImage {
         (count > 0).then(|| (sum / f64::from(count)) as f32)
     }
 
-    /// Returns, in model space, the first and the last voxel brighter than `iso` of each row along x that has one; the
-    /// enclosing start surface is made around them.
+    /// Returns, in model space, the first and the last part of a voxel brighter than `iso` of each row along x that has
+    /// one; the enclosing start surface is made around them.
     pub(super) fn ends_of_rows(&self, iso: f32) -> Vec<Vec3> {
-        let (Grid { dims: [nx, ny, _], values }, position) = (&self.grid, self.grid().1);
+        let (grid, position) = self.part_grid();
+        let [nx, _, nz] = grid.dims();
         let mut ends = Vec::new();
-        for (k, row) in values.chunks_exact(*nx).enumerate() {
-            let at = |i: usize| position(Vec3::new(i as f32, (k % ny) as f32, (k / ny) as f32));
-            let [first, last] = [row.iter().position(|&v| v > iso), row.iter().rposition(|&v| v > iso)];
-            ends.extend([first, last].into_iter().flatten().map(at));
+        for z in 0..nz {
+            for (y, row) in grid.slice(z).chunks_exact(nx).enumerate() {
+                let at = |i: usize| position(Vec3::new(i as f32, y as f32, z as f32));
+                let [first, last] = [row.iter().position(|&v| v > iso), row.iter().rposition(|&v| v > iso)];
+                ends.extend([first, last].into_iter().flatten().map(at));
+            }
         }
         ends
     }
@@ -156,22 +279,23 @@ impl LevelImage {
         median(differences.into_iter()).map_or(0.0, |difference| difference * self.voxels_per_unit())
     }
 
-    /// Calls `visit` with the signed difference of intensity of each pair of voxels that share a face and are on
-    /// opposite sides of `iso`, from which the steepness of the image is computed.
+    /// Calls `visit` with the signed difference of intensity, per part of a voxel, of each pair of voxels that share a face
+    /// and are on opposite sides of `iso`, from which the steepness of the image is computed.
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
-        let mut pass = |a: &[f32], b: &[f32]| {
+        let parts = self.parts.map(|n| n as f32);
+        let mut pass = |a: &[f32], b: &[f32], axis: usize| {
             let iso_crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
-            iso_crossings.for_each(|(&a, &b)| visit(a - b));
+            iso_crossings.for_each(|(&a, &b)| visit((a - b) / parts[axis]));
         };
         let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
         for (k, row) in rows.iter().enumerate() {
-            pass(&row[1..], row);
+            pass(&row[1..], row, 0);
             if k % ny + 1 < ny {
-                pass(rows[k + 1], row);
+                pass(rows[k + 1], row, 1);
             }
             if k / ny + 1 < nz {
-                pass(rows[k + ny], row);
+                pass(rows[k + ny], row, 2);
             }
         }
     }
@@ -184,10 +308,10 @@ impl LevelImage {
         Ok(())
     }
 
-    /// Returns the number of voxels of this level per model unit, along the axis on which it is largest; it converts
-    /// lengths to voxels of the level.
+    /// Returns the number of voxels, or of parts of divided ones, of this level per model unit, along the axis on which it
+    /// is largest; it converts lengths to voxels of the level.
     pub(super) fn voxels_per_unit(&self) -> f32 {
-        self.scale.max_element()
+        self.part_scale.max_element()
     }
 
     /// Returns the number of voxels of this level per model unit, along each axis.
@@ -195,9 +319,9 @@ impl LevelImage {
         self.scale
     }
 
-    /// Returns the grid of this level, and a map from its voxel indices to model space.
-    pub(super) fn grid(&self) -> (&Grid, impl Fn(Vec3) -> Vec3) {
-        (&self.grid, |index| (index - self.offset) / self.scale)
+    /// Returns the number of voxels along each axis.
+    pub(super) fn dims(&self) -> [usize; 3] {
+        self.grid.dims
     }
 }
 
@@ -207,8 +331,21 @@ pub(super) struct Pyramid {
     pub(super) levels: Vec<LevelImage>,
     /// The spacing of the volume, from which those of the levels follow.
     spacing: [f64; 3],
+    /// The numbers of parts into which the voxels of the volume are divided along each axis.
+    parts: [usize; 3],
+    /// The intensity that is normalised to 0, and the range that is normalised to 0..1.
     low: f64,
     range: f64,
+    /// The lowest intensity of the volume, and its range: those above, unless differences across the iso value are too
+    /// small for that.
+    volume_range: [f64; 2],
+    /// The volume and the index of its frame, if what is normalised to 0..1 may depend on the iso value.
+    source: Option<(Volume, usize)>,
+    /// The voxels of the finest level that are not finite. Their values depend on the iso value and the side of it on
+    /// which the object is.
+    not_finite: Option<NotFinite>,
+    /// The iso value of the volume, and the side of it on which the object is, that `source` and `not_finite` were used for.
+    made_for: (f64, ObjectIs),
     /// The sum of the hashes of all voxels of the finest level, or of the coarsest of a sparse volume, by which a saved
     /// state is matched to its volume.
     hash: u64,
@@ -226,32 +363,131 @@ pub(super) struct SparseLevels {
 }
 
 impl Pyramid {
-    /// Builds the image pyramid of a frame, with `above` levels above the volume itself.
+    /// Builds the image pyramid of a frame, with `above` levels above the volume itself, for the iso value of `params`.
+    ///
+    /// Intensities are normalised by the range of the volume; if single precision then shows the image near the iso value
+    /// too coarsely, since a few voxels are far beyond all others, by a window around it.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for more levels than the volume allows; [`MethodError::Volume`] if there is no
     /// such frame or memory does not suffice.
-    pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
-        let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
+    pub(super) fn new(
+        volume: &Volume,
+        frame: usize,
+        above: usize,
+        params: &DeformableParams,
+    ) -> Result<Self, MethodError> {
+        let parts = parts_of_whole(volume.spacing(), volume.dims());
+        let possible = most_levels_above(volume, parts)?;
         if above > possible {
             let [nx, ny, nz] = volume.dims();
             let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
             return Err(MethodError::invalid("levels", problem));
         }
-        let mut grid = volume.normalised_grid(frame)?;
-        let mut spacing = volume.spacing();
+        let grid = volume.normalised_grid(frame)?;
+        let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
+        let volume_range = [volume.range()[0], volume.span()];
+        let divided = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
+        let mut pyramid = Self {
+            levels: vec![LevelImage::new(grid, parts, divided)],
+            spacing: volume.spacing(),
+            parts,
+            low: volume_range[0],
+            range: volume_range[1],
+            volume_range,
+            source: None,
+            not_finite: volume.not_finite(frame)?,
+            made_for: (params.iso, ObjectIs::by(params)),
+            hash,
+            sparse: None,
+        };
+        if let Some([low, high]) = volume.window_at(params.iso, frame)? {
+            [pyramid.low, pyramid.range] = [low, high - low];
+            pyramid.levels = vec![LevelImage::new(volume.grid_in([low, high], frame)?, parts, divided)];
+        }
+        if pyramid.is_windowed() || volume.is_wide(frame)? {
+            pyramid.source = Some((volume.clone(), frame));
+        }
+        pyramid.set_not_finite(params);
+        pyramid.build_levels(above)?;
+        Ok(pyramid)
+    }
+
+    /// Returns the pyramid for other parameters, if its voxels depend on them and differ; otherwise `None`.
+    ///
+    /// # Errors
+    /// [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn adapted(&self, params: &DeformableParams) -> Result<Option<Self>, MethodError> {
+        if self.made_for == (params.iso, ObjectIs::by(params)) {
+            return Ok(None);
+        }
+        let above = self.levels.len() - 1;
+        if let Some((volume, frame)) = &self.source
+            && (self.is_windowed() || volume.window_at(params.iso, *frame)?.is_some())
+        {
+            return Self::new(volume, *frame, above, params).map(Some);
+        }
+        if self.not_finite.is_none() {
+            return Ok(None);
+        }
+        let finest = LevelImage::new(self.levels[0].grid.clone(), self.parts, self.dims());
+        let mut adapted = Self {
+            levels: vec![finest],
+            source: self.source.clone(),
+            not_finite: self.not_finite.clone(),
+            made_for: (params.iso, ObjectIs::by(params)),
+            sparse: None,
+            ..*self
+        };
+        adapted.set_not_finite(params);
+        adapted.build_levels(above)?;
+        Ok(Some(adapted))
+    }
+
+    /// Returns whether the finest level has the values of [`Volume::normalised_grid`], each of which depends on its voxel
+    /// and the range of the volume only.
+    pub(super) fn is_as_normalised(&self) -> bool {
+        !self.is_windowed() && self.not_finite.is_none()
+    }
+
+    /// Returns whether a window around the iso value is normalised to 0..1, not the range of the volume.
+    fn is_windowed(&self) -> bool {
+        [self.low, self.range] != self.volume_range
+    }
+
+    /// Replaces the volume that other windows may be taken from.
+    pub(super) fn set_source(&mut self, volume: &Volume, frame: usize) {
+        if self.source.is_some() {
+            self.source = Some((volume.clone(), frame));
+        }
+    }
+
+    /// Gives values to the voxels of the finest level that are not finite: NaN is never object, infinite voxels are on
+    /// their side of the iso value.
+    fn set_not_finite(&mut self, params: &DeformableParams) {
+        let Some(not_finite) = &self.not_finite else { return };
+        let (iso, object) = (self.iso(params), ObjectIs::by(params));
+        let grid = &mut self.levels[0].grid;
+        let far = [ObjectIs::Brighter, ObjectIs::Darker].map(|object| object.background(iso));
+        not_finite.replace(grid, iso, object.is_above(), far);
+    }
+
+    /// Makes `above` levels from the finest, the only one.
+    fn build_levels(&mut self, above: usize) -> Result<(), MethodError> {
+        let mut spacing = self.spacing;
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
-        let mut levels = Vec::with_capacity(above + 1);
-        for _ in 0..above {
-            let (coarse, coarse_spacing) = grid.reduce(spacing, unit, REDUCTION)?;
-            levels.push(LevelImage::new(std::mem::replace(&mut grid, coarse), volume.dims()));
+        let finest = self.dims();
+        let mut level_parts = self.parts;
+        for level in 0..above {
+            let grid = &self.levels[level].grid;
+            let along = level_parts.map(|n| n == 1);
+            let (coarse, coarse_spacing) = grid.reduce_along(along, spacing, unit, REDUCTION)?;
+            level_parts = parts_on_coarse_level(self.parts, coarse_spacing, coarse.dims);
+            self.levels.push(LevelImage::new(coarse, level_parts, finest));
             spacing = coarse_spacing;
             unit *= REDUCTION;
         }
-        levels.push(LevelImage::new(grid, volume.dims()));
-        let spacing = volume.spacing();
-        let hash = hash_of(&levels[0].grid, Region { min: [0; 3], dims: volume.dims() });
-        Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse: None })
+        Ok(())
     }
 
     /// Makes the pyramid of a sparse volume from its level `finest` on, the coarsest level whole.
@@ -269,26 +505,40 @@ impl Pyramid {
             return Err(MethodError::NeedsData { needs: volume.missing(last)? });
         };
         let hash = hash_of(&coarsest, Region { min: [0; 3], dims: coarsest.dims });
+        let spacing = spacing_of(&first.affine);
+        let parts = parts_of(spacing);
+        let to_world = model_to_world(&first.affine, parts);
         let mut levels = Vec::with_capacity(all.len() - finest);
-        for level in &all[finest..] {
-            let map = level.affine.inverse() * first.affine;
+        for (k, level) in all[finest..].iter().enumerate() {
+            let map = level.affine.inverse() * to_world;
             let [x, y, z] = [map.matrix3.x_axis.x, map.matrix3.y_axis.y, map.matrix3.z_axis.z];
-            levels.push(LevelImage {
-                grid: Grid { dims: level.dims, values: Vec::new() },
-                bricks: Some(BrickGrid::default()),
-                gradient: None,
-                scale: Vec3::new(x as f32, y as f32, z as f32),
-                offset: map.translation.as_vec3(),
-            });
+            let of_level = match k {
+                0 => parts,
+                _ if k + finest < last => parts_of_coarse_voxels(parts, spacing_of(&level.affine)),
+                _ => parts_on_coarse_level(parts, spacing_of(&level.affine), level.dims),
+            };
+            let [scale, offset] = [Vec3::new(x as f32, y as f32, z as f32), map.translation.as_vec3()];
+            levels.push(LevelImage::of_bricks(level.dims, of_level, [scale, offset]));
         }
         if let Some(level) = levels.last_mut() {
             *level = LevelImage { grid: coarsest, bricks: None, ..level.clone() };
         }
         IS_ANY_SPARSE.store(true, Ordering::Relaxed);
         let sparse = Some(SparseLevels { volume: volume.clone(), finest, reach: super::sparse::REACH });
-        let axes = first.affine.matrix3;
-        let spacing = [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()];
-        Ok(Self { levels, spacing, low: volume.range()[0], range: volume.span(), hash, sparse })
+        let volume_range = [volume.range()[0], volume.span()];
+        Ok(Self {
+            levels,
+            spacing,
+            parts,
+            low: volume_range[0],
+            range: volume_range[1],
+            volume_range,
+            source: None,
+            not_finite: None,
+            made_for: (0.0, ObjectIs::Brighter),
+            hash,
+            sparse,
+        })
     }
 
     /// Returns whether this is the pyramid of a sparse volume.
@@ -343,8 +593,10 @@ impl Pyramid {
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
         for level in 1..self.levels.len() {
             let (finer, coarser) = self.levels.split_at_mut(level);
+            let axes = finer[level - 1].parts.map(|n| n == 1);
             let (from, to) = (&finer[level - 1].grid, &mut coarser[0]);
-            let updated = from.update_reduced(&mut to.grid, changed, spacing, [unit, REDUCTION])?;
+            let steps = [unit, REDUCTION];
+            let updated = from.update_reduced_along(axes, &mut to.grid, changed, spacing, steps)?;
             let Some(updated) = updated else { return Ok(()) };
             to.update_gradient(updated)?;
             spacing =
@@ -360,31 +612,136 @@ impl Pyramid {
         self.hash
     }
 
-    /// Returns whether intensities are normalised by the range of `volume`.
+    /// Returns whether the range of `volume` is that of the volume of the pyramid.
     pub(super) fn has_range_of(&self, volume: &Volume) -> bool {
-        [self.low, self.range] == [volume.range()[0], volume.span()]
+        self.volume_range == [volume.range()[0], volume.span()]
     }
 
-    /// Maps an intensity in the volume's units such that the range of the volume becomes 0..1. Results are clamped to
+    /// Returns the iso value π_I, normalised as intensities are. If all of these are object, it is [`MAX_BEYOND`] from them
+    /// at most.
+    pub(super) fn iso(&self, params: &DeformableParams) -> f32 {
+        let iso = self.normalised(params.iso);
+        match ObjectIs::by(params) {
+            ObjectIs::Brighter if iso < -MAX_BEYOND => -MAX_BEYOND,
+            ObjectIs::Darker if iso > 1.0 + MAX_BEYOND => 1.0 + MAX_BEYOND,
+            _ => iso,
+        }
+    }
+
+    /// Maps an intensity in the volume's units such that the range of the pyramid becomes 0..1. Results are clamped to
     /// ±[`MAX_NORMALISED`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
         ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }
 
-    /// Returns the intensity in the volume's units that is normalised to 0, and the range that is normalised to 0..1.
-    pub(super) fn range(&self) -> [f64; 2] {
-        [self.low, self.range]
+    /// Returns the lowest intensity of the volume, and its range.
+    pub(super) fn volume_range(&self) -> [f64; 2] {
+        self.volume_range
     }
 
-    /// Returns the spacing of the finest level in world units.
+    /// Returns the lengths of a model unit along the axes, in world units.
     pub(super) fn spacing(&self) -> [f64; 3] {
-        self.spacing
+        [0, 1, 2].map(|axis| self.spacing[axis] / self.parts[axis] as f64)
+    }
+
+    /// Returns the dimensions of the finest level in model units: in voxels, or in parts of divided ones.
+    pub(super) fn dims(&self) -> [usize; 3] {
+        self.levels[0].part_grid().0.dims()
     }
 
     /// Returns the dimensions of the finest level in voxels.
-    pub(super) fn dims(&self) -> [usize; 3] {
-        self.levels[0].grid.dims
+    pub(super) fn voxel_dims(&self) -> [usize; 3] {
+        self.levels[0].dims()
     }
+
+    /// Returns the volume of a voxel of the finest level in model units: the number of its parts.
+    pub(super) fn voxel(&self) -> f64 {
+        self.parts.iter().product::<usize>() as f64
+    }
+
+    /// Returns the warnings about results on this image.
+    pub(super) fn warnings(&self) -> Vec<Warning> {
+        let spacing = self.spacing();
+        let [shortest, longest] =
+            [f64::min, f64::max].map(|of| spacing.into_iter().reduce(of).unwrap_or(1.0));
+        if longest / shortest <= MAX_RATIO {
+            return Vec::new();
+        }
+        let ratio = self.spacing.into_iter().fold(0.0, f64::max) / shortest;
+        let text = format!(
+            "voxels are {ratio:.0} times as long as wide: between their centres the shape is a guess, and the surface has \
+             steps; interpolate slices (enrichSlices) or resample the volume first"
+        );
+        vec![Warning::new(WarningCode::Anisotropic, text)]
+    }
+
+    /// Returns the map from model space to world space for a volume with the affine transform `affine`.
+    pub(super) fn to_world(&self, affine: &DAffine3) -> DAffine3 {
+        model_to_world(affine, self.parts)
+    }
+
+    /// Returns the parts of voxels, as a region in model units, whose intensities change with those of the voxels in
+    /// `region`.
+    pub(super) fn parts_around(&self, region: Region) -> Region {
+        let dims = self.dims();
+        let [min, end] = [0, 1].map(|k| {
+            [0, 1, 2].map(|axis| {
+                let parts = self.parts[axis];
+                // Beyond the centres of the next voxels nothing changes.
+                let (middle, beyond) = (parts * region.min[axis] + parts / 2, parts - 1);
+                match k {
+                    0 => middle.saturating_sub(beyond),
+                    _ => (middle + parts * (region.dims[axis] - 1) + beyond + 1).min(dims[axis]),
+                }
+            })
+        });
+        Region { min, dims: [0, 1, 2].map(|axis| end[axis] - min[axis]) }
+    }
+}
+
+/// Returns the number of parts into which the voxels of a coarse level are divided, given those of the finest: none if
+/// these are not, although rounding may have made them a little longer.
+fn parts_on_coarse_level(finest: [usize; 3], sides: [f64; 3], dims: [usize; 3]) -> [usize; 3] {
+    if finest == [1; 3] { finest } else { parts_of_whole(sides, dims) }
+}
+
+/// Returns numbers of parts as [`parts_on_coarse_level`], of a level that is never there as a whole.
+fn parts_of_coarse_voxels(finest: [usize; 3], sides: [f64; 3]) -> [usize; 3] {
+    if finest == [1; 3] { finest } else { parts_of(sides) }
+}
+
+/// Returns the largest number of levels above a volume with voxels divided into `parts`: each must have at least two
+/// voxels along every axis. Axes along which voxels are divided keep their voxels until the others are as long.
+fn most_levels_above(volume: &Volume, parts: [usize; 3]) -> Result<usize, MethodError> {
+    if parts == [1; 3] {
+        return Ok(volume.max_pyramid_levels(REDUCTION)? - 1);
+    }
+    let (mut dims, mut spacing, mut level_parts) = (volume.dims(), volume.spacing(), parts);
+    let mut above = 0;
+    while dims.iter().all(|&n| n >= 2) {
+        let next = [0, 1, 2].map(|axis| {
+            if level_parts[axis] == 1 { (dims[axis] as f64 / REDUCTION) as usize } else { dims[axis] }
+        });
+        spacing = [0, 1, 2].map(|axis| spacing[axis] * dims[axis] as f64 / next[axis].max(1) as f64);
+        dims = next;
+        level_parts = parts_on_coarse_level(parts, spacing, dims);
+        above += 1;
+    }
+    Ok(usize::max(above, 1) - 1)
+}
+
+/// Returns the map from the indices of parts of voxels to world space, given that from voxel indices.
+fn model_to_world(affine: &DAffine3, parts: [usize; 3]) -> DAffine3 {
+    if parts == [1; 3] {
+        return *affine;
+    }
+    let side = DVec3::from(parts.map(|n| 1.0 / n as f64));
+    *affine * DAffine3 { matrix3: DMat3::from_diagonal(side), translation: (side - DVec3::ONE) * 0.5 }
+}
+
+fn spacing_of(affine: &DAffine3) -> [f64; 3] {
+    let axes = affine.matrix3;
+    [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()]
 }
 
 /// Returns the sum of the hashes of the voxels of a grid in a region.

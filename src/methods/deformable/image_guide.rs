@@ -54,7 +54,7 @@ impl<'a> ImageGuide<'a> {
     }
 
     fn depth(&self, p: Vec3) -> f32 {
-        let intensity = self.image.intensity(p, self.object.background(), &mut CellCache::default());
+        let intensity = self.image.intensity(p, self.object.outside(self.iso), &mut CellCache::default());
         self.object.depth(intensity, self.iso)
     }
 

@@ -11,6 +11,11 @@
 //! edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
 //! [`DeformableModel::restore`].
 //!
+//! # Elongated voxels
+//! The surface has the topology of the trilinearly interpolated image, also where voxels are up to 20 times as long as
+//! wide: voxels more than twice as long are divided into nearly cubic parts, which are computed when they are needed.
+//! Where voxels remain elongated, beyond 62 times as long, reports carry [`crate::warning::WarningCode::Anisotropic`].
+//!
 //! # Limits
 //! With `adaptivity: 0`, sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner
 //! than that are lost, on coarse levels those thinner than the contact distance there.
@@ -43,6 +48,7 @@
 //! ```
 
 mod awake;
+mod balance;
 mod coarse;
 mod contour;
 mod coverage;
@@ -95,7 +101,9 @@ pub struct DeformableOptions {
     /// lost there.
     pub levels: usize,
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
-    /// default 1.53 times the side of a cube with the volume of a voxel.
+    /// default 1.53 times the side of a cube with the volume of a voxel, or 0.85 times in images of less than four voxels
+    /// along an axis. Voxels more than twice as long as wide are divided into nearly cubic parts, whose volume counts
+    /// instead.
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -125,6 +133,13 @@ const MEAN_EDGE: f64 = 1.7;
 /// The default δ on the finest level in voxels. It is near the upper end of the range that the paper gives, 0.693 to 1
 /// voxels (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
+
+/// The number of voxels along an axis below which an image is thin: all of its objects are.
+const FEW_SLICES: usize = 4;
+
+/// The default δ in thin images, in voxels. With [`DEFAULT_DELTA`], the rim of a disc in a single slice is rounded off, and
+/// the disc loses a seventh of its volume; with less, there are more vertices, but the same volume.
+const DELTA_OF_THIN: f64 = 0.5;
 
 /// The accepted range of δ, the lower edge bound, on the finest level in voxels: with less, a mesh of the whole image
 /// does not fit into memory; with more, the mesh misses the object.
@@ -243,15 +258,16 @@ impl DeformableModel {
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
-        let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
+        let pyramid = Pyramid::new(volume, options.frame, options.levels, &params)?;
         let origin = Origin { frame: options.frame, start: options.start, edge: options.edge, params };
         Self::from_pyramid(pyramid, volume.affine(), origin)
     }
 
-    fn from_pyramid(pyramid: Pyramid, to_world: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+    fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
+        let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
-        let finest_delta = finest_delta(edge, voxel)?;
+        let finest_delta = finest_delta(edge, voxel, pyramid.dims())?;
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
         let domain = Domain::new(pyramid.dims(), delta);
@@ -259,9 +275,9 @@ impl DeformableModel {
         let context = StartContext {
             image: &pyramid.levels[level],
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
-            iso: pyramid.normalised(params.iso),
+            iso: pyramid.iso(&params),
             object: ObjectIs::by(&params),
-            smallest_part: params.smallest_part,
+            smallest_part: params.smallest_part * pyramid.voxel(),
             dims: pyramid.dims(),
             domain,
             from_world: to_world.inverse(),
@@ -454,6 +470,11 @@ impl DeformableModel {
         changes
     }
 
+    /// Returns the least volume of a part in model units.
+    fn smallest_part(&self) -> f64 {
+        self.params.smallest_part * self.pyramid.voxel()
+    }
+
     fn sampling(&self) -> Sampling {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
@@ -508,7 +529,7 @@ impl DeformableModel {
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.pyramid.warnings(),
         }
     }
 
@@ -519,9 +540,14 @@ impl DeformableModel {
     /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         self.check_params(&params)?;
+        let adapted = self.pyramid.adapted(&params)?;
+        let image = adapted.map(|adapted| std::mem::replace(&mut self.pyramid, adapted));
         let before = std::mem::replace(&mut self.params, params);
         if let Err(error) = self.prepare_level() {
             self.params = before;
+            if let Some(image) = image {
+                self.pyramid = image;
+            }
             return Err(error);
         }
         self.wake_all();
@@ -583,11 +609,11 @@ impl DeformableModel {
         self.motion.forces.forget_image();
         self.needs_factor = self.pyramid.levels[self.level].bricks().is_some();
         if self.needs_factor {
-            self.level_iso = self.pyramid.normalised(self.params.iso);
+            self.level_iso = self.pyramid.iso(&self.params);
             return Ok(());
         }
         self.level_iso = if self.seeds_levels() || self.pyramid.is_sparse() {
-            self.pyramid.normalised(self.params.iso)
+            self.pyramid.iso(&self.params)
         } else {
             coarse::iso(&self.pyramid, &self.params, self.level)
         };
@@ -611,7 +637,8 @@ impl DeformableModel {
         self.pyramid.delta_at(self.finest_delta, self.level)
     }
 
-    /// The mesh in model space, the index space of the volume, where voxels are unit cubes.
+    /// The mesh in model space: the index space of the volume, or of the parts into which elongated voxels are divided,
+    /// where these are unit cubes.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
@@ -654,9 +681,13 @@ impl DeformableModel {
 }
 
 /// Converts the option `edge`, the mean edge length in world units, to δ on the finest level in voxels; `None` gives
-/// [`DEFAULT_DELTA`]. `voxel` is the side, in world units, of a cube with the volume of a voxel.
-fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
-    let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
+/// [`DEFAULT_DELTA`], or less in an image of few slices. `voxel` is the side, in world units, of a cube with the volume of
+/// a voxel.
+fn finest_delta(edge: Option<f64>, voxel: f64, dims: [usize; 3]) -> Result<f64, MethodError> {
+    let Some(edge) = edge else {
+        let is_thin = dims.into_iter().any(|n| n < FEW_SLICES);
+        return Ok(if is_thin { DELTA_OF_THIN } else { DEFAULT_DELTA });
+    };
     let delta = edge / voxel / MEAN_EDGE;
     if DELTA_RANGE.contains(&delta) {
         return Ok(delta);

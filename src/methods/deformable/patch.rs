@@ -5,13 +5,13 @@
 //! already, and each rim of the hole is joined with a rim of the contour by a strip of triangles. If rims do not
 //! correspond, or triangles would intersect, nothing is replaced.
 
-use super::contour::{ObjectIs, contour_of_grid, placed};
+use super::contour::{ObjectIs, contour_of_grid, placed, sizes_of_parts};
 use super::image::LevelImage;
 use crate::math::order::{combined_rank, sort_by_rank, sort_distinct, sort_ranks};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, Patch, PatchCorner, TriangleMesh, VertexId, sort_distinct as sort_vertices};
 use crate::methods::MethodError;
-use crate::volume::Region;
+use crate::volume::{Region, Subdivided};
 use std::collections::BTreeMap;
 
 /// The distance, in voxels, between the box whose contour is inserted and the one along which the mesh is cut. With
@@ -336,18 +336,19 @@ struct Piece {
 
 impl Piece {
     fn new(image: &LevelImage, at: PatchBox, rule: ContourRule) -> Result<Self, MethodError> {
-        let part = image.grid().0.part(at.voxels)?;
+        let part = image.part_grid().0.region(at.voxels)?;
         let offset = Vec3::from(at.voxels.min.map(|k| k as f32));
-        let mut surface = placed(contour_of_grid(&part, rule.iso, rule.object)?, |p| p + offset);
+        let mut surface =
+            placed(contour_of_grid(&Subdivided::whole(&part), rule.iso, rule.object)?, |p| p + offset);
         let component = surface.component_of_each_vertex();
-        let volumes = surface.enclosed_volumes(&component);
+        let sizes = sizes_of_parts(&surface, &component, rule.smallest_part);
         let is_inside: Vec<bool> = surface.positions.iter().map(|&p| at.inner.contains(p)).collect();
         surface.triangles.retain(|corners| corners.iter().all(|&v| is_inside[v as usize]));
         let part = surface.component_of_each_vertex();
         let deep = Bounds { min: at.inner.min + Vec3::splat(GAP), max: at.inner.max - Vec3::splat(GAP) };
         let mut is_negligible = vec![true; part.len()];
         for (v, &p) in surface.positions.iter().enumerate().filter(|&(v, _)| is_inside[v]) {
-            let is_small = volumes[component[v] as usize].abs() < rule.smallest_part;
+            let is_small = sizes[component[v] as usize] < rule.smallest_part;
             is_negligible[part[v] as usize] &= is_small || !deep.contains(p);
         }
         Ok(Self { surface, part, is_negligible })

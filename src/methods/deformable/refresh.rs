@@ -37,22 +37,27 @@ impl DeformableModel {
     /// memory does not suffice; [`MethodError::TooManyVertices`].
     pub fn refresh(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
         self.check_is_whole()?;
-        if volume.dims() != self.pyramid.dims() || volume.affine() != self.to_world {
+        let is_in_place = self.pyramid.to_world(&volume.affine()) == self.to_world;
+        if volume.dims() != self.pyramid.voxel_dims() || !is_in_place {
             let problem = "must have the dimensions and the affine transform of the model's volume";
             return Err(MethodError::invalid("volume", problem));
         }
         let new = volume.normalised_region(region, self.frame)?;
-        if !self.pyramid.has_range_of(volume) {
+        let is_local = self.pyramid.is_as_normalised() && volume.is_finite_in(region, self.frame)?;
+        if !is_local || !self.pyramid.has_range_of(volume) {
             return self.refresh_range(volume, region);
         }
+        self.pyramid.set_source(volume, self.frame);
         let Some((changed, new)) = self.pyramid.changes(region, &new)? else { return Ok(()) };
         self.refresh_changed(changed, &new)
     }
 
-    /// Adapts the model to a volume whose range has changed, by which all intensities are normalised.
+    /// Adapts the model to a volume whose range has changed, by which all intensities are normalised, or in which
+    /// voxels depend on others than themselves.
     fn refresh_range(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
         let levels = self.pyramid.levels.len() - 1;
-        let before = std::mem::replace(&mut self.pyramid, Pyramid::new(volume, self.frame, levels)?);
+        let new = Pyramid::new(volume, self.frame, levels, &self.params)?;
+        let before = std::mem::replace(&mut self.pyramid, new);
         if let Err(error) = self.prepare_level() {
             self.pyramid = before;
             return Err(error);
@@ -87,7 +92,7 @@ impl DeformableModel {
             return Ok(None);
         }
         for margin in MARGINS {
-            let at = PatchBox::around(changed, margin, self.pyramid.dims());
+            let at = PatchBox::around(self.pyramid.parts_around(changed), margin, self.pyramid.dims());
             if let Some(added) = self.try_to_patch(at)? {
                 return Ok(Some(added));
             }
@@ -103,7 +108,7 @@ impl DeformableModel {
         let rule = ContourRule {
             iso: self.level_iso,
             object: ObjectIs::by(&self.params),
-            smallest_part: self.params.smallest_part,
+            smallest_part: self.smallest_part(),
         };
         let Some(Replacement { removed, patch, components }) =
             replacement(&self.pyramid.levels[0], &self.mesh, &near, at, rule)?
@@ -154,6 +159,7 @@ impl DeformableModel {
     fn wake_near(&mut self, changed: Region) -> usize {
         let image = &self.pyramid.levels[self.level];
         let reach = Vec3::splat(REACH / image.voxels_per_unit());
+        let changed = self.pyramid.parts_around(changed);
         let (first, last) = (
             Vec3::from(changed.min.map(|k| k as f32)),
             Vec3::from([0, 1, 2].map(|axis| (changed.min[axis] + changed.dims[axis] - 1) as f32)),

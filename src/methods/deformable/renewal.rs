@@ -37,8 +37,8 @@ impl DeformableModel {
         }
         let (level, object) = (self.level - 1, ObjectIs::by(&self.params));
         let image = &self.pyramid.levels[level];
-        let iso = self.pyramid.normalised(self.params.iso);
-        let contour = contour(image, iso, object, self.params.smallest_part)?;
+        let iso = self.pyramid.iso(&self.params);
+        let contour = contour(image, iso, object, self.smallest_part())?;
         let (removed, added) =
             self.components_to_replace(&contour, COVERED_DISTANCE / image.voxels_per_unit())?;
         if added.triangles.is_empty() {

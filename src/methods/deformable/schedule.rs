@@ -139,6 +139,9 @@ impl DeformableModel {
             self.convergence.was_examined = true;
             return Ok(Changes::default());
         }
+        if self.level == 0 {
+            self.balance_volumes()?;
+        }
         let mut changes = self.check_everything(times);
         if self.level == 0 {
             self.convergence.done = true;

@@ -14,7 +14,7 @@ use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
-use crate::volume::{Grid, marching_cubes, voxels_inside};
+use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside};
 use fixedbitset::FixedBitSet;
 
 /// The distance from the mesh, in voxels of the pyramid level, beyond which voxels on the wrong side of it are missing,
@@ -128,15 +128,15 @@ impl DeformableModel {
     fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
-        let dims = image.grid().0.dims;
-        let indexed = |mesh| placed(mesh, |p| image.index(p));
+        let dims = image.part_grid().0.dims();
+        let indexed = |mesh| placed(mesh, |p| image.part_index(p));
         // The contour, in a large image the larger of the two meshes, is freed before the other is made.
-        let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
+        let contour = contour(image, self.level_iso, object, self.smallest_part())?;
         let in_contour = voxels_inside(&indexed(contour), dims);
         let surface = indexed(self.mesh.to_triangles());
         let in_mesh = voxels_inside(&surface, dims);
         let comparison = Comparison { image, iso: self.level_iso, object, in_contour, in_mesh, surface };
-        let smallest = SMALLEST_SEED * self.params.smallest_part;
+        let smallest = SMALLEST_SEED * self.smallest_part();
         Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Cavity, smallest)?])
     }
 }
@@ -155,19 +155,23 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
+    fn grid(&self) -> Subdivided<'_> {
+        self.image.part_grid().0
+    }
+
     /// Returns closed surfaces, in model space, around the voxels of missing matter or of missing cavities, as `kind`
     /// tells; each encloses at least `smallest` voxels of the finest level.
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
-        let (grid, position) = self.image.grid();
+        let (dims, position) = (self.grid().dims(), self.image.part_grid().1);
         let missing = self.missing_voxels(kind)?;
         let voxel = 1.0 / f64::from(self.image.voxels_per_unit());
-        let mut clusters = clusters(&missing, grid.dims);
+        let mut clusters = clusters(&missing, dims);
         clusters.retain(|cluster| {
             cluster.len() > 1 || MAX_VOLUME_OF_ONE_VOXEL * voxel * voxel * voxel >= smallest
         });
         let mut parts = TriangleMesh::default();
         for cluster in clusters {
-            let (low, high) = bounding_box(&cluster, grid.dims);
+            let (low, high) = bounding_box(&cluster, dims);
             let field = self.field(kind, &cluster, [low, high]);
             let offset = Vec3::from(low.map(|k| k as f32));
             parts.append(&placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
@@ -191,7 +195,7 @@ impl Comparison<'_> {
         if missing.is_empty() {
             return Ok(missing);
         }
-        let dims = self.image.grid().0.dims;
+        let dims = self.grid().dims();
         let mut cells = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
         missing.iter().for_each(|&voxel| cells.insert_around(coordinates(dims, voxel)));
         let tree = TriangleTree::new(&self.surface_near(&cells))?;
@@ -203,7 +207,7 @@ impl Comparison<'_> {
     /// outside it, whose six neighbours are on that side of the mesh, too.
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Cavity;
-        let dims = self.image.grid().0.dims;
+        let dims = self.grid().dims();
         let is_misplaced = |&voxel: &usize| {
             self.is_in_missing_phase(kind, voxel)
                 && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh.contains(w) == is_inside))
@@ -229,7 +233,7 @@ impl Comparison<'_> {
     /// Returns the difference between the intensity of a voxel and the iso value, positive in the object if matter is
     /// missing, or in the background if cavities are, as `kind` tells.
     fn depth(&self, kind: Missing, voxel: usize) -> f32 {
-        let depth = self.object.depth(self.image.grid().0.values[voxel], self.iso);
+        let depth = self.object.depth(self.grid().value(voxel), self.iso);
         if kind == Missing::Matter { depth } else { -depth }
     }
 
@@ -237,7 +241,7 @@ impl Comparison<'_> {
     /// the root mean square of the differences between those with positive [`Self::depth`] and their neighbours with
     /// negative depth; if there are none, of the positive depths alone; 1 if there are none, either.
     fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
-        let dims = self.image.grid().0.dims;
+        let dims = self.grid().dims();
         let (mut differences, mut depths) = (Mean::default(), Mean::default());
         for &voxel in voxels {
             let depth = self.depth(kind, voxel);
@@ -258,7 +262,7 @@ impl Comparison<'_> {
     /// voxels, positive inside their contour and negative outside: it is 0 on the iso-surface where that bounds the
     /// cluster, else at most halfway to the next voxel.
     fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
-        let grid = self.image.grid().0;
+        let dims = self.grid().dims();
         let steepness = self.steepness(kind, missing);
         let size = [0, 1, 2].map(|k| high[k] - low[k]);
         let mut values = Vec::with_capacity(size.iter().product());
@@ -279,7 +283,7 @@ impl Comparison<'_> {
         };
         for z in low[2]..high[2] {
             for y in low[1]..high[1] {
-                let row = grid.dims[0] * (y + grid.dims[1] * z);
+                let row = dims[0] * (y + dims[1] * z);
                 values.extend((row + low[0]..row + high[0]).map(&mut value));
             }
         }

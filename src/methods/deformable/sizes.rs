@@ -8,7 +8,7 @@
 //! names this as future work.
 
 use super::DeformableModel;
-use super::contour::ObjectIs;
+use super::contour::{ObjectIs, SMALL_PART};
 use crate::math::Vec3;
 use crate::mesh::VertexId;
 use crate::remesh::Sampling;
@@ -28,6 +28,14 @@ const MIN_SAGITTA: f32 = 0.05;
 const SMALLEST: f32 = 0.7;
 /// The largest size of a vertex, a local factor on δ, if the parameter `adaptivity` is 1.
 pub(super) const LARGEST: f32 = 1.6;
+
+/// The size of a vertex of a part of one voxel's volume, if parts of a few voxels count; that of others grows with the
+/// cube root of their volume. With more, the contour of a single voxel, an octahedron, has edges below their lower
+/// bound and is removed; with less, it has hundreds of vertices.
+const SIZE_OF_VOXEL: f64 = 0.4;
+
+/// The largest number of vertices of a part of a few voxels; the search for them stops there.
+const MOST_IN_SMALL_PART: usize = 512;
 
 /// The largest difference of size, a local factor on δ, between the ends of an edge of length [`MEAN_EDGE`] δ, and in
 /// proportion for shorter and longer edges; with this, sampling remains isotropic.
@@ -80,6 +88,41 @@ impl DeformableModel {
         }
         let size = self.mesh.scalar_mut(self.keys.size);
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
+        self.set_sizes_of_small_parts(members);
+    }
+
+    /// Sets the sizes, local factors on δ, of those of some vertices that are on parts of a few voxels, by the volume of
+    /// the part, if parts so small count; with other sizes they would have too few vertices to be closed.
+    pub(super) fn set_sizes_of_small_parts(&mut self, members: &[VertexId]) {
+        if self.params.smallest_part > SMALL_PART || !self.params.adapts_to_image() {
+            return;
+        }
+        let mut is_seen = vec![false; self.mesh.slots()];
+        for &v in members {
+            if is_seen[v.index()] {
+                continue;
+            }
+            // A search that stops early is within a large component.
+            let part = self.mesh.component_of(v, MOST_IN_SMALL_PART + 1);
+            part.iter().for_each(|w| is_seen[w.index()] = true);
+            if part.len() > MOST_IN_SMALL_PART {
+                continue;
+            }
+            let size = SIZE_OF_VOXEL * libm::cbrt(self.volume_within(&part));
+            if size < f64::from(SMALLEST) {
+                let sizes = self.mesh.scalar_mut(self.keys.size);
+                part.iter().for_each(|w| sizes[w.index()] = size as f32 - 1.0);
+            }
+        }
+    }
+
+    /// Returns the volume that a component with the given vertices encloses, in voxels of the finest level.
+    fn volume_within(&self, component: &[VertexId]) -> f64 {
+        let Some(&first) = component.first() else { return 0.0 };
+        let origin = self.mesh.position(first);
+        let corner = |v: VertexId| (self.mesh.position(v) - origin).as_dvec3();
+        let six = |[a, b, c]: [VertexId; 3]| corner(a).cross(corner(b)).dot(corner(c));
+        self.mesh.triangles_at(component).into_iter().map(six).sum::<f64>().abs() / 6.0
     }
 
     /// Returns for each vertex in `members`, by slot, the smallest of the sizes, local factors on δ, that the curvature
@@ -124,7 +167,8 @@ impl DeformableModel {
     /// object.
     fn depth(&self, p: Vec3) -> f32 {
         let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
-        object.depth(image.intensity(p, object.background(), &mut CellCache::default()), self.level_iso)
+        let outside = object.outside(self.level_iso);
+        object.depth(image.intensity(p, outside, &mut CellCache::default()), self.level_iso)
     }
 
     /// Returns for each slot whether its vertex is in `members`.

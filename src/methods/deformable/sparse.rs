@@ -16,7 +16,7 @@ use super::schedule::Convergence;
 use super::sizes::LARGEST;
 use super::{DeformableModel, DeformableParams, Keys, Origin, Seeding, Start, Topology, coarse};
 use crate::math::order::{median, sort_ranks};
-use crate::math::{Bounds, DVec3, Vec3};
+use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Connectivity, Mesh, ScalarKey, VertexId};
 use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
@@ -178,10 +178,10 @@ impl DeformableModel {
         params.validate()?;
         check_params(&params)?;
         let pyramid = Pyramid::of_sparse(volume, options.finest)?;
-        let to_world = volume.levels()[options.finest].affine;
-        let follow = follow(volume, &options)?;
+        let affine = volume.levels()[options.finest].affine;
+        let follow = follow(volume, &options, &pyramid.to_world(&affine))?;
         let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
-        let mut model = Self::from_pyramid(pyramid, to_world, origin)?;
+        let mut model = Self::from_pyramid(pyramid, affine, origin)?;
         model.follow = follow;
         Ok(model)
     }
@@ -366,12 +366,13 @@ impl DeformableModel {
     /// Returns the factor on α_I, the strength of the image force, of a sparse level, by the steepness of the image at the
     /// vertices.
     pub(super) fn measured_factor(&self) -> f32 {
-        let (image, background) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params).background());
+        let image = &self.pyramid.levels[self.level];
+        let outside = ObjectIs::by(&self.params).outside(self.level_iso);
         let half = 0.5 / image.voxels_per_unit();
         let mut steepness = Vec::new();
         for v in self.followed_vertices() {
             let (p, offset) = (self.mesh.position(v), self.mesh.unit_normal(v) * half);
-            let at = |p: Vec3| image.intensity(p, background, &mut CellCache::default());
+            let at = |p: Vec3| image.intensity(p, outside, &mut CellCache::default());
             let [inside, outside] = [at(p - offset), at(p + offset)];
             if (inside < self.level_iso) != (outside < self.level_iso) {
                 steepness.push((inside - outside).abs() / (2.0 * half));
@@ -404,7 +405,7 @@ impl DeformableModel {
             corners.for_each(|x| hash.mix(u64::from(x.to_bits())));
             hash.mix(whole as u64);
         }
-        let levels = self.pyramid.levels.iter().flat_map(|level| level.grid().0.dims);
+        let levels = self.pyramid.levels.iter().flat_map(|level| level.dims());
         levels.for_each(|n| hash.mix(n as u64));
     }
 
@@ -545,7 +546,11 @@ pub(super) fn check_params(params: &DeformableParams) -> Result<(), MethodError>
     Ok(())
 }
 
-fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follow>, MethodError> {
+fn follow(
+    volume: &SparseVolume,
+    options: &SparseOptions,
+    to_world: &DAffine3,
+) -> Result<Option<Follow>, MethodError> {
     let last = volume.levels().len() - 1;
     let whole = options.whole.unwrap_or(last);
     if whole < options.finest || whole > last {
@@ -557,7 +562,7 @@ fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follo
         let problem = format!("must be two finite corners, the lower one first, got {min} and {max}");
         return Err(MethodError::invalid("box", problem));
     }
-    let to_model = volume.levels()[options.finest].affine.inverse();
+    let to_model = to_world.inverse();
     let corner = |k: usize| DVec3::from([0, 1, 2].map(|axis| [min, max][k >> axis & 1][axis]));
     let corners: Vec<Vec3> = (0..8).map(|k| to_model.transform_point3(corner(k)).as_vec3()).collect();
     Ok(Some(Follow { bounds: Bounds::from_points(&corners), whole: whole - options.finest }))
@@ -566,7 +571,6 @@ fn follow(volume: &SparseVolume, options: &SparseOptions) -> Result<Option<Follo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DAffine3;
     use crate::volume::{SparseInit, SparseLevel, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;

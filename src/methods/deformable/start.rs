@@ -10,7 +10,7 @@ use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
-use crate::volume::marching_cubes;
+use crate::volume::marching_cubes_of_slices;
 
 /// The start surface of a run; lengths and points are in world space.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,13 +48,13 @@ pub(super) struct StartContext<'a> {
     pub(super) iso: f32,
     /// The side of the iso value π_I on which the object is.
     pub(super) object: ObjectIs,
-    /// The least volume, in voxels of the finest level, of a closed part of the contour; smaller ones are left out.
+    /// The least volume, in model units, of a closed part of the contour; smaller ones are left out.
     pub(super) smallest_part: f64,
-    /// The dimensions of the finest level in voxels.
+    /// The dimensions of the finest level in model units.
     pub(super) dims: [usize; 3],
     pub(super) domain: Domain,
     pub(super) from_world: DAffine3,
-    /// The voxel spacing in world units.
+    /// The lengths of a model unit along the axes, in world units.
     pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
     /// Whether an empty contour gives an empty start mesh, since missing parts are seeded later, instead of the
@@ -177,6 +177,8 @@ impl DeformableModel {
     }
 
     fn resolve_sized(&mut self) -> Result<(), MethodError> {
+        let all: Vec<_> = self.mesh.vertices().collect();
+        self.set_sizes_of_small_parts(&all);
         self.resolve_everywhere()?;
         // A contour of the finest level is close to the result. Other starts are sized once they have settled.
         if self.level == 0 && self.set_sizes() {
@@ -381,8 +383,8 @@ pub(super) fn contour_mesh(context: &StartContext) -> Result<Option<Mesh>, Metho
 }
 
 fn iso_surface(context: &StartContext, iso: f32) -> Result<Mesh, MethodError> {
-    let (grid, position) = context.image.grid();
-    let surface = marching_cubes(grid, iso)?;
+    let (grid, position) = context.image.part_grid();
+    let surface = marching_cubes_of_slices(grid.dims(), iso, &|z| grid.slice(z))?;
     if surface.triangles.is_empty() {
         return Err(MethodError::invalid(
             "start.marchingCubes",

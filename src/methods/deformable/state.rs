@@ -81,7 +81,10 @@ impl DeformableModel {
             (false, decode(&MAGIC, bytes)?)
         };
         if state.fingerprint != self.fingerprint() {
-            let problem = "the state belongs to another volume, frame or number of levels".into();
+            let problem =
+                "the state belongs to another volume, frame or number of levels, or to a version that did \
+                           not divide elongated voxels"
+                    .into();
             return Err(MethodError::BadState { field: "volume", problem });
         }
         self.check_state(&state)?;
@@ -133,7 +136,7 @@ impl DeformableModel {
         let [frame, levels] = [self.frame, self.pyramid.levels.len() - 1];
         self.pyramid.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));
         self.to_world.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
-        self.pyramid.range().into_iter().for_each(|x| hash.mix(x.to_bits()));
+        self.pyramid.volume_range().into_iter().for_each(|x| hash.mix(x.to_bits()));
         hash.mix(self.pyramid.hash());
         self.mix_box_into(&mut hash);
         hash.value()
@@ -145,7 +148,12 @@ impl DeformableModel {
     }
 
     fn take_state(&mut self, state: State) -> Result<(), MethodError> {
-        self.pyramid.levels[state.level].prepare_gradient_for(&state.params)?;
+        let mut adapted = self.pyramid.adapted(&state.params)?;
+        adapted.as_mut().unwrap_or(&mut self.pyramid).levels[state.level]
+            .prepare_gradient_for(&state.params)?;
+        if let Some(adapted) = adapted {
+            self.pyramid = adapted;
+        }
         self.level = state.level;
         self.params = state.params;
         self.attractors = state.attractors;

@@ -20,10 +20,12 @@ const ORTHOGONAL: f64 = 1e-3;
 /// Largest accepted ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
 const MAX_AXIS_RATIO: f64 = 1e3;
 
-/// Shortest accepted semi-axis, in units of the mesh: squares and cubes of lengths stay within the range of `f32`.
-const SHORTEST: f64 = 1e-9;
-/// Longest accepted semi-axis and largest accepted coordinate of a centre, in units of the mesh.
-const LONGEST: f64 = 1e9;
+/// Shortest accepted semi-axis, in units of the mesh: positions stay within the range of `f32`.
+const SHORTEST: f64 = 1e-15;
+/// Longest accepted semi-axis, in units of the mesh.
+const LONGEST: f64 = 1e15;
+/// Largest accepted coordinate of a centre, in units of the mesh.
+const FURTHEST: f64 = 1e30;
 
 impl ControlEllipsoid {
     /// Checks that the centre is in range, and that the axes span an ellipsoid: their lengths, the ratio of the longest
@@ -36,8 +38,8 @@ impl ControlEllipsoid {
             |problem: String| Err(MethodError::invalid("ellipsoids", format!("number {index}: {problem}")));
         let [x, y, z] = self.axes.map(DVec3::from);
         let lengths = [x, y, z].map(DVec3::length);
-        if !DVec3::from(self.center).abs().cmple(DVec3::splat(LONGEST)).all() {
-            return refuse(format!("center must be finite and at most {LONGEST:e}, got {:?}", self.center));
+        if !DVec3::from(self.center).abs().cmple(DVec3::splat(FURTHEST)).all() {
+            return refuse(format!("center must be finite and at most {FURTHEST:e}, got {:?}", self.center));
         }
         if let Some(length) = lengths.into_iter().find(|length| !(SHORTEST..=LONGEST).contains(length)) {
             return refuse(format!("semi-axes must be {SHORTEST:e} to {LONGEST:e} long, got {length}"));
@@ -466,7 +468,8 @@ mod tests {
             bad.validate(4).unwrap_err().to_string()
         };
         assert!(
-            spoilt(|e| e.axes[1] = [0.0; 3]).contains("number 4: semi-axes must be 1e-9 to 1e9 long, got 0")
+            spoilt(|e| e.axes[1] = [0.0; 3])
+                .contains("number 4: semi-axes must be 1e-15 to 1e15 long, got 0")
         );
         assert!(
             spoilt(|e| e.axes[1] = [1.0, 1.0, 0.0]).contains("axes 0 and 1 must be orthogonal, got 45.0°")

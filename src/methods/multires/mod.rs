@@ -27,6 +27,7 @@ mod motion;
 mod params;
 mod prisms;
 mod setup;
+mod space;
 mod state;
 mod texture;
 mod topology;
@@ -38,7 +39,7 @@ pub use params::{Energy, MultiresParams, Topology};
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, triangle};
-use crate::mesh::{Mesh, TriangleMesh, measure, world_origin};
+use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::{Changes, Embedding, restructure};
 use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
@@ -47,6 +48,7 @@ use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
 use membrane::{pushed_positions, solve_with};
 use motion::MovingEllipsoids;
 use setup::{check_size, identity, set_up};
+use space::ModelSpace;
 use topology::displacements_to;
 
 /// Options to create a [`MultiresolutionModel`].
@@ -77,11 +79,13 @@ const MAX_VERTICES: usize = 200_000;
 
 /// A surface that is deformed by control ellipsoids and keeps its detail.
 pub struct MultiresolutionModel {
-    /// The origin in world space of everything that the model computes with.
-    origin: DVec3,
+    /// The space that everything below is in, and the model computes in.
+    space: ModelSpace,
     bands: Bands,
     ellipsoids: MovingEllipsoids,
     params: MultiresParams,
+    /// The parameters with lengths in world units, as the caller knows them.
+    given_params: MultiresParams,
     /// The deformed base S, a membrane over the ellipsoids.
     surface: Mesh,
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
@@ -109,7 +113,7 @@ impl LiveSurface for MultiresolutionModel {
     }
 
     fn origin(&self) -> DVec3 {
-        self.origin
+        self.space.origin
     }
 
     fn counts(&self) -> [usize; 2] {
@@ -132,21 +136,18 @@ impl MultiresolutionModel {
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
-        let origin = match detail.as_ref().or(base.as_ref()) {
-            Some(mesh) => mesh.origin,
-            None => origin_of(&given),
-        };
-        let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| in_model(mesh, origin)));
-        let moving = MovingEllipsoids::new(&moved(&given, -origin));
+        let space = ModelSpace::of(detail.as_ref().or(base.as_ref()), &given);
+        let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| space.mesh(mesh)));
+        let moving = MovingEllipsoids::new(&space.ellipsoids(&given));
         let ellipsoids = moving.now();
-        let (bands, params) = set_up(detail, base, &ellipsoids, params)?;
+        let (bands, params) = set_up(detail, base, &ellipsoids, space.params(&params))?;
         let bands = Bands::new(bands);
         let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
-        Self::from_parts(origin, bands, moving, params, surface)
+        Self::from_parts(space, bands, moving, params, surface)
     }
 
     fn from_parts(
-        origin: DVec3,
+        space: ModelSpace,
         bands: Bands,
         moving: MovingEllipsoids,
         params: MultiresParams,
@@ -166,7 +167,8 @@ impl MultiresolutionModel {
         let correspondence = project(&surface, &before, walker, f64::MAX);
         let detailed = detailed(&surface, &correspondence, &bands, &mut guard, detail_sampling(&params));
         let mut model = Self {
-            origin,
+            given_params: space.params_in_world(&params),
+            space,
             components: 0,
             bands,
             ellipsoids: moving,
@@ -191,8 +193,8 @@ impl MultiresolutionModel {
         self.clock = clock;
     }
 
-    /// Returns the deformed surface with its detail, the result of the model, in the model's space: relative to the
-    /// [origin](TriangleMesh::origin) of [`Self::surface`].
+    /// Returns the deformed surface with its detail, the result of the model, in the model's space: that of the world,
+    /// unless what it was made from is very large, very small or far from the origin; see [`Self::surface`].
     pub fn mesh(&self) -> &Mesh {
         &self.detailed.mesh
     }
@@ -204,11 +206,7 @@ impl MultiresolutionModel {
         let finest = &self.bands.finest().walker;
         mesh.corner_uvs = texture::corner_uvs(&self.detailed.mesh, &self.detailed.points, finest);
         mesh.texture = finest.mesh().texture.clone();
-        self.in_world(mesh)
-    }
-
-    fn in_world(&self, mesh: TriangleMesh) -> TriangleMesh {
-        TriangleMesh { origin: self.origin, ..mesh }
+        self.space.in_world(mesh)
     }
 
     /// Solves a copy of the membrane for the current ellipsoids, and returns its mesh on each level of the solver, from
@@ -218,7 +216,7 @@ impl MultiresolutionModel {
         let ellipsoids = self.ellipsoids.now();
         let mut mesh = self.surface.clone();
         solve_with(&mut mesh, &ellipsoids, &self.params, self.params.levels, |mesh| {
-            levels.push(self.in_world(mesh.to_triangles()));
+            levels.push(self.space.in_world(mesh.to_triangles()));
         });
         levels
     }
@@ -235,7 +233,7 @@ impl MultiresolutionModel {
 
     /// Returns the deformed base S, without detail, as triangles.
     pub fn base_surface(&self) -> TriangleMesh {
-        self.in_world(self.surface.to_triangles())
+        self.space.in_world(self.surface.to_triangles())
     }
 
     /// Returns the image of the deformed base under the map T, to show the correspondence: the triangles of
@@ -244,12 +242,12 @@ impl MultiresolutionModel {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
         mesh.normals = None;
-        self.in_world(mesh)
+        self.space.in_world(mesh)
     }
 
     /// Returns the current parameters.
     pub fn params(&self) -> &MultiresParams {
-        &self.params
+        &self.given_params
     }
 
     /// Sets the parameters, also during a run. On an error they are unchanged.
@@ -260,9 +258,11 @@ impl MultiresolutionModel {
     /// the deformed base.
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
-        check_tips(&self.ellipsoids.targets(), params.edge_max)?;
-        check_size(area(&self.surface), &params)?;
-        let before = std::mem::replace(&mut self.params, params);
+        let inner = self.space.params(&params);
+        check_tips(&self.ellipsoids.targets(), inner.edge_max)?;
+        check_size(area(&self.surface), &inner)?;
+        self.given_params = params;
+        let before = std::mem::replace(&mut self.params, inner);
         if self.params != before {
             self.apply_params(&before);
         }
@@ -296,7 +296,7 @@ impl MultiresolutionModel {
     /// and for tips too sharp for the edges of the membrane.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
-        let given = &moved(given, -self.origin);
+        let given = &self.space.ellipsoids(given);
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
         let surface = &self.surface;
         self.ellipsoids
@@ -309,13 +309,13 @@ impl MultiresolutionModel {
     /// being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
         let now: Vec<_> = self.ellipsoids.now().iter().map(Ellipsoid::control).collect();
-        moved(&now, self.origin)
+        self.space.ellipsoids_in_world(&now)
     }
 
     /// Returns the target ellipsoids, without those that are being removed.
     pub fn targets(&self) -> Vec<ControlEllipsoid> {
         let targets: Vec<_> = self.ellipsoids.targets().iter().map(Ellipsoid::control).collect();
-        moved(&targets, self.origin)
+        self.space.ellipsoids_in_world(&targets)
     }
 
     /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area; 0 if the
@@ -393,32 +393,6 @@ impl MultiresolutionModel {
             warnings: Vec::new(),
         }
     }
-}
-
-/// Returns the origin for a model of ellipsoids alone.
-fn origin_of(ellipsoids: &[ControlEllipsoid]) -> DVec3 {
-    let ends = ellipsoids.iter().flat_map(|e| {
-        let reach = e.axes.iter().fold(DVec3::ZERO, |reach, &axis| reach + DVec3::from(axis).abs());
-        [DVec3::from(e.center) - reach, DVec3::from(e.center) + reach]
-    });
-    let bounds = ends.map(|p| (p, p)).reduce(|(min, max), (p, _)| (min.min(p), max.max(p)));
-    bounds.map_or(DVec3::ZERO, |(min, max)| world_origin(min, max))
-}
-
-/// Returns the ellipsoids moved by `shift`.
-fn moved(ellipsoids: &[ControlEllipsoid], shift: DVec3) -> Vec<ControlEllipsoid> {
-    let mut all = ellipsoids.to_vec();
-    if shift != DVec3::ZERO {
-        all.iter_mut().for_each(|e| e.center = (DVec3::from(e.center) + shift).to_array());
-    }
-    all
-}
-
-/// Returns a mesh in the space of a model with the given origin: positions relative to it, as if it were that of the
-/// world.
-fn in_model(mut mesh: TriangleMesh, origin: DVec3) -> TriangleMesh {
-    mesh.move_origin(origin);
-    TriangleMesh { origin: DVec3::ZERO, ..mesh }
 }
 
 fn detail_sampling(params: &MultiresParams) -> DetailSampling {

@@ -15,7 +15,7 @@ parameters! {
             help: "Shorter edges are collapsed; halving it quadruples the number of triangles.",
             symbol: "ε_min",
             default: ParamDefault::FromData,
-            range: 1e-9..=1e9,
+            range: 1e-16..=1e16,
             scale: ParamScale::Log,
         },
         /// ε_max, in units of the mesh: longer edges of the deformed base are split; more than twice `edge_min`.
@@ -25,7 +25,7 @@ parameters! {
             help: "Longer edges are split; must be more than twice the shortest edge.",
             symbol: "ε_max",
             default: ParamDefault::FromData,
-            range: 1e-9..=1e9,
+            range: 1e-16..=1e16,
             scale: ParamScale::Log,
         },
         /// Maximum number of coarser meshes on which the membrane is solved first; 0 solves on the target resolution

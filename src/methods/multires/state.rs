@@ -71,6 +71,7 @@ impl MultiresolutionModel {
             return bad("link", "refers to a missing triangle");
         };
         (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);
+        self.given_params = self.space.params_in_world(&self.params);
         let replaced = std::mem::replace(&mut self.surface, state.surface);
         self.surface.advance_versions_past(&replaced);
         (self.iteration, self.refreshed_frames) = (state.iteration, state.passing);
@@ -96,8 +97,11 @@ impl MultiresolutionModel {
     /// restored only with the same surfaces.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
-        if self.origin != DVec3::ZERO {
-            self.origin.to_array().iter().for_each(|x| hash.mix(x.to_bits()));
+        if self.space.origin != DVec3::ZERO {
+            self.space.origin.to_array().iter().for_each(|x| hash.mix(x.to_bits()));
+        }
+        if self.space.unit != 1.0 {
+            hash.mix(self.space.unit.to_bits());
         }
         for band in &self.bands.all {
             let mesh = band.walker.mesh();

@@ -1,4 +1,4 @@
-//! The mesh of the first frame (section 4.1 of the paper that `tracking` follows): a signed distance from the boundary
+//! The mesh of the first frame, or of one in which an object begins (section 4.1 of the paper that `tracking` follows): a signed distance from the boundary
 //! points, and its zero level by marching cubes.
 
 use super::extremal::plane;
@@ -6,6 +6,7 @@ use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
 use super::samples::{Falloff, SampleField};
 use super::vote::{Faces, X, Y, Z};
+use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
@@ -25,16 +26,19 @@ struct Oriented {
     weight: f64,
 }
 
-/// Extracts the closed surfaces around all bright regions of the first frame, in world coordinates; an empty mesh if
+/// Extracts the closed surfaces around all bright regions of a frame, in the working space; an empty mesh if
 /// the image has no boundary.
 pub(super) fn extract_bright_surface(
     region: &Region,
+    frame: usize,
     faces: &Faces,
     falloff: Falloff,
 ) -> Result<TriangleMesh, MethodError> {
     let part = VoxelBox { ends: region.inner };
-    let Some(is_bright) = label_bright(region, 0, faces, part) else { return Ok(TriangleMesh::default()) };
-    let points = oriented(region, faces, falloff);
+    let Some(is_bright) = label_bright(region, frame, faces, part) else {
+        return Ok(TriangleMesh::default());
+    };
+    let points = oriented(region, frame, faces, falloff);
     let band = BAND * falloff.radius;
     let distance = signed_distances(region, &points, band);
     let value = |i: usize| {
@@ -46,13 +50,14 @@ pub(super) fn extract_bright_surface(
     };
     let values = (0..distance.len()).map(value).collect();
     let mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
-    Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
+    let map = region.to_space * DAffine3::from_scale(region.spacing);
+    Ok(WorkingSpace::default().rebased(&mesh.transformed(&map)))
 }
 
-/// Returns the centres of the faces that separate bright from dark in the first frame, those with a weight of at least
+/// Returns the centres of the faces that separate bright from dark in a frame, those with a weight of at least
 /// [`MIN_WEIGHT`], with the normals of the planes fitted around them, oriented towards falling intensity, or outwards
 /// in the sides of the box.
-fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
+fn oriented(region: &Region, frame: usize, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
@@ -61,7 +66,7 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
             let Some(fit) = plane(&field.sums(at)) else { continue };
             let out = region
                 .outward_at_box_side(direction, face.voxel)
-                .unwrap_or_else(|| -rising_direction(region, region.voxel(face.voxel)));
+                .unwrap_or_else(|| -rising_direction(region, frame, region.voxel(face.voxel)));
             let normal = if fit.normal.dot(out) < 0.0 { -fit.normal } else { fit.normal };
             points.push(Oriented { at, normal, weight: f64::from(face.weight) });
         }
@@ -69,9 +74,9 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     points
 }
 
-/// Returns the direction, not normalised, in which intensity rises around a voxel of the first frame, to orient
+/// Returns the direction, not normalised, in which intensity rises around a voxel of a frame, to orient
 /// normals: a multiple of the covariance of intensity and position.
-fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
+fn rising_direction(region: &Region, frame: usize, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
     let range =
         |k: usize| voxel[k].saturating_sub(SLOPE_RADIUS)..(voxel[k] + SLOPE_RADIUS + 1).min(region.dims[k]);
@@ -79,7 +84,7 @@ fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     for z in range(2) {
         for y in range(1) {
             for x in range(0) {
-                let value = f64::from(region.frames[0][(z * ny + y) * nx + x]);
+                let value = f64::from(region.frames[frame][(z * ny + y) * nx + x]);
                 let at = DVec3::new(x as f64, y as f64, z as f64) * region.spacing;
                 sum += value * at;
                 first += at;
@@ -92,7 +97,7 @@ fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
 }
 
 /// Returns for each voxel within `band` of boundary points the weighted mean of its signed distances to the planes
-/// through these points, in world units, positive inside; `None` for other voxels. The surface of the first frame is
+/// through these points, positive inside; `None` for other voxels. The surface of the frame is
 /// the zero level of these distances.
 fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;

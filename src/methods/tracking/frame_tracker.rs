@@ -88,11 +88,11 @@ pub(super) enum Support {
 }
 
 impl FrameContext<'_> {
-    /// Classifies a point of the surface, in world coordinates, by the intensities at two points on its normal: inside
+    /// Classifies a point of the surface, by the intensities at two points on its normal: inside
     /// and outside, at a distance of the shortest side of a voxel.
     pub fn classify(&self, at: Vec3, normal: Vec3) -> Support {
         let region = self.region;
-        let displacement = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
+        let displacement = region.from_space.transform_vector3(normal.as_dvec3()).normalize_or_zero()
             * region.spacing.min_element();
         let position = region.to_local(at);
         if let Some(voxel) = region.clamp_into_box(position + displacement) {
@@ -110,11 +110,11 @@ impl FrameContext<'_> {
     }
 }
 
-/// Tracks one mesh, in world coordinates, through the frames of a 4D image.
+/// Tracks one mesh, in the working space, through the frames of a 4D image.
 #[derive(Clone, Debug)]
 pub(super) struct FrameTracker {
     pub(super) guard: Embedding,
-    /// Mean edge length of the mesh in the first frame, in world units; the edge bounds are multiples of it.
+    /// Mean edge length of the mesh in the first frame, in the working space; the edge bounds are multiples of it.
     pub edge: f64,
     pub(super) bounds: EdgeBounds,
 }
@@ -235,7 +235,7 @@ impl FrameTracker {
     /// Projects `vertices`, each displaced by `offsets` (by vertex slot) first, onto the extremal surface of the
     /// boundary points of a frame. A vertex whose projection fails moves by the mean of its neighbours' displacements.
     /// All vertices move at once, with one collision test. Returns the total number of projection steps, and the total
-    /// displacement by the projections, in world units.
+    /// displacement by the projections.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
@@ -254,7 +254,7 @@ impl FrameTracker {
                 rejected.push(v);
                 continue;
             };
-            let to = context.region.to_world(position);
+            let to = context.region.to_space(position);
             displacements[v.index()] = Some(to - mesh.position(v));
             steps += count;
             sum += f64::from(to.distance(from));
@@ -280,7 +280,7 @@ fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<V
     for v in mesh.vertices() {
         let at = region.to_local(mesh.position(v));
         displacements[v.index()] =
-            samples.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_world(displacement));
+            samples.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_space(displacement));
     }
     (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements))
 }

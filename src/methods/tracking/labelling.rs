@@ -200,6 +200,7 @@ fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Ve
 #[cfg(test)]
 mod tests {
     use super::super::vote::{BoundaryVoting, Window};
+    use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
     #[cfg(target_arch = "wasm32")]
@@ -226,11 +227,14 @@ mod tests {
             dims: DIMS,
             inner: [[0; 3], DIMS.map(|n| n - 1)],
             spacing: DVec3::ONE,
-            to_world: DAffine3::IDENTITY,
-            from_world: DAffine3::IDENTITY,
+            space: WorkingSpace::default(),
+            to_space: DAffine3::IDENTITY,
+            from_space: DAffine3::IDENTITY,
             frames: vec![(0..DIMS.iter().product()).map(value).collect()],
             quantum: 1.0,
             threshold: 20.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

@@ -23,12 +23,15 @@ mod first;
 mod frame_tracker;
 mod labelling;
 mod params;
+mod presence;
 mod project;
 mod region;
 mod samples;
 mod start;
 mod state;
 mod vote;
+mod warnings;
+mod working_space;
 
 pub use frame_tracker::FrameStatistics;
 pub use params::TrackingParams;
@@ -40,7 +43,8 @@ use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
-use frame_tracker::{FrameContext, FrameTracker};
+use frame_tracker::FrameTracker;
+use presence::Tracked;
 use project::SpaceTimeSamples;
 use region::Region;
 use samples::{Falloff, SampleField};
@@ -108,10 +112,15 @@ pub struct SurfaceTracker {
     /// The boundary points around the newest tracked frame in time, `None` before the first.
     samples: Option<SpaceTimeSamples>,
     mesh: Mesh,
-    /// The surface of each frame tracked so far, in world coordinates.
+    /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
+    /// By frame, the mean intensities inside and outside of its surface, in steps of the quantised intensities.
+    intensities_at_surface: Vec<Option<[f64; 2]>>,
+    /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,
+    /// The frames in which the surface of the frame before ended and another one began.
+    lost: Vec<u32>,
     steps: u32,
     clock: fn() -> f64,
 }
@@ -137,7 +146,7 @@ impl LiveSurface for SurfaceTracker {
     }
 
     fn origin(&self) -> DVec3 {
-        DVec3::ZERO
+        self.region.space.origin
     }
 
     fn counts(&self) -> [usize; 2] {
@@ -170,12 +179,13 @@ impl SurfaceTracker {
         let noise = region.noise() * region.quantum;
         let image = ImageStatistics {
             shortest_side,
-            longest_side: region.longest_side(),
+            longest_side: region.longest_side() / region.space.scale,
             noise,
             range: region.span(),
         };
-        let start =
-            start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::validate_start(mesh, &region))?;
+        let start = start
+            .as_ref()
+            .map_or(Ok(region.space.empty_mesh()), |mesh| start::validate_start(mesh, &region))?;
         let mut tracker = Self {
             voting: BoundaryVoting::new(Window::default(), 0),
             mesh: start.clone(),
@@ -189,7 +199,9 @@ impl SurfaceTracker {
             samples: None,
             meshes: Vec::new(),
             statistics: Vec::new(),
+            intensities_at_surface: Vec::new(),
             cycle_closure_error: None,
+            lost: Vec::new(),
             steps: 0,
             clock: || 0.0,
         };
@@ -233,6 +245,8 @@ impl SurfaceTracker {
         (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
         self.statistics.clear();
+        self.intensities_at_surface.clear();
+        self.lost.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.advance_versions_past(&replaced);
     }
@@ -271,13 +285,20 @@ impl SurfaceTracker {
         self.image.noise
     }
 
-    /// Returns the surface in the newest frame, in world coordinates; before the first frame is done, the caller's
+    /// Returns the origin in world space of all meshes and boundary points that the tracker gives: their coordinates plus
+    /// this are those in the world. It is 0 unless the volume is far from the world's origin for its size, where single
+    /// precision would be too coarse.
+    pub fn origin(&self) -> DVec3 {
+        self.region.space.origin
+    }
+
+    /// Returns the surface in the newest frame, relative to [`Self::origin`]; before the first frame is done, the caller's
     /// start, or an empty mesh.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Returns the surface of each frame tracked so far, in world coordinates; positions and triangles only.
+    /// Returns the surface of each frame tracked so far, relative to [`Self::origin`]; positions and triangles only.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
@@ -298,9 +319,10 @@ impl SurfaceTracker {
     }
 
     /// Returns the cycle closure error: the mean distance of the last frame's surface, tracked on to the first frame,
-    /// from the surface there, in world units. `None` until it is known, and for sequences that are not cyclic.
+    /// from the surface there, in world units. `None` until it is known, for sequences that are not cyclic, and if the
+    /// first or the last frame has no surface.
     pub fn cycle_closure_error(&self) -> Option<f64> {
-        self.cycle_closure_error
+        self.cycle_closure_error.filter(|error| !error.is_nan())
     }
 
     /// Returns the number of frames, from the first on, whose boundary in the image has been found, for progress
@@ -309,15 +331,16 @@ impl SurfaceTracker {
         self.faces.len()
     }
 
-    /// Returns the boundary points of a frame: x, y, z in world coordinates, t in frames, and the weight (share of
-    /// votes, up to 1), for display. Empty until the boundary of the frame has been found.
+    /// Returns the boundary points of a frame: x, y, z relative to [`Self::origin`], t in frames, and the weight (share
+    /// of votes, up to 1), for display. Empty until the boundary of the frame has been found.
     pub fn boundary(&self, frame: usize) -> Vec<[f32; 5]> {
         let Some(faces) = self.faces.get(frame) else { return Vec::new() };
         let mut points = Vec::new();
         for (direction, list) in faces.iter().enumerate() {
             for face in list {
                 let (position, later) = self.region.face(direction, face.voxel);
-                let [x, y, z] = self.region.to_world(position).to_array();
+                let at = self.region.to_space(position);
+                let [x, y, z] = self.region.space.to_relative(at).to_array();
                 points.push([x, y, z, frame as f32 + later, face.weight]);
             }
         }
@@ -364,54 +387,87 @@ impl SurfaceTracker {
         self.region.frames.len()
     }
 
-    /// Tracks the surface into the next frame, or extracts it in the first; returns the edits of the mesh. If this
-    /// fails, nothing has changed.
+    /// Tracks the surface into the next frame, or extracts it where an object begins; returns the edits of the mesh. The
+    /// surface is empty in frames without an object. If this fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
-        let frame = self.meshes.len();
-        let mut tracker = match self.frame_tracker.take() {
-            Some(tracker) => tracker,
-            None => {
-                self.find_first_mesh()?;
-                FrameTracker::new(measure(&self.mesh.to_triangles()).edge_mean)
+        let (frame, space) = (self.meshes.len(), self.region.space);
+        if frame == 0 {
+            self.check_boundary()?;
+        }
+        let mut last = self.mesh.clone();
+        space.enter(&mut last);
+        let has_surface = last.vertex_count() > 0;
+        if has_surface {
+            let tracker = self.frame_tracker.take();
+            let tracker =
+                tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
+            let (edge, from) = (tracker.edge, self.samples.take());
+            if let Some(found) = self.follow(&last, tracker, from.as_ref(), frame) {
+                return Ok(self.set_frame(found));
             }
-        };
-        // Present for every frame but the first.
-        let from = self.samples.take();
-        let samples = self.samples_around(frame);
-        self.voting.ensure_levels(&self.region, frame);
-        let context = FrameContext {
-            region: &self.region,
-            params: &self.params,
-            frame,
-            samples: &samples,
-            voting: &self.voting,
-        };
-        let (changes, statistics) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
-        (self.frame_tracker, self.samples) = (Some(tracker), Some(samples));
+            (self.frame_tracker, self.samples) = (Some(FrameTracker::new(edge)), from);
+        }
+        // Nothing else begins where a caller's start ends.
+        let may_begin = frame > 0 || !has_surface;
+        match if may_begin { self.begin(&last, frame)? } else { None } {
+            Some(found) => {
+                if has_surface {
+                    self.lost.push(frame as u32);
+                }
+                let replaced = std::mem::take(&mut self.mesh);
+                let changes = self.set_frame(found);
+                self.mesh.advance_versions_past(&replaced);
+                Ok(changes)
+            }
+            None => {
+                self.set_empty_frame();
+                Ok(Changes::default())
+            }
+        }
+    }
+
+    /// Adds the next frame with the surface tracked into it; returns the edits of the mesh.
+    fn set_frame(&mut self, found: Tracked) -> Changes {
+        let space = self.region.space;
+        self.mesh = found.mesh;
+        space.leave(&mut self.mesh);
+        (self.frame_tracker, self.samples) = (Some(found.tracker), Some(found.samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
-        self.statistics.push(statistics);
-        Ok(changes)
+        self.statistics.push(space.statistics(found.statistics));
+        self.intensities_at_surface.push(self.measured_intensities(self.meshes.len() - 1));
+        found.changes
+    }
+
+    /// Adds the next frame without a surface.
+    fn set_empty_frame(&mut self) {
+        let replaced = std::mem::replace(&mut self.mesh, self.region.space.empty_mesh());
+        self.mesh.advance_versions_past(&replaced);
+        self.samples = None;
+        self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
+        self.statistics.push(FrameStatistics::default());
+        self.intensities_at_surface.push(None);
     }
 
     /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean
-    /// distance from the surface there.
+    /// distance from the surface there; to NaN if one of the two is empty, or the first frame has no object there.
     fn close_cycle(&mut self) {
-        let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
+        self.cycle_closure_error = Some(f64::NAN);
+        let (Some(tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
             return;
         };
+        if first.triangles.is_empty() || self.mesh.vertex_count() == 0 {
+            return;
+        }
+        let space = self.region.space;
         let mut mesh = self.mesh.clone();
-        let samples = self.samples_around(0);
+        space.enter(&mut mesh);
         self.voting.ensure_levels(&self.region, 0);
-        let context = FrameContext {
-            region: &self.region,
-            params: &self.params,
-            frame: 0,
-            samples: &samples,
-            voting: &self.voting,
-        };
-        tracker.track_frame(&mut mesh, self.samples.as_ref(), &context);
-        let distance = surface_distance(&mesh.to_triangles(), first);
-        self.cycle_closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
+        let mut closed = self.tracked(mesh, tracker, self.samples.as_ref(), 0, &self.voting);
+        if closed.is_present {
+            space.leave(&mut closed.mesh);
+            let distance = surface_distance(&closed.mesh.to_triangles(), first);
+            self.cycle_closure_error = Some(distance.map_or(f64::NAN, |distance| distance.mean));
+        }
     }
 
     /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
@@ -432,7 +488,7 @@ impl SurfaceTracker {
             }
         }
         let shortest_side = self.region.spacing.min_element();
-        let (damping, time_scale) = (self.params.damping, self.params.time_scale);
+        let (damping, time_scale) = (self.params.damping, falloff.time_scale);
         let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame]);
         let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame]);
         SpaceTimeSamples {
@@ -447,7 +503,8 @@ impl SurfaceTracker {
     }
 
     fn falloff(&self) -> Falloff {
-        Falloff { radius: self.params.radius, time_scale: self.params.time_scale }
+        let params = self.region.space.params(&self.params);
+        Falloff { radius: params.radius, time_scale: params.time_scale }
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {
@@ -468,28 +525,28 @@ impl SurfaceTracker {
             phase,
             progress: steps_done as f64 / (2 * frames + closing_steps) as f64,
             residual: self.statistics.last().map_or(f64::NAN, |statistics| statistics.mean_final_correction),
-            tolerance: CONVERGED_STEP * self.region.spacing.min_element(),
+            tolerance: CONVERGED_STEP * self.region.shortest_side(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
             components: self.mesh.component_count() as u32,
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.warnings(),
         }
     }
 }
 
 impl Region {
     fn to_local(&self, p: Vec3) -> DVec3 {
-        self.from_world.transform_point3(p.as_dvec3())
+        self.from_space.transform_point3(p.as_dvec3())
     }
 
-    fn to_world(&self, position: DVec3) -> Vec3 {
-        self.to_world.transform_point3(position).as_vec3()
+    fn to_space(&self, position: DVec3) -> Vec3 {
+        self.to_space.transform_point3(position).as_vec3()
     }
 
-    fn direction_to_world(&self, displacement: DVec3) -> Vec3 {
-        self.to_world.transform_vector3(displacement).as_vec3()
+    fn direction_to_space(&self, displacement: DVec3) -> Vec3 {
+        self.to_space.transform_vector3(displacement).as_vec3()
     }
 }

@@ -96,6 +96,7 @@ mod tests {
     use super::super::region::Region;
     use super::super::samples::Falloff;
     use super::super::vote::{Face, Faces, TIME, X, Y, Z};
+    use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::DAffine3;
     #[cfg(target_arch = "wasm32")]
@@ -109,11 +110,14 @@ mod tests {
             dims: [20, 18, 16],
             inner: [[0; 3], [19, 17, 15]],
             spacing: SPACING,
-            to_world: DAffine3::IDENTITY,
-            from_world: DAffine3::IDENTITY,
+            space: WorkingSpace::default(),
+            to_space: DAffine3::IDENTITY,
+            from_space: DAffine3::IDENTITY,
             frames: vec![Vec::new(); 5],
             quantum: 1.0,
             threshold: 1.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

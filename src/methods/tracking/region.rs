@@ -2,9 +2,10 @@
 
 use super::Bounds;
 use super::vote::TIME;
+use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
-use crate::volume::{Volume, trilinear};
+use crate::volume::{Volume, Voxels, trilinear};
 
 /// Highest quantised intensity: intensities are quantised to 0 to 254, one byte per voxel.
 const MAX_LEVEL: f64 = 254.0;
@@ -16,12 +17,28 @@ const OUTLIERS: f64 = 1e-3;
 /// Number of bins of the histogram from which the range of intensities that is quantised is determined.
 const BINS: usize = 4096;
 
+/// Share of the range of intensities up to which those next to voxels without a value are among the darkest: noise in a
+/// background reaches a tenth, and the values of an object without one are above it on average.
+const DARKEST: f64 = 0.25;
+
+/// Share of the mean intensity, above the least, from which those next to voxels without a value are typical of an object:
+/// the blurred rim of one, beyond which values are missing, is at a half.
+const TYPICAL: f64 = 0.7;
+
 /// Number of voxels that are added on every side of the processed box, so that windows around its outermost voxels
 /// extend beyond it.
 const PADDING: usize = 2;
 
-/// Minimum number of voxels that the processed box must have along at least two axes; a single slice is accepted.
+/// Minimum number of voxels that the processed box must have along at least two axes.
 const MIN_VOXELS: usize = 5;
+
+/// Minimum number of voxels along every axis: in a single slice, the sides of the box before and behind it are nearer to
+/// each other than the radius of plane fits, and planes are fitted to both.
+const MIN_SLICES: usize = 2;
+
+/// Minimum thickness of the box along every axis, in units of the shortest side of a voxel, for the same reason: through
+/// two isotropic slices a cylinder loses a quarter of its volume, through three it loses 3 %.
+const MIN_THICKNESS: f64 = 3.0;
 
 /// Upper bounds of the memory that tracking needs per voxel of the region, in bytes. The first, once: weights of the
 /// boundary points around two frames; the second, for each frame: quantised intensity and level between bright and
@@ -38,25 +55,32 @@ const ORTHOGONAL: f64 = 1e-3;
 /// A box of voxels of a 4D image, in all frames, with quantised intensities, in which a surface is tracked. Padding
 /// around the box lets windows extend beyond it; outside of the image, the border is replicated.
 ///
-/// Positions in the region are in world units (millimetres) along the voxel axes, from the centre of the first voxel of
-/// the padded box.
+/// Positions in the region are in units of the working space (see [`WorkingSpace`]) along the voxel axes, from the centre
+/// of the first voxel of the padded box.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub dims: [usize; 3],
     /// The first and the last voxel of the box without its padding, in coordinates of the padded grid.
     pub inner: [[usize; 3]; 2],
-    /// Side lengths of a voxel, in world units.
+    /// The working space, in which lengths and positions of this region are given.
+    pub space: WorkingSpace,
+    /// Side lengths of a voxel.
     pub spacing: DVec3,
-    /// Maps positions in the region, along the voxel axes, to world coordinates.
-    pub to_world: DAffine3,
-    /// Maps world coordinates to positions in the region, along the voxel axes.
-    pub from_world: DAffine3,
+    /// Maps positions in the region, along the voxel axes, to the working space.
+    pub to_space: DAffine3,
+    /// Maps positions in the working space to those in the region, along the voxel axes.
+    pub from_space: DAffine3,
     /// Quantised intensities of the padded box for each frame, x fastest.
     pub frames: Vec<Vec<u8>>,
     /// The difference in intensity that one step of the quantised intensities stands for.
     pub quantum: f64,
     /// The edge threshold τ, in steps of the quantised intensities.
     pub threshold: f64,
+    /// Whether voxels without a value are the background of the objects; they then have the intensity 0, and no others.
+    pub has_background: bool,
+    /// By frame, whether all of its voxels have the same intensity, or none has a value: such a frame is missing, or has
+    /// no objects. It takes no part in the windows of others.
+    pub is_blank: Vec<bool>,
 }
 
 impl Region {
@@ -82,16 +106,20 @@ impl Region {
         let dims = inner[1].map(|last| last + PADDING + 1);
         check_size(dims, volume.frames())?;
         let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - PADDING as f64)));
-        let to_world = DAffine3::from_mat3_translation(directions, first);
+        let space = WorkingSpace::of(volume);
+        let to_space = DAffine3::from_mat3_translation(directions, space.point(first));
         let mut region = Self {
             dims,
             inner,
-            spacing,
-            to_world,
-            from_world: to_world.inverse(),
+            space,
+            spacing: spacing * space.scale,
+            to_space,
+            from_space: to_space.inverse(),
             frames: Vec::new(),
             quantum: 0.0,
             threshold: 0.0,
+            has_background: false,
+            is_blank: Vec::new(),
         };
         region.read(volume, low)?;
         Ok(region)
@@ -102,29 +130,77 @@ impl Region {
         let mut counts = vec![0u64; BINS];
         for frame in 0..volume.frames() {
             self.for_each_row(volume, low, frame, |row| {
-                row.iter().for_each(|&v| counts[bin_of(v)] += 1);
+                row.iter().filter(|v| !v.is_nan()).for_each(|&v| counts[bin_of(v)] += 1);
             })?;
         }
-        let [from, to] = intensity_quantiles(&counts);
+        let [mut from, to] = intensity_quantiles(&counts);
+        self.has_background = self.is_background_missing(volume, low, [from, to])?;
+        if self.has_background {
+            // The step from the background to the darkest voxels is as large as all others together.
+            from -= if to > from { to - from } else { 1.0 };
+        }
         if from >= to {
             let problem = "all voxels in the box have the same intensity";
             return Err(MethodError::invalid("volume", problem));
         }
         let scale = MAX_LEVEL / (to - from);
+        let level = |v: f32| {
+            let v = if v.is_nan() { f64::NEG_INFINITY } else { f64::from(v) };
+            ((v - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8
+        };
         for frame in 0..volume.frames() {
             let mut levels = Vec::with_capacity(self.dims.iter().product());
-            self.for_each_row(volume, low, frame, |row| {
-                levels.extend(
-                    row.iter().map(|&v| ((f64::from(v) - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8),
-                );
-            })?;
+            self.for_each_row(volume, low, frame, |row| levels.extend(row.iter().map(|&v| level(v))))?;
+            self.is_blank.push(levels.windows(2).all(|pair| pair[0] == pair[1]));
             self.frames.push(levels);
         }
         self.quantum = volume.span() / scale;
         Ok(())
     }
 
-    /// Calls `visit` with each row of the region along x in a frame, as intensities in 0..1, the range of the volume.
+    /// Returns whether voxels that are not numbers are the background of the objects, so that the step to them counts as a
+    /// boundary: those next to them are as bright as others. Next to a mask in the background of the image they are; there
+    /// the step counts for nothing. `range` are the quantiles of the other intensities.
+    fn is_background_missing(
+        &self,
+        volume: &Volume,
+        low: [usize; 3],
+        [from, to]: [f64; 2],
+    ) -> Result<bool, MethodError> {
+        if !is_float(volume) {
+            return Ok(false);
+        }
+        let [nx, ny, _] = self.dims;
+        let (mut sum, mut count) = (0.0, 0.0);
+        let (mut all, mut all_count) = (0.0, 0.0);
+        for frame in 0..volume.frames() {
+            let mut values: Vec<f32> = Vec::with_capacity(self.dims.iter().product());
+            self.for_each_row(volume, low, frame, |row| values.extend(row))?;
+            if !values.iter().any(|value| value.is_nan()) {
+                continue;
+            }
+            for (i, &value) in values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
+                let at = self.voxel(i as u32);
+                let has_missing = (0..3).any(|k| {
+                    let step = [1, nx, nx * ny][k];
+                    at[k] > 0 && values[i - step].is_nan()
+                        || at[k] + 1 < self.dims[k] && values[i + step].is_nan()
+                });
+                if has_missing {
+                    (sum, count) = (sum + f64::from(value), count + 1.0);
+                }
+                (all, all_count) = (all + f64::from(value), all_count + 1.0);
+            }
+        }
+        if count == 0.0 || to <= from {
+            return Ok(count > 0.0);
+        }
+        let [beside, mean] = [sum / count, all / all_count].map(|mean| mean - from);
+        Ok(beside > DARKEST * (to - from) && beside > TYPICAL * mean)
+    }
+
+    /// Calls `visit` with each row of the region along x in a frame, as intensities in 0..1, the range of the volume; NaN
+    /// for those without a value.
     fn for_each_row(
         &self,
         volume: &Volume,
@@ -132,7 +208,15 @@ impl Region {
         frame: usize,
         mut visit: impl FnMut(&[f32]),
     ) -> Result<(), MethodError> {
-        let grid = volume.normalised_grid(frame)?;
+        let mut grid = volume.normalised_grid(frame)?;
+        if is_float(volume) {
+            let start = frame * grid.values.len();
+            for (i, value) in grid.values.iter_mut().enumerate() {
+                if lacks_value(volume, start + i) {
+                    *value = f32::NAN;
+                }
+            }
+        }
         // Indices into the volume, clamped to its border.
         let along = |axis: usize| -> Vec<usize> {
             let (from, last) = (low[axis], grid.dims[axis] - 1);
@@ -150,11 +234,21 @@ impl Region {
         Ok(())
     }
 
-    /// Returns the longest side of a voxel among axes along which the box has more than one voxel, in world units; the
-    /// default radius of plane fits depends on it.
+    /// Returns the longest side of a voxel among axes along which the box has more than one voxel; the default radius of
+    /// plane fits depends on it.
     pub fn longest_side(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
+    }
+
+    /// Returns whether all voxels of a frame have the same intensity.
+    pub fn is_blank(&self, frame: usize) -> bool {
+        self.is_blank.get(frame).copied().unwrap_or(false)
+    }
+
+    /// Returns the shortest side of a voxel, in world units.
+    pub fn shortest_side(&self) -> f64 {
+        self.spacing.min_element() / self.space.scale
     }
 
     /// Returns the difference between the largest and the smallest intensity in the region, without outliers, in the
@@ -167,6 +261,12 @@ impl Region {
     pub fn voxel(&self, index: u32) -> [usize; 3] {
         let ([nx, ny, _], i) = (self.dims, index as usize);
         [i % nx, i / nx % ny, i / (nx * ny)]
+    }
+
+    /// Returns the index of the voxel with the given coordinates in the region's grid.
+    pub fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        let [nx, ny, _] = self.dims;
+        (z * ny + y) * nx + x
     }
 
     /// Returns the coordinates, in the region's grid, of the voxel nearest to a position.
@@ -196,9 +296,10 @@ impl Region {
     /// x: most of them are noise.
     pub fn noise(&self) -> f64 {
         let mut counts = [0u64; 256];
-        for frame in &self.frames {
+        for (frame, _) in self.frames.iter().zip(&self.is_blank).filter(|(_, is_blank)| !**is_blank) {
             for row in frame.chunks_exact(self.dims[0]) {
-                row.windows(2).for_each(|pair| counts[usize::from(pair[0].abs_diff(pair[1]))] += 1);
+                let pairs = row.windows(2).filter(|pair| !self.has_background || pair[0] > 0 && pair[1] > 0);
+                pairs.for_each(|pair| counts[usize::from(pair[0].abs_diff(pair[1]))] += 1);
             }
         }
         let all: u64 = counts.iter().sum();
@@ -214,6 +315,17 @@ impl Region {
         // For two normally distributed values, the median of |a − b| is 0.6745·√2 standard deviations.
         median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
     }
+}
+
+fn is_float(volume: &Volume) -> bool {
+    matches!(volume.voxels(), Voxels::F32(_) | Voxels::F64(_))
+}
+
+/// Returns whether a voxel has no value: NaN, or negative infinity.
+fn lacks_value(volume: &Volume, index: usize) -> bool {
+    let stored = volume.voxels().get(index).unwrap_or(f64::NAN);
+    let value = stored * volume.slope() + volume.intercept();
+    value.is_nan() || value == f64::NEG_INFINITY
 }
 
 fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
@@ -266,12 +378,26 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
             return Err(MethodError::invalid("voxels", problem));
         }
     };
-    let counts = [0, 1, 2].map(|k| high[k] - low[k] + 1);
-    if counts.iter().filter(|&&count| count >= MIN_VOXELS).count() < 2 {
-        let problem = format!("must have at least {MIN_VOXELS} voxels along two axes, got {counts:?}");
-        return Err(MethodError::invalid(parameter, problem));
-    }
+    check_extent(parameter, [0, 1, 2].map(|k| high[k] - low[k] + 1), volume.spacing())?;
     Ok([low, high])
+}
+
+/// Checks that a box with these numbers of voxels is large enough along all axes; `parameter` is the one that gave the box.
+fn check_extent(parameter: &'static str, counts: [usize; 3], spacing: [f64; 3]) -> Result<(), MethodError> {
+    let shortest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+    let is_thick = |k: usize| {
+        // A rounding error must not decide about three isotropic slices.
+        counts[k] >= MIN_SLICES && counts[k] as f64 * spacing[k] >= 0.999 * MIN_THICKNESS * shortest
+    };
+    let wide = counts.iter().filter(|&&count| count >= MIN_VOXELS).count();
+    if wide >= 2 && (0..3).all(is_thick) {
+        return Ok(());
+    }
+    let problem = format!(
+        "must have at least {MIN_VOXELS} voxels along two axes, and {MIN_SLICES} along the third, {MIN_THICKNESS} times \
+         the shortest side of a voxel thick, got {counts:?}: a surface encloses a volume, not a part of a slice"
+    );
+    Err(MethodError::invalid(parameter, problem))
 }
 
 /// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in

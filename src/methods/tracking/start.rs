@@ -21,20 +21,24 @@ const EDGE_BOUND_RATIO: f32 = 1.5;
 /// kept: with shorter edges, a surface as large as the image would have more triangles than fit into memory.
 const MIN_EDGE: f64 = 0.1;
 
-/// Validates the caller's mesh for the first frame, and converts it to a [`Mesh`] with the same vertices.
+/// Validates the caller's mesh for the first frame, and converts it to a [`Mesh`] with the same vertices, relative to
+/// the origin of the working space.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
 /// [`checked_mesh`].
 pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
-    let mesh = checked_mesh("start", start)?;
-    let (edge, least) = (measure(start).edge_mean, MIN_EDGE * region.spacing.min_element());
+    let rebased = region.space.rebased(start);
+    let mesh = checked_mesh("start", &rebased)?;
+    let (edge, least) = (measure(&rebased).edge_mean, MIN_EDGE * region.shortest_side());
     if edge < least {
         let problem =
             format!("the mean edge length must be ≥ {least:.1e} (a tenth of a voxel), got {edge:.1e}");
         return Err(MethodError::invalid("start", problem));
     }
-    if start.positions.iter().all(|&p| region.clamp_into_box(region.to_local(p)).is_some()) {
+    let mut surface = mesh.clone();
+    region.space.enter(&mut surface);
+    if surface.vertices().all(|v| region.clamp_into_box(region.to_local(surface.position(v))).is_some()) {
         let problem =
             "no vertex of the mesh is inside the box; give a surface of the first frame in world coordinates";
         return Err(MethodError::invalid("start", problem));
@@ -43,15 +47,16 @@ pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Me
 }
 
 impl SurfaceTracker {
-    /// Extracts the initial mesh from the first frame, in world coordinates, unless the caller gave one.
+    /// Checks that the image has a boundary in some frame, and without the caller's mesh a closed surface in some frame.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if no frame has a boundary, or there is no closed surface in the first one.
-    pub(super) fn find_first_mesh(&mut self) -> Result<(), MethodError> {
+    /// [`MethodError::InvalidArgument`] if it has none.
+    pub(super) fn check_boundary(&mut self) -> Result<(), MethodError> {
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.quantum;
+            let largest = if largest < 0.01 { format!("{largest:.2e}") } else { format!("{largest:.4}") };
             let problem = format!(
-                "must be below {largest:.4}, the largest step in the box, got {}: no boundary was found",
+                "must be below {largest}, the largest step in the box, got {}: no boundary was found",
                 self.params.threshold
             );
             return Err(MethodError::invalid("threshold", problem));
@@ -59,32 +64,53 @@ impl SurfaceTracker {
         if self.mesh.vertex_count() > 0 {
             return Ok(());
         }
-        let surface = extract_bright_surface(&self.region, &self.faces[0], self.falloff())?;
-        let Some(part) = self.tracked_component(surface.components()) else {
-            let problem = "no closed surface in the first frame; use a larger box or a lower threshold";
-            return Err(MethodError::invalid("box", problem));
-        };
-        let mut mesh = Mesh::from_triangles(&part)?;
-        let edge = (EDGE * self.region.spacing.min_element()) as f32;
-        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
-        self.mesh = mesh;
-        Ok(())
+        for frame in 0..self.frames() {
+            if !self.surfaces_in(frame)?.is_empty() {
+                return Ok(());
+            }
+        }
+        let problem = "no closed surface in any frame; use a larger box or a lower threshold";
+        Err(MethodError::invalid("box", problem))
     }
 
-    /// Returns the component to be tracked, selected by the option `component`, from the closed surfaces in the first
-    /// frame; `None` if there is none. Components with negative volume are cavities of others, and are skipped.
-    fn tracked_component(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
-        let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
-        let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
-        let scored = solids.map(|(volume, part)| match self.component {
-            Component::Largest => (-volume, part),
-            Component::Nearest(p) => (distance(&part, p.as_vec3()), part),
+    /// Returns the closed surfaces around the bright regions of a frame, in the working space, without those of cavities,
+    /// which have negative volumes.
+    ///
+    /// # Errors
+    /// [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn surfaces_in(&self, frame: usize) -> Result<Vec<TriangleMesh>, MethodError> {
+        let surface = extract_bright_surface(&self.region, frame, &self.faces[frame], self.falloff())?;
+        let mut parts = surface.components();
+        parts.retain(|part| measure(part).volume > 0.0);
+        Ok(parts)
+    }
+
+    /// Returns the component to be tracked, selected by the option `component`, from closed surfaces in a frame; `None` if
+    /// there are none.
+    pub(super) fn tracked_component(
+        &self,
+        parts: impl Iterator<Item = TriangleMesh>,
+    ) -> Option<TriangleMesh> {
+        let scored = parts.map(|part| match self.component {
+            Component::Largest => (-measure(&part).volume, part),
+            Component::Nearest(p) => (distance(&part, self.region.space.point(p).as_vec3()), part),
         });
         scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
     }
+
+    /// Returns an extracted surface as a mesh with edges of even lengths, in the working space.
+    ///
+    /// # Errors
+    /// [`MethodError::Mesh`] if memory does not suffice.
+    pub(super) fn remeshed(&self, part: &TriangleMesh) -> Result<Mesh, MethodError> {
+        let mut mesh = Mesh::from_triangles(part)?;
+        let edge = (EDGE * self.region.spacing.min_element()) as f32;
+        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
+        Ok(mesh)
+    }
 }
 
-/// Returns the distance, in world units, of a point from the nearest vertex of a closed surface; 0 if the point is
+/// Returns the distance of a point from the nearest vertex of a closed surface; 0 if the point is
 /// inside. It selects the tracked component.
 fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
     let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();

@@ -3,6 +3,7 @@
 
 use super::frame_tracker::{FrameStatistics, FrameTracker};
 use super::vote::{Faces, TIME};
+use super::working_space::WorkingSpace;
 use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
@@ -11,6 +12,10 @@ use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLTRK\x01";
+
+/// That of states which also list the frames in which one surface ended and another began. States without such frames
+/// keep the first layout.
+const MAGIC_WITH_LOST: Magic = *b"VSCLTRK\x02";
 
 /// The saved state of a [`SurfaceTracker`]: everything of a run but its input and what is computed again.
 #[derive(Serialize, Deserialize)]
@@ -33,20 +38,22 @@ impl SurfaceTracker {
     /// start.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
-        encode(
-            &MAGIC,
-            &State {
-                fingerprint: self.fingerprint(),
-                params: self.params.clone(),
-                faces: self.faces.clone(),
-                mesh: self.mesh.clone(),
-                edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge),
-                meshes: self.meshes.iter().map(plain).collect(),
-                statistics: self.statistics.clone(),
-                cycle_closure_error: self.cycle_closure_error,
-                steps: self.steps,
-            },
-        )
+        let state = State {
+            fingerprint: self.fingerprint(),
+            params: self.params.clone(),
+            faces: self.faces.clone(),
+            mesh: self.mesh.clone(),
+            edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge / self.region.space.scale),
+            meshes: self.meshes.iter().map(plain).collect(),
+            statistics: self.statistics.clone(),
+            cycle_closure_error: self.cycle_closure_error,
+            steps: self.steps,
+        };
+        if self.lost.is_empty() {
+            encode(&MAGIC, &state)
+        } else {
+            encode(&MAGIC_WITH_LOST, &(state, &self.lost))
+        }
     }
 
     /// Restores a run from the bytes of [`Self::save`], for a tracker of the same volume, box, component and start.
@@ -54,7 +61,11 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = decode(&MAGIC, bytes)?;
+        let (mut state, lost): (State, Vec<u32>) = if bytes.starts_with(&MAGIC_WITH_LOST) {
+            decode(&MAGIC_WITH_LOST, bytes)?
+        } else {
+            (decode(&MAGIC, bytes)?, Vec::new())
+        };
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("volume", "the state belongs to another volume, box, component or start");
@@ -65,8 +76,15 @@ impl SurfaceTracker {
         if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_valid(faces)) {
             return bad("boundary", "boundary votes outside the box");
         }
+        let origin = self.region.space.origin;
+        state.mesh.set_origin(origin);
         let meshes: Vec<TriangleMesh> = (state.meshes.into_iter())
-            .map(|(positions, triangles)| TriangleMesh { positions, triangles, ..TriangleMesh::default() })
+            .map(|(positions, triangles)| TriangleMesh {
+                positions,
+                origin,
+                triangles,
+                ..TriangleMesh::default()
+            })
             .collect();
         let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.statistics.len();
         let boundary_fits = meshes.is_empty() || state.faces.len() == self.frames();
@@ -78,7 +96,11 @@ impl SurfaceTracker {
         if !edge_fits || !closure_fits || !start_fits {
             return bad("frames", "inconsistent with this tracker");
         }
-        if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
+        let had_surface = meshes.iter().any(|mesh| !mesh.triangles.is_empty());
+        let edge_is_known = state.edge.is_some() || !had_surface;
+        let lost_fit = lost.iter().all(|&frame| (frame as usize) < meshes.len());
+        let is_newest = meshes.last().is_none_or(|last| last.triangles.len() == state.mesh.triangle_count());
+        if !frames_fit || !boundary_fits || !edge_is_known || !lost_fit || !is_newest {
             return bad("frames", "inconsistent");
         }
         if !can_be_checked(&state.mesh)
@@ -94,8 +116,10 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
-        (self.cycle_closure_error, self.steps) = (state.cycle_closure_error, state.steps);
-        self.frame_tracker = state.edge.map(FrameTracker::new);
+        self.intensities_at_surface =
+            (0..self.meshes.len()).map(|frame| self.measured_intensities(frame)).collect();
+        (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
+        self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();
         Ok(())
     }
@@ -116,7 +140,11 @@ impl SurfaceTracker {
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));
-        mix(&self.region.to_world.to_cols_array());
+        mix(&self.region.to_space.to_cols_array());
+        if self.region.space != WorkingSpace::default() {
+            mix(&self.region.space.origin.to_array());
+            mix(&[self.region.space.scale]);
+        }
         mix(&self.region.spacing.to_array());
         mix(&[self.region.quantum]);
         if let Component::Nearest(p) = self.component {

@@ -70,17 +70,26 @@ impl BoundaryVoting {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
+    /// Returns the extent of the windows.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
     /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
     /// sides where they cut bright regions.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
-        let frames = self.window.frames_around(frame, region.frames.len());
-        frames.iter().for_each(|&t| self.ensure_levels(region, t));
         let mut faces = Faces::default();
+        if region.is_blank(frame) {
+            return faces;
+        }
+        let frames = self.window.frames_with_contrast(region, frame);
+        frames.iter().for_each(|&t| self.ensure_levels(region, t));
         for direction in [X, Y, Z] {
             faces[direction] = self.votes(region, frame, frame, direction, &frames);
         }
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
+        let next = next.filter(|&next| !region.is_blank(next));
         if let (Some(next), true) = (next, self.window.frames > 0) {
             // Windows that contain both frames.
             let both: Vec<usize> =
@@ -117,12 +126,8 @@ impl BoundaryVoting {
     /// [`Rows`]).
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
-        let frames: Vec<&[u8]> = self
-            .window
-            .frames_around(frame, region.frames.len())
-            .iter()
-            .map(|&t| &region.frames[t][..])
-            .collect();
+        let frames: Vec<&[u8]> =
+            self.window.frames_with_contrast(region, frame).iter().map(|&t| &region.frames[t][..]).collect();
         let rows = Rows::new(region.dims, self.window.half_width);
         let mut out = vec![NONE; rows.len()];
         let mut slabs = Slabs::new(region.dims, self.window.half_width, &frames);
@@ -258,9 +263,16 @@ impl VotingWindows<'_> {
 }
 
 impl Window {
+    /// Returns the frames of a window around a frame, without those that are blank.
+    fn frames_with_contrast(&self, region: &Region, frame: usize) -> Vec<usize> {
+        let mut frames = self.frames_around(frame, region.frames.len());
+        frames.retain(|&t| !region.is_blank(t));
+        frames
+    }
+
     /// Returns the indices of the frames within a window's extent in time around `frame`, in a sequence of `count`
     /// frames that may be cyclic.
-    fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
+    pub fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
         let half_width = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
             let t = (frame + count + offset).checked_sub(half_width)?;
@@ -444,6 +456,7 @@ impl<'a> Slabs<'a> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
     #[cfg(target_arch = "wasm32")]
@@ -464,11 +477,14 @@ mod tests {
             dims,
             inner: [[0; 3], dims.map(|n| n - 1)],
             spacing: DVec3::ONE,
-            to_world: DAffine3::IDENTITY,
-            from_world: DAffine3::IDENTITY,
+            space: WorkingSpace::default(),
+            to_space: DAffine3::IDENTITY,
+            from_space: DAffine3::IDENTITY,
             frames: (0..frames).map(|t| frame(t, &mut random)).collect(),
             quantum: 1.0,
             threshold: 50.0,
+            has_background: false,
+            is_blank: Vec::new(),
         }
     }
 

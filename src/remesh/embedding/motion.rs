@@ -42,6 +42,8 @@ impl Embedding {
         self.mark_edited_dirty(mesh);
         self.apply_motion(mesh, moving.iter().copied().zip(from.iter().copied()));
         let mut shares = BTreeMap::new();
+        // Ends, since each round shortens the displacement of a vertex, to a quarter and then to 0, and holds those alone
+        // that have one.
         loop {
             let intersecting = self.check_dirty(mesh);
             let can_be_held = |v: &VertexId| displacements[v.index()] != Vec3::ZERO;
@@ -58,7 +60,9 @@ impl Embedding {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
                 let factor = if *share == 1.0 { HELD_BACK } else { 0.0 };
-                (*share, displacements[i]) = (*share * factor, displacements[i] * factor);
+                // Not by a product with 0, which is NaN for a displacement that is not finite.
+                displacements[i] = if factor == 0.0 { Vec3::ZERO } else { displacements[i] * factor };
+                *share *= factor;
                 mesh.set_position(v, from[k] + displacements[i]);
                 if mesh.position(v) == before {
                     // A displacement lost in rounding uses up no motion bound.

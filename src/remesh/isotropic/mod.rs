@@ -61,6 +61,7 @@ const INPUT_TEST_RUN: usize = 1;
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
+/// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest coordinate;
 /// [`MeshError::TooLarge`] if more than eight million vertices would be needed. The mesh is unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;

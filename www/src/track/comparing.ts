@@ -47,7 +47,8 @@ async function trackAll(
     for (let frame = 0; frame < tracker.frames; frame++) {
       const mesh = tracker.meshAt(frame);
       selfIntersections += mesh.check().selfIntersections;
-      if (spec) errors.push(errorOf(spec, frame, mesh.arrays().positions));
+      const error = spec && errorOf(spec, frame, mesh.arrays().positions);
+      if (error) errors.push(error);
       mesh.free();
     }
     const mean = (of: 'mean' | 'p95') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;

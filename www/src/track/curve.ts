@@ -16,12 +16,12 @@ export interface Beat {
 
 /**
  * Returns the largest and smallest of the volumes of all frames, their frames, and the ejection fraction; undefined for
- * fewer than two frames.
+ * fewer than two frames, and if the surface is empty in one: nothing is ejected from an object that is not there.
  */
 export function beatOf(volumes: readonly number[]): Beat | undefined {
-  if (volumes.length < 2) return undefined;
+  if (volumes.length < 2 || volumes.some((volume) => !(volume > 0))) return undefined;
   const [largest, smallest] = [Math.max(...volumes), Math.min(...volumes)];
-  const ejection = largest > 0 ? (largest - smallest) / largest : 0;
+  const ejection = (largest - smallest) / largest;
   return { diastole: volumes.indexOf(largest), systole: volumes.indexOf(smallest), largest, smallest, ejection };
 }
 

@@ -18,9 +18,13 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
   }
 }
 
-/** Returns the mean and the 95th percentile of the distances, mm, of points from the true wall of the phantom. */
-export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
+/**
+ * Returns the mean and the 95th percentile of the distances, mm, of points from the true wall of the phantom; undefined
+ * without points.
+ */
+export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError | undefined {
+  if (points.length === 0) return undefined;
   const distances = wallDistances(spec, frame, points);
-  const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);
+  const mean = distances.reduce((sum, distance) => sum + distance, 0) / distances.length;
   return { mean, p95: distances[Math.floor(0.95 * distances.length)] ?? 0 };
 }

@@ -1,6 +1,6 @@
 import { plural, text } from '../texts';
 import { warningsOf } from '../track/curve';
-import type { FrameStatistics, SurfaceError } from '../track/protocol';
+import type { FrameStatistics, StepReport, SurfaceError } from '../track/protocol';
 import { h } from './dom';
 import { count, figure } from './format';
 
@@ -51,6 +51,12 @@ const COLUMNS: Column[] = [
 
 const round = (value: number) => Number(value.toPrecision(3));
 
+/** Returns a warning of the tracker in words, with the number of the frame that it concerns. */
+function toldWarning({ text: told, where }: StepReport['warnings'][number]): string {
+  const frame = where && 'frame' in where ? where.frame + 1 : undefined;
+  return frame === undefined ? `${told}.` : text('trackPanels.frameWarning', { frame, told });
+}
+
 /**
  * Table of the Track lab with the statistics of each frame, and warnings about folded triangles and jumps of the area.
  */
@@ -59,6 +65,7 @@ export class FrameTable {
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });
   #facts: readonly FrameStatistics[] = [];
+  #found: StepReport['warnings'] = [];
   #rows: HTMLElement[] = [];
 
   constructor() {
@@ -71,9 +78,19 @@ export class FrameTable {
     );
   }
 
-  show(facts: readonly FrameStatistics[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
-    const isNew = facts.length !== this.#facts.length || facts.some((one, i) => one !== this.#facts[i]);
+  /** Shows the statistics and errors of frames, with `found`, the tracker's own warnings, and marks the current `frame`. */
+  show(
+    facts: readonly FrameStatistics[],
+    errors: readonly (SurfaceError | undefined)[],
+    found: StepReport['warnings'],
+    frame: number,
+  ): void {
+    const isNew =
+      facts.length !== this.#facts.length ||
+      facts.some((one, i) => one !== this.#facts[i]) ||
+      found.length !== this.#found.length;
     this.#facts = facts;
+    this.#found = found;
     if (isNew) this.#fill(facts, errors);
     for (const [i, row] of this.#rows.entries()) {
       if (i === frame) row.setAttribute('aria-current', 'true');
@@ -112,8 +129,9 @@ export class FrameTable {
       ...(jumped.length > 0
         ? [plural('trackPanels.areaWarning', jumped.length, { most: percent(jumped.map(({ share }) => share)) })]
         : []),
+      ...this.#found.map(toldWarning),
     ];
-    this.warnings.dataset.warnings = String(found.length);
+    this.warnings.dataset.warnings = String(found.length + this.#found.length);
     const warnings = texts.join(' ');
     if (this.warnings.textContent !== warnings) this.warnings.textContent = warnings;
   }

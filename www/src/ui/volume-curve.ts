@@ -1,4 +1,4 @@
-import { text } from '../texts';
+import { plural, text } from '../texts';
 import { type Beat, beatOf } from '../track/curve';
 import { h } from './dom';
 import { figure } from './format';
@@ -89,8 +89,15 @@ export class VolumeCurve {
     this.#legend.replaceChildren(legendOf(keys));
     const beat = beatOf(volumes);
     this.#caption.dataset.beat = JSON.stringify(beat ?? {});
-    this.#caption.textContent =
-      beat && volumes.length === frames ? describeBeat(beat, this.#curves) : text('trackPanels.curveUnfinished');
+    this.#caption.textContent = this.#told(beat);
+  }
+
+  /** Describes the curve in words; `beat` is undefined while it is unfinished, and if some frames have no surface. */
+  #told(beat: Beat | undefined): string {
+    const { volumes, frames } = this.#curves;
+    if (volumes.length < frames) return text('trackPanels.curveUnfinished');
+    if (beat) return describeBeat(beat, this.#curves);
+    return plural('trackPanels.curveEmpty', volumes.filter((volume) => !(volume > 0)).length, {});
   }
 
   /** Returns the marks of the current frame and, once all frames are tracked, of the largest and smallest volume. */

@@ -1,0 +1,211 @@
+//! Whether a frame has the tracked object: the surface ends where the image has none, and begins where one appears.
+//!
+//! The image decides by its boundary votes. A vertex is on the boundary of an object if the frame itself, not only
+//! those around it in time, has votes around the vertex, and its intensity falls there from inside to outside. Noise has
+//! hardly any votes, a neighbouring object the opposite step. So the surface of an object that is there has such
+//! vertices nearly everywhere, and one without an object nearly nowhere, however dim or small the object is. What is
+//! smaller than a voxel is none.
+//!
+//! Where no vertices are on a boundary, the windows may have extended over frames so much brighter that the object's
+//! own step does not count. So the frame is tried again with windows of its own, before the surface ends.
+
+use super::frame_tracker::{FrameContext, FrameTracker, Support};
+use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
+use super::project::SpaceTimeSamples;
+use super::region::Region;
+use super::vote::{BoundaryVoting, Window};
+use super::{FrameStatistics, SurfaceTracker};
+use crate::math::DAffine3;
+use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::methods::MethodError;
+use crate::remesh::Changes;
+use crate::volume::voxels_inside;
+use fixedbitset::FixedBitSet;
+
+/// Smallest share of a surface's vertices on a boundary of the frame for an object to be there. Noise reaches one in a
+/// hundred; a surface of a ventricle, of which a third has no boundary behind muscles and at valves, stays above a half.
+const MIN_PRESENT: f64 = 0.1;
+
+/// Share of the vertices without a boundary, or with rejected projections, from which [`MIN_PRESENT`] is tested at all.
+/// With a lower share it is not in doubt.
+const DOUBTFUL: f64 = 0.5;
+
+/// Share of a component's voxels that were bright in the frame before, outside of the tracked surface, from which it
+/// counts as another object that was there before, not as one that begins. Objects that touch overlap by less, and those
+/// that move by half of their size by more.
+const KNOWN: f64 = 0.25;
+
+/// The result of tracking a surface into a frame.
+pub(super) struct Tracked {
+    pub mesh: Mesh,
+    pub tracker: FrameTracker,
+    pub samples: SpaceTimeSamples,
+    pub changes: Changes,
+    pub statistics: FrameStatistics,
+    /// Whether the frame has an object at the surface.
+    pub is_present: bool,
+}
+
+impl SurfaceTracker {
+    /// Tracks a surface, given in the working space, into a frame; `from` are the boundary points around the frame before,
+    /// `None` if the surface begins here. `voting` has the levels of the frame.
+    pub(super) fn tracked(
+        &self,
+        mut mesh: Mesh,
+        mut tracker: FrameTracker,
+        from: Option<&SpaceTimeSamples>,
+        frame: usize,
+        voting: &BoundaryVoting,
+    ) -> Tracked {
+        let samples = self.samples_around(frame);
+        let params = &self.region.space.params(&self.params);
+        let context = FrameContext { region: &self.region, params, frame, samples: &samples, voting };
+        let (changes, statistics) = tracker.track_frame(&mut mesh, from, &context);
+        let voxel = self.region.spacing.element_product();
+        let is_present = statistics.volume >= voxel && context.is_present(&mesh, &statistics);
+        Tracked { mesh, tracker, samples, changes, statistics, is_present }
+    }
+
+    /// Tracks the surface of the frame before, `mesh` in the working space, into a frame; `None` if the frame has no
+    /// object there. If windows over several frames find none, the votes of the frame are replaced by those of windows
+    /// within the frame, provided that these find one.
+    pub(super) fn follow(
+        &mut self,
+        mesh: &Mesh,
+        tracker: FrameTracker,
+        from: Option<&SpaceTimeSamples>,
+        frame: usize,
+    ) -> Option<Tracked> {
+        let edge = tracker.edge;
+        self.voting.ensure_levels(&self.region, frame);
+        let first = self.tracked(mesh.clone(), tracker, from, frame, &self.voting);
+        if first.is_present {
+            return Some(first);
+        }
+        self.with_own_windows(frame, |this, voting| {
+            let again = this.tracked(mesh.clone(), FrameTracker::new(edge), from, frame, voting);
+            Ok(again.is_present.then_some(again))
+        })
+        .unwrap_or(None)
+    }
+
+    /// Finds an object that begins in a frame, and extracts and tracks its surface; `None` if no object begins there.
+    /// `last` is the surface of the frame before, in the working space, which has ended; empty if there was none.
+    ///
+    /// # Errors
+    /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn begin(&mut self, last: &Mesh, frame: usize) -> Result<Option<Tracked>, MethodError> {
+        self.voting.ensure_levels(&self.region, frame);
+        if let Some(found) = self.begin_with(last, frame, &self.voting)? {
+            return Ok(Some(found));
+        }
+        self.with_own_windows(frame, |this, voting| this.begin_with(last, frame, voting))
+    }
+
+    fn begin_with(
+        &self,
+        last: &Mesh,
+        frame: usize,
+        voting: &BoundaryVoting,
+    ) -> Result<Option<Tracked>, MethodError> {
+        let parts = self.surfaces_in(frame)?;
+        if parts.is_empty() {
+            return Ok(None);
+        }
+        let known = self.known_before(last, frame);
+        let Some(part) =
+            self.tracked_component(parts.into_iter().filter(|part| !self.is_known(part, &known)))
+        else {
+            return Ok(None);
+        };
+        let mesh = self.remeshed(&part)?;
+        let tracker = match &self.frame_tracker {
+            Some(tracker) => FrameTracker::new(tracker.edge),
+            None => FrameTracker::new(measure(&mesh.to_triangles()).edge_mean),
+        };
+        let found = self.tracked(mesh, tracker, None, frame, voting);
+        // In the first frame there is nothing to compare with, and what was extracted is given.
+        Ok((found.is_present || frame == 0).then_some(found))
+    }
+
+    /// Calls `attempt` with the votes of a frame replaced by those of windows within it, and keeps these if it finds
+    /// something; `None` if windows are of single frames anyway.
+    fn with_own_windows(
+        &mut self,
+        frame: usize,
+        attempt: impl FnOnce(&Self, &BoundaryVoting) -> Result<Option<Tracked>, MethodError>,
+    ) -> Result<Option<Tracked>, MethodError> {
+        if self.params.window_frames == 0 {
+            return Ok(None);
+        }
+        let window = Window { frames: 0, ..self.voting.window() };
+        let mut voting = BoundaryVoting::new(window, self.frames());
+        let mut faces = voting.faces(&self.region, frame);
+        let several = self.faces[frame].clone();
+        // Faces along time have no windows within one frame.
+        faces[super::vote::TIME].clone_from(&several[super::vote::TIME]);
+        self.faces[frame] = faces;
+        let found = attempt(self, &voting);
+        if !matches!(found, Ok(Some(_))) {
+            self.faces[frame] = several;
+        }
+        found
+    }
+
+    /// Returns the voxels of the region that were bright in the frame before, outside of the tracked surface `last`;
+    /// empty for the first frame.
+    fn known_before(&self, last: &Mesh, frame: usize) -> FixedBitSet {
+        let region = &self.region;
+        let mut known = FixedBitSet::with_capacity(region.dims.iter().product());
+        let Some(before) = frame.checked_sub(1) else { return known };
+        let voxels = VoxelBox { ends: region.inner };
+        let Some(bright) = label_bright(region, before, &self.faces[before], voxels) else { return known };
+        for (i, _) in bright.iter().enumerate().filter(|(_, is_bright)| **is_bright) {
+            known.insert(region.index(voxels.at(i)));
+        }
+        if last.vertex_count() > 0 {
+            known.difference_with(&inside_voxels(region, &last.to_triangles()));
+        }
+        known
+    }
+
+    /// Returns whether the component of a frame's surface is that of an object whose voxels were bright in the frame
+    /// before.
+    fn is_known(&self, part: &TriangleMesh, known: &FixedBitSet) -> bool {
+        if known.is_clear() {
+            return false;
+        }
+        let inside = inside_voxels(&self.region, part);
+        let overlap = inside.intersection(known).count();
+        overlap as f64 >= KNOWN * (inside.count_ones(..).max(1)) as f64
+    }
+}
+
+/// Returns the voxels of the region whose centres are inside a surface, given in the working space.
+fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
+    let to_voxels = DAffine3::from_scale(region.spacing.recip()) * region.from_space;
+    voxels_inside(
+        &TriangleMesh { origin: Default::default(), ..surface.clone() }.transformed(&to_voxels),
+        region.dims,
+    )
+}
+
+impl FrameContext<'_> {
+    /// Returns whether the frame has an object at a surface that was tracked into it, see the module's documentation.
+    fn is_present(&self, mesh: &Mesh, statistics: &FrameStatistics) -> bool {
+        let doubtful = DOUBTFUL * mesh.vertex_count() as f64;
+        let is_certain =
+            (statistics.without_boundary as f64) < doubtful && (statistics.rejected as f64) < doubtful;
+        is_certain || self.share_on_boundary(mesh) >= MIN_PRESENT
+    }
+
+    /// Returns the share of vertices on a boundary of the frame.
+    fn share_on_boundary(&self, mesh: &Mesh) -> f64 {
+        let on_boundary = mesh.vertices().filter(|&v| {
+            let at = self.region.to_local(mesh.position(v));
+            self.classify(mesh.position(v), mesh.area_normal(v)) == Support::Boundary
+                && self.samples.own.sums(at).weight >= f64::from(MIN_WEIGHT)
+        });
+        on_boundary.count() as f64 / mesh.vertex_count().max(1) as f64
+    }
+}

@@ -1,0 +1,125 @@
+//! Warnings about a tracked sequence: frames in which the object ends or begins, and those in which its
+//! surface is uncertain.
+
+use super::SurfaceTracker;
+use super::region::Region;
+use crate::mesh::TriangleMesh;
+use crate::warning::{Place, Warning, WarningCode};
+
+/// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
+/// in units of the step of one. The level between bright and dark is that of the window: at this difference it may be at
+/// a fifth of the step instead of half, a third of a voxel off where the image is blurred by one. With a smaller limit,
+/// frames of a cine sequence are warned of.
+const MAX_SHIFT: f64 = 0.3;
+
+/// Radius of a ball with the volume of the object, in units of the radius of the plane fits, below which its volume is
+/// uncertain: planes fitted to half of a ball and more do not show its curvature. At this radius errors are 5 %.
+const SMALL: f64 = 1.4;
+
+impl SurfaceTracker {
+    /// Returns what a user should know about the frames tracked so far, in their order.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        for frame in 0..self.meshes.len() {
+            let before = match frame.checked_sub(1) {
+                Some(before) => self.has_object(before),
+                None => self.start.vertex_count() > 0,
+            };
+            let (is_there, is_lost) = (self.has_object(frame), self.lost.contains(&(frame as u32)));
+            if before && (!is_there || is_lost) {
+                warnings.push(ends(frame));
+            }
+            if is_there && frame > 0 && (!before || is_lost) {
+                warnings.push(begins(frame));
+            }
+            if is_there {
+                // Steps at the surface of a small object are not those of its boundary.
+                warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
+            }
+        }
+        warnings.extend(self.cycle_warning());
+        warnings
+    }
+
+    fn has_object(&self, frame: usize) -> bool {
+        !self.meshes[frame].triangles.is_empty()
+    }
+
+    /// Returns the warning about the first frame of a cyclic sequence, which follows the last, once the run is done.
+    fn cycle_warning(&self) -> Option<Warning> {
+        self.cycle_closure_error?;
+        let last = self.meshes.len().checked_sub(1)?;
+        match [self.has_object(last), self.has_object(0)] {
+            [true, false] => Some(ends(0)),
+            [false, true] => Some(begins(0)),
+            _ => None,
+        }
+    }
+
+    /// Returns a warning if the intensities at the surface differ too much from those in another frame of the windows.
+    fn uneven_brightness(&self, frame: usize) -> Option<Warning> {
+        let [inside, outside] = self.intensities_at_surface[frame]?;
+        let middle = |[inside, outside]: [f64; 2]| (inside + outside) / 2.0;
+        let near = self.voting.window().frames_around(frame, self.frames());
+        let others = near.iter().filter_map(|&t| *self.intensities_at_surface.get(t)?);
+        let shift = others.map(|other| (middle(other) - middle([inside, outside])).abs()).fold(0.0, f64::max);
+        (shift > MAX_SHIFT * (inside - outside)).then(|| {
+            let text = format!(
+                "intensities at the surface differ from those in a frame nearby by {:.1} times the step there, so the \
+                 surface may be off; equalise the brightness of the frames, or set windowFrames to 0",
+                shift / (inside - outside)
+            );
+            Warning::at(WarningCode::UnevenBrightness, Place::Frame(frame as u32), text)
+        })
+    }
+
+    /// Returns a warning if the object is too small for the radius of the plane fits.
+    fn small_object(&self, frame: usize) -> Option<Warning> {
+        let volume = self.statistics[frame].volume.max(0.0);
+        let radius = libm::cbrt(volume * 0.75 / std::f64::consts::PI);
+        (radius < SMALL * self.params.radius).then(|| {
+            let text = format!(
+                "the object is as large as a ball of radius {radius:.3e}, too small for plane fits of radius {:.3e}, so \
+                 its volume is uncertain",
+                self.params.radius
+            );
+            Warning::at(WarningCode::SmallObject, Place::Frame(frame as u32), text)
+        })
+    }
+
+    /// Returns the mean intensities at the surface of a frame tracked so far, see [`intensities_at`].
+    pub(super) fn measured_intensities(&self, frame: usize) -> Option<[f64; 2]> {
+        let mut mesh = self.meshes[frame].clone();
+        mesh.positions.iter_mut().for_each(|p| *p *= self.region.space.scale as f32);
+        intensities_at(&self.region, frame, &mesh)
+    }
+}
+
+/// Returns the mean intensities one voxel inside and one voxel outside of a surface, given in the working space, in steps of
+/// the quantised intensities. Vertices at which intensity rises outwards, or beyond the box, are left out; `None` if
+/// there are no others.
+fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<[f64; 2]> {
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    for (p, normal) in mesh.positions.iter().zip(mesh.vertex_normals()) {
+        let (at, out) = (region.to_local(*p), region.from_space.transform_vector3(normal.as_dvec3()));
+        let out = out.normalize_or_zero() * region.spacing.min_element();
+        if region.clamp_into_box(at + out).is_some() {
+            continue;
+        }
+        let [inside, outside] = [at - out, at + out].map(|at| region.sample(frame, at));
+        if inside > outside {
+            (sums, count) = ([sums[0] + inside, sums[1] + outside], count + 1.0);
+        }
+    }
+    (count > 0.0).then(|| sums.map(|sum| sum / count))
+}
+
+fn ends(frame: usize) -> Warning {
+    let text = "the surface ends: the image has no boundary of the object here; it is gone, too small, or has moved too far";
+    Warning::at(WarningCode::EndsInFrame, Place::Frame(frame as u32), text)
+}
+
+fn begins(frame: usize) -> Warning {
+    let text = "a surface begins: in the frame before, the image had no such object, or one too small";
+    Warning::at(WarningCode::BeginsInFrame, Place::Frame(frame as u32), text)
+}
