@@ -1,7 +1,7 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
 
 import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
-import { likewise } from '../placing';
+import { inWorld } from '../placing';
 import { text } from '../texts';
 import { toCode } from '../worker/code';
 import { Refusal, toFailure } from '../worker/refusal';
@@ -19,7 +19,6 @@ import type {
   ComparedTrack,
   OpenedImage,
   ParamValues,
-  PointArray,
   Preparation,
   Ready,
   Requests,
@@ -266,14 +265,15 @@ class Session {
   }
 
   #votes(frame: number): BoundaryVotes {
-    const all: PointArray = this.#current().boundary(frame);
+    const tracker = this.#current();
+    const all = tracker.boundary(frame);
     const count = all.length / 5;
-    const [points, weights] = [likewise(all, 3 * count), new Float32Array(count)];
+    const [points, weights] = [new Float32Array(3 * count), new Float32Array(count)];
     for (let i = 0; i < count; i++) {
       points.set(all.subarray(5 * i, 5 * i + 3), 3 * i);
       weights[i] = all[5 * i + 4] ?? 0;
     }
-    return { frame, points, weights };
+    return { frame, points: inWorld(points, tracker.origin), weights };
   }
 
   #save(): SavedTrack {

@@ -126,7 +126,7 @@ export class AttractorControls {
       'button',
       {
         type: 'button',
-        class: 'quiet',
+        class: 'quiet place',
         title: text('extractPanels.showInSlices'),
         'aria-label': text('extractPanels.attractorShow', { name, where }),
         onclick: () => this.#events.onGoTo(attractor.point),

@@ -1,4 +1,4 @@
-import { shortened } from '../placing';
+import { shortenedPoint } from '../placing';
 import { boxOf, lengthsOf, turned, withLengths } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Vec3 } from '../sculpt/protocol';
 import { text } from '../texts';
@@ -25,6 +25,10 @@ const MODES: { mode: HandleMode; label: string; key: string; help: string }[] = 
     help: text('sculptPanels.modeScaleHelp'),
   },
 ];
+/** Significant digits of coordinates and lengths; dragging is no more precise. */
+const DIGITS = 4;
+/** Number of characters for which there is room in each of three fields side by side. */
+const WIDTH = 8;
 const AXES = ['x', 'y', 'z'] as const;
 const DIRECTIONS: Vec3[] = [
   [1, 0, 0],
@@ -157,9 +161,12 @@ export class EllipsoidControls {
 
   #showNumbers(ellipsoid: ControlEllipsoid): void {
     const lengths = lengthsOf(ellipsoid);
+    const place = this.#place(ellipsoid);
+    const isLong = place.some((text) => text.length > WIDTH);
+    this.#center[0]?.parentElement?.classList.toggle('long', isLong);
     for (let k = 0; k < 3; k++) {
       const [center, length] = [this.#center[k], this.#lengths[k]];
-      if (center && center !== document.activeElement) center.value = short(ellipsoid.center[k] ?? 0, this.#size);
+      if (center && center !== document.activeElement) center.value = place[k] ?? '';
       if (length && length !== document.activeElement) length.value = short(lengths[k] ?? 0);
     }
   }
@@ -214,10 +221,11 @@ export class EllipsoidControls {
     return input;
   }
 
-  /** Size of the box around all ellipsoids. */
-  get #size(): number {
+  /** Returns the centre of an ellipsoid as texts, to four digits of the box around all ellipsoids. */
+  #place({ center }: ControlEllipsoid): string[] {
     const { min, max } = boxOf(this.#pose);
-    return Math.max(...max.map((high, k) => high - (min[k] ?? 0)));
+    const size = Math.max(...max.map((high, k) => high - (min[k] ?? 0)));
+    return shortenedPoint(center, DIGITS, size).map(String);
   }
 
   get #ellipsoid(): ControlEllipsoid | undefined {
@@ -261,9 +269,9 @@ export class EllipsoidControls {
   #reject(message: string): void {
     const ellipsoid = this.#ellipsoid;
     if (ellipsoid) {
-      const lengths = lengthsOf(ellipsoid);
+      const [lengths, place] = [lengthsOf(ellipsoid), this.#place(ellipsoid)];
       this.#center.forEach((field, k) => {
-        field.value = short(ellipsoid.center[k] ?? 0, this.#size);
+        field.value = place[k] ?? '';
       });
       this.#lengths.forEach((field, k) => {
         field.value = short(lengths[k] ?? 0);
@@ -273,10 +281,7 @@ export class EllipsoidControls {
   }
 }
 
-/**
- * Formats a length, or a coordinate in a scene of this size, with four significant digits, far from the origin with
- * more; dragging is no more precise.
- */
-function short(value: number, size = 0): string {
-  return String(shortened(value, 4, size));
+/** Formats a length with as many digits as it is worth. */
+function short(value: number): string {
+  return String(Number(value.toPrecision(DIGITS)));
 }
