@@ -19,6 +19,11 @@ impl RawAnimation {
         RawAnimation::default()
     }
 
+    /// Adds notes for the reader of the file, each `code: text`.
+    pub fn note(&mut self, notes: Vec<String>) {
+        self.0.note(&notes);
+    }
+
     /// Appends a frame that shows a mesh in its current state.
     pub fn add(&mut self, mesh: &RawMesh) -> Result<(), JsValue> {
         Ok(self.0.add(&mesh.triangles()).map_err(Failure::from)?)
