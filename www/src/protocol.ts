@@ -16,13 +16,25 @@ import type {
   StepReport,
   UncoveredRegion,
   Vec3,
+  Warning,
 } from 'vesicle';
 
 import type { Edit } from './finish/protocol';
 import type { Shape } from './shapes';
 import type { RunLog } from './worker/run-log';
 
-export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredRegion, Vec3 };
+export type {
+  Attractor,
+  Coverage,
+  MeshFormat,
+  MeshInfo,
+  MeshReport,
+  ParamSpec,
+  StepReport,
+  UncoveredRegion,
+  Vec3,
+  Warning,
+};
 
 export type ParamValues = Record<string, unknown>;
 
@@ -108,6 +120,8 @@ export interface VolumeView extends LevelView {
   /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
+  /** What to know about the volume before relying on it. */
+  warnings: readonly Warning[];
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
    * and the bytes of all.
@@ -202,6 +216,12 @@ export interface RunCode {
   note?: string | undefined;
 }
 
+export interface ExportRequest {
+  format: MeshFormat;
+  /** Warnings that the file is to have in comments, besides those of the mesh. */
+  warnings: readonly Warning[];
+}
+
 /** Requests of the page to the workers of all labs whose model runs. */
 export interface CodeRequests {
   code: { body: CodeRequest; reply: RunCode };
@@ -231,7 +251,8 @@ export interface Requests extends CodeRequests {
   setParams: { body: ParamValues; reply: ParamValues };
   /** Sets the planes whose cross-sections with the surface are sent from now on, for the outlines on the slices. */
   planes: { body: Plane[]; reply: undefined };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  /** Replies with the surface as a file, with its own `warnings` and those given. */
+  export: { body: ExportRequest; reply: Uint8Array };
   /** Replies with `levels` coarser levels of the volume's pyramid for display, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };

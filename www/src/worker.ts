@@ -5,12 +5,12 @@ import type {
   Attractor,
   CodeRequest,
   DataEvent,
+  ExportRequest,
   LargeSource,
   LevelView,
   Loaded,
   MeasuredCoverage,
   Measures,
-  MeshFormat,
   ParamValues,
   Plane,
   Ready,
@@ -100,7 +100,7 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     planes: (planes) => this.#setPlanes(planes),
-    export: ({ format }) => this.#export(format),
+    export: (body) => this.#export(body),
     pyramid: ({ levels }) => this.#pyramid(levels),
     setAttractors: (attractors) => this.#setAttractors(attractors),
     quantity: (quantity) => this.#setQuantity(quantity),
@@ -289,8 +289,8 @@ class Session {
     this.#done = false;
   }
 
-  #export(format: MeshFormat): Uint8Array {
-    const bytes = this.#current().mesh.toBytes(format);
+  #export({ format, warnings }: ExportRequest): Uint8Array {
+    const bytes = this.#current().mesh.toBytes(format, { warnings });
     return withTransfer(bytes, [bytes]);
   }
 

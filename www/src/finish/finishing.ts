@@ -1,6 +1,7 @@
 import { RequestError } from '../channel';
 import type { MeshFormat } from '../protocol';
 import { text } from '../texts';
+import type { Warning } from '../warnings';
 import { FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';
 
@@ -88,8 +89,8 @@ export class Finishing {
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */
-  exported(format: MeshFormat): Promise<Uint8Array> | undefined {
-    return this.#edited?.log.length ? this.#client?.request('export', format) : undefined;
+  exported(format: MeshFormat, warnings: readonly Warning[]): Promise<Uint8Array> | undefined {
+    return this.#edited?.log.length ? this.#client?.request('export', { format, warnings }) : undefined;
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

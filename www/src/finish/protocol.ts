@@ -1,5 +1,5 @@
 /** Messages between the page and the worker that edits and compares surfaces after a run. */
-import type { Measures, MeshFormat, NamedBytes, Surface, Vec3 } from '../protocol';
+import type { ExportRequest, Measures, NamedBytes, Surface, Vec3 } from '../protocol';
 
 /** One edit of a surface: the name of a method of `Mesh`, and its arguments by name. */
 export type Edit =
@@ -66,7 +66,7 @@ export interface Requests {
   edit: { body: Edit; reply: Edited };
   undo: { body: undefined; reply: Edited };
   redo: { body: undefined; reply: Edited };
-  export: { body: MeshFormat; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
   /** Cross-section of the surface with a plane: pairs of points. */
   section: { body: { origin: Vec3; normal: Vec3 }; reply: Float32Array };
   /** Distances between two points, straight and along the surface; the latter is Infinity between two components. */

@@ -156,7 +156,7 @@ const handlers: Handlers<Requests> = {
   edit,
   undo: () => travel(-1),
   redo: () => travel(1),
-  export: (format) => current().mesh.toBytes(format),
+  export: ({ format, warnings }) => current().mesh.toBytes(format, { warnings }),
   section: ({ origin, normal }) => current().mesh.crossSection(origin, normal),
   measure,
   reference: readReference,

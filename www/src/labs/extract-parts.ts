@@ -1,7 +1,7 @@
 import type { Example } from '../examples';
 import { COVERAGE_GUIDE } from '../guides';
 import { isPreset, type Preset, type Variant, variantInForce } from '../presets';
-import type { Attractor, LargeSource, MeshFormat, ParamValues, Plane, VolumeView } from '../protocol';
+import type { Attractor, LargeSource, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { AttractorControls } from '../ui/attractors';
@@ -24,7 +24,7 @@ import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../ui/view-op
 import { Stage } from '../view/stage';
 import { type ExtractSource, frameOf } from './extract-opening';
 import { extractData, factsOf, unitOf } from './extract-page';
-import { type RunEvents, RunParts } from './lab-parts';
+import { type FetchMesh, type RunEvents, RunParts } from './lab-parts';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 
@@ -67,13 +67,7 @@ export class ExtractParts extends RunParts<Example> {
   readonly #log = new EventLog();
   readonly #compareHolder: HTMLDetailsElement;
 
-  constructor(
-    root: HTMLElement,
-    history: History,
-    fetchMesh: (format: MeshFormat) => Promise<Uint8Array>,
-    signal: AbortSignal,
-    events: PartEvents,
-  ) {
+  constructor(root: HTMLElement, history: History, fetchMesh: FetchMesh, signal: AbortSignal, events: PartEvents) {
     const large = new LargeSourceControls(events.onLarge);
     const frames = new FrameChoice(events.onFrame);
     const chooser = fileChooser(events.onFiles);
@@ -118,6 +112,7 @@ export class ExtractParts extends RunParts<Example> {
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
+    this.warnings.actions = { point: (point) => this.stage.goTo(point) };
     this.layOut({
       name: 'extract',
       options: this.options.element,
@@ -132,7 +127,7 @@ export class ExtractParts extends RunParts<Example> {
         this.paramsSection(true),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.measures.element),
+        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
         this.saveSection(this.stage.subject, this.#sculpt),
         ...this.finishSections(this.stage.editing, this.measures),
@@ -148,6 +143,7 @@ export class ExtractParts extends RunParts<Example> {
   adopt(volume: VolumeView, source: ExtractSource): void {
     const { example, unit = unitOf(volume) } = source;
     this.saving.name = volume.name;
+    this.warnings.showData(volume.warnings);
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
@@ -188,6 +184,7 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   showHistory(): void {
+    this.showRunWarnings();
     this.#plots.update();
     this.#times.update(this.history);
     this.csv.disabled = this.history.reports.length === 0;

@@ -34,7 +34,7 @@ export class ExtractLab extends RunLab<Example> {
     const ui = new ExtractParts(
       root,
       history,
-      (format) => client.request('export', { format }),
+      (format, warnings) => client.request('export', { format, warnings }),
       signal,
       this.#events(),
     );

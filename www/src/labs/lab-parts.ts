@@ -14,6 +14,8 @@ import { PicturePanel, type PictureSubject } from '../ui/pictures';
 import { type CodeEvents, SessionControls, type SessionEvents } from '../ui/session';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
+import { WarningList } from '../ui/warnings';
+import type { Warning } from '../warnings';
 import type { ExamplePanel, Listed } from './example-panel';
 import { Saving } from './saving';
 
@@ -46,10 +48,12 @@ interface PartsOptions<Example extends Listed> {
   sessionHelp?: string;
 }
 
+/** Returns the present surface as a file, with warnings besides those that it has itself. */
+export type FetchMesh = (format: MeshFormat, warnings: readonly Warning[]) => Promise<Uint8Array>;
+
 interface RunPartsOptions<Example extends Listed> extends PartsOptions<Example> {
   history: History;
-  /** Returns the present surface as a file. */
-  fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  fetchMesh: FetchMesh;
   /** Heading of the column of residuals in the data of the plots. */
   residual?: string;
 }
@@ -77,6 +81,8 @@ export abstract class LabParts<Example extends Listed> {
   readonly status = new StatusLine();
   readonly banner: ErrorBanner;
   readonly data: ExamplePanel<Example>;
+  /** What to know about data and result before relying on them. */
+  readonly warnings = new WarningList();
   readonly saving = new Saving((message) => this.status.say(message));
   /** Starts or continues the run, in labs whose model runs. */
   protected onRun: (() => void) | undefined;
@@ -204,7 +210,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected readonly exports: ExportButtons;
   readonly csv: HTMLButtonElement;
   protected readonly history: History;
-  readonly #fetchMesh: (format: MeshFormat) => Promise<Uint8Array>;
+  readonly #fetchMesh: FetchMesh;
   finish: Finish | undefined;
 
   constructor(
@@ -226,7 +232,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     });
     this.csv = h(
       'button',
-      { type: 'button', disabled: true, onclick: () => this.saving.plots(history, residual) },
+      { type: 'button', disabled: true, onclick: () => this.saving.plots(history, this.warnings.all, residual) },
       text('labs.plotData'),
     );
   }
@@ -242,7 +248,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
 
   /** Returns the surface, edited if it is, as a file. */
   surfaceFile(format: MeshFormat): Promise<Uint8Array> {
-    return this.finish?.exported(format) ?? this.#fetchMesh(format);
+    const warnings = this.surfaceWarnings;
+    return this.finish?.exported(format, warnings) ?? this.#fetchMesh(format, warnings);
   }
 
   protected override saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
@@ -256,9 +263,15 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected finishSections(view: EditedView, measures: MeasurePanel, onOpen = () => {}): HTMLElement[] {
     const mesh = () => {
       onOpen();
-      return this.#fetchMesh('ply');
+      return this.#fetchMesh('ply', []);
     };
-    this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
+    this.finish = new Finish({
+      mesh,
+      view,
+      measures,
+      warnings: () => this.surfaceWarnings,
+      save: (...file) => this.saving.bytes(...file),
+    });
     return this.finish.elements;
   }
 
@@ -277,6 +290,16 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
 
   dispose(): void {
     this.finish?.close();
+  }
+
+  /** The warnings that concern the surface shown. */
+  protected get surfaceWarnings(): readonly Warning[] {
+    return this.warnings.all;
+  }
+
+  /** Shows the warnings of the last report of the run. */
+  protected showRunWarnings(): void {
+    this.warnings.showReport(this.history.reports.at(-1));
   }
 
   /** Added to the names of saved surfaces, to distinguish several of the same data. */

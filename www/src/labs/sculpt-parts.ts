@@ -54,7 +54,7 @@ export class SculptParts extends RunParts<SculptExample> {
       drop: text('sculpt.drop'),
       data: sceneData(fileChooser(events.onFiles, ACCEPT), events.onExample),
       history,
-      fetchMesh: (format) => client.request('export', { format }),
+      fetchMesh: (format, warnings) => client.request('export', { format, warnings }),
       residual: 'unrest',
     });
     this.#onError = events.onError;
@@ -79,7 +79,7 @@ export class SculptParts extends RunParts<SculptExample> {
         this.paramsSection(),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.measures.element),
+        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
         this.saveSection(this.view.subject),
         ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
@@ -89,11 +89,12 @@ export class SculptParts extends RunParts<SculptExample> {
 
   /** Shows a newly opened scene: meshes with their texture, ellipsoids and facts. */
   adopt(
-    { box, start, pose, detail, bands, buildMs, texture }: OpenedScene,
+    { box, start, pose, detail, bands, buildMs, texture, warnings }: OpenedScene,
     example: SculptExample | undefined,
     name: string,
   ): void {
     this.saving.name = example?.id ?? name;
+    this.warnings.showData(warnings);
     this.measures.unit = '';
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);

@@ -78,7 +78,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#editing = new SegmentEditing(this.client, {
       onLabels: () => this.#showLabels(),
       onVoxels: () => ui.view.showLabels(),
-      onUpdate: (update, smooth) => this.#take(update, smooth),
+      onUpdate: (update, smooth) => {
+        ui.warnings.showReport(update);
+        this.#take(update, smooth);
+      },
       onBusy: () => states.setModelState('running'),
       onNothing: (reason) => {
         this.#isUnfilled = true;
@@ -218,6 +221,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #showAll(opened: OpenedLabels): void {
+    this.ui.warnings.showData(opened.warnings);
     this.#measures.clear();
     this.#released = undefined;
     this.#latency = {};
@@ -407,7 +411,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #saveSurfaces(format: SurfaceFormat): void {
-    const saving = saveSurfaces(format, this.client, this.ui.saving, this.#editing.labels, this.ui.view.surfaces());
+    const saving = saveSurfaces(format, this.client, this.ui, this.#editing.labels, this.ui.view.surfaces());
     this.ask(saving, text('segment.saveFailed'));
   }
 

@@ -8,6 +8,7 @@
 import type { Fitness } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
@@ -19,6 +20,7 @@ import type {
   StepReport,
   Surface,
   Vec3,
+  Warning,
 } from '../protocol';
 import type { RunLog } from '../worker/run-log';
 import type { PointShape } from './clouds';
@@ -31,6 +33,8 @@ export interface Cloud {
   normals?: Float32Array;
   /** Colours of the points, rgb in 0..1. */
   colors?: Float32Array;
+  /** What to know about the points before relying on them. */
+  warnings?: readonly Warning[];
 }
 
 /** The camera of a photograph that the points were computed from, with the photograph if there is one. */
@@ -139,7 +143,7 @@ export interface Requests extends CodeRequests {
    */
   setEdits: { body: Edits; reply: undefined };
   save: { body: undefined; reply: SavedSurface };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
   /**
    * Replies with the fitted function f sampled on a grid around the points, `size` voxels along the longest side, as
    * NIfTI, and with the level of f at which the surface is extracted.

@@ -9,6 +9,7 @@
 import type { ControlEllipsoid, MeshTexture } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
@@ -20,6 +21,7 @@ import type {
   StepReport,
   Surface,
   Vec3,
+  Warning,
 } from '../protocol';
 import type { RunLog } from '../worker/run-log';
 import type { Film } from './film';
@@ -82,6 +84,8 @@ export interface OpenedScene extends Ready {
   bands: number;
   /** The texture of the surface; undefined if it has none. */
   texture: MeshTexture | undefined;
+  /** What to know about the meshes before relying on them. */
+  warnings: readonly Warning[];
   /** Milliseconds spent building the model, most of them for its base. */
   buildMs: number;
 }
@@ -187,7 +191,7 @@ export interface Requests extends CodeRequests {
    */
   record: { body: { frameSeconds: number }; reply: Uint8Array | undefined };
   cancelRecord: { body: undefined; reply: undefined };
-  export: { body: { format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

@@ -3,7 +3,17 @@
  * other's code.
  */
 import type { MeshFormat, VolumeFormat } from 'vesicle';
-import type { FailureEvent, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeView } from '../protocol';
+import type {
+  ExportRequest,
+  FailureEvent,
+  NamedBytes,
+  ParamSpec,
+  ParamValues,
+  Surface,
+  Vec3,
+  VolumeView,
+  Warning,
+} from '../protocol';
 import type { KnownLabel, Label } from './labels';
 
 export type { FailureEvent, MeshFormat, NamedBytes, ParamSpec, ParamValues, Surface, Vec3, VolumeFormat, VolumeView };
@@ -53,6 +63,8 @@ export interface SurfaceUpdate {
 /** The surfaces that have changed, after a step; `done` says whether they are smooth. */
 export interface StepUpdate extends SurfaceUpdate {
   done: boolean;
+  /** What to know about the surfaces before relying on them. */
+  warnings: readonly Warning[];
 }
 
 /** The open label map, with the surfaces of all its labels, which are not smooth yet. */
@@ -64,6 +76,8 @@ export interface OpenedLabels extends SurfaceUpdate {
   known: KnownLabel[];
   /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
   labelFile: string | undefined;
+  /** What to know about the volume and the label map before relying on them. */
+  warnings: readonly Warning[];
 }
 
 export interface OpenedImage extends OpenedLabels {
@@ -110,7 +124,7 @@ export interface Requests {
   /** Replies with the label map as a file, in the geometry of the volume; NRRD has names and colours of the labels, too. */
   exportMap: { body: { format: VolumeFormat; labels: readonly Label[] }; reply: Uint8Array };
   /** Replies with the surface of a label as a file. */
-  exportMesh: { body: { value: number; format: MeshFormat }; reply: Uint8Array };
+  exportMesh: { body: ExportRequest & { value: number }; reply: Uint8Array };
 }
 
 export type RequestKind = keyof Requests;

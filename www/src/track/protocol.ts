@@ -7,6 +7,7 @@
 import type { FrameStatistics } from 'vesicle';
 import type {
   CodeRequests,
+  ExportRequest,
   Failure,
   FailureEvent,
   Measures,
@@ -201,7 +202,7 @@ export interface Requests extends CodeRequests {
   view: { body: undefined; reply: VolumeView };
   /** Makes the worker send a state event, `done` or `paused`, to the page. */
   sendState: { body: undefined; reply: undefined };
-  export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
+  export: { body: ExportRequest & { frame: number }; reply: Uint8Array };
   /** Replies with all tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
   /** Tracks all frames with another setup, for comparison; replies with undefined if cancelled. */

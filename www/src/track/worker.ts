@@ -78,7 +78,7 @@ class Session {
     restore: (saved) => this.#restore(saved),
     view: () => this.#view(),
     sendState: () => this.#reportStopped(),
-    export: ({ frame, format }) => this.#export(frame, format),
+    export: (body) => this.#export(body),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => this.#comparison.stop(),
@@ -300,10 +300,10 @@ class Session {
     return toCode(this.#log.log, program, edits);
   }
 
-  #export(frame: number, format: Requests['export']['body']['format']): Uint8Array {
+  #export({ frame, format, warnings }: Requests['export']['body']): Uint8Array {
     const mesh = this.#current().meshAt(frame);
     try {
-      return mesh.toBytes(format);
+      return mesh.toBytes(format, { warnings });
     } finally {
       mesh.free();
     }
