@@ -2,7 +2,7 @@ import { checkProperties, denseCopy, invalid, number } from './check.js';
 import { type Mesh, meshHandle } from './mesh.js';
 import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
-import { mergedWarnings, notesOf } from './warning.js';
+import { mergedWarnings, notesOf } from './warnings.js';
 
 /**
  * Encodes a sequence of meshes as an animated glb (binary glTF), one mesh a frame. The meshes need not have the same

@@ -49,7 +49,7 @@ export interface VolumeInit {
   space?: Space;
   /** Length of a world unit, which NIfTI files state. Default unknown. */
   unit?: LengthUnit;
-  /** What the reader of the file noticed, for {@link Volume.warnings}; kinds of its own have the code `reader`. */
+  /** Findings of the file's reader, for {@link Volume.warnings}; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
 }
 
@@ -111,7 +111,7 @@ export interface MeshExtra {
   colors?: Float32Array;
   /** The image that texture coordinates refer to. */
   texture?: MeshTexture;
-  /** What the reader of the file noticed, for `Mesh.warnings`; kinds of its own have the code `reader`. */
+  /** Findings of the file's reader, for `Mesh.warnings`; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
 }
 
@@ -131,6 +131,6 @@ export interface PointData {
   normals?: Float32Array;
   /** Colours, 0..1, if the file has them. */
   colors?: Float32Array;
-  /** What the reader of the file noticed, if anything. */
+  /** Findings of the file's reader, if there are any. */
   warnings?: readonly Warning[];
 }

@@ -27,7 +27,7 @@ import {
 } from './stepper.js';
 import { RawDeformable, RawStart, type RawVolume } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
-import { ModelWarnings } from './warning.js';
+import { ModelWarnings } from './warnings.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {

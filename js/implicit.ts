@@ -5,7 +5,8 @@ import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawCameras, RawImplicit } from './vesicle.js';
 import { type Volume, withWarnings, wrapVolume } from './volume.js';
-import { checkedWarnings, ModelWarnings, type Warning } from './warning.js';
+import type { Warning } from './warning.js';
+import { checkedWarnings, ModelWarnings } from './warnings.js';
 
 /**
  * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. The unit of
@@ -98,7 +99,7 @@ export interface ImplicitOptions {
   keepComponents?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
-  /** What the reader of the points noticed, for the `warnings` of the mesh; kinds of its own have the code `reader`. */
+  /** Findings of the points' reader, for the `warnings` of the mesh; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
 }
 

@@ -5,7 +5,7 @@ import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawLabelSurfaces } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
-import { ModelWarnings } from './warning.js';
+import { ModelWarnings } from './warnings.js';
 
 /** Parameters of {@link LabelSurfaces}; `paramSpecs('labels')` has their ranges, defaults and descriptions. */
 export interface LabelParams {

@@ -19,7 +19,8 @@ import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
-import { checkedWarnings, mergedWarnings, notesOf, type Warning } from './warning.js';
+import type { Warning } from './warning.js';
+import { checkedWarnings, mergedWarnings, notesOf } from './warnings.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -321,7 +322,7 @@ export class Mesh {
   }
 
   /**
-   * What to know about the mesh before relying on it; empty if there is nothing. The mesh of a model has the warnings of
+   * Warnings: things to know about the mesh before relying on it; empty if there are none. The mesh of a model has those of
    * its data and of its last report (after `restore`, of the next one), the mesh of a file those of its reader; copies
    * and edits keep them, and {@link Mesh.toBytes} writes them.
    */

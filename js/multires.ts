@@ -4,7 +4,7 @@ import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawMultires, TriangleCopy } from './vesicle.js';
-import { ModelWarnings } from './warning.js';
+import { ModelWarnings } from './warnings.js';
 
 /**
  * A solid ellipsoid that supports the low-frequency surface of a {@link MultiresolutionModel} and drives its

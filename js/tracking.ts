@@ -5,7 +5,7 @@ import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawTracker, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
-import { ModelWarnings, notesOf } from './warning.js';
+import { ModelWarnings, notesOf } from './warnings.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {

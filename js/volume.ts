@@ -18,7 +18,8 @@ import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
-import { checkedWarnings, placeOf, type Warning } from './warning.js';
+import type { Warning } from './warning.js';
+import { checkedWarnings, placeOf } from './warnings.js';
 
 const INIT = [
   ...['data', 'dims', 'affine', 'spacing', 'origin'],
@@ -167,7 +168,7 @@ export class Volume {
   }
 
   /**
-   * What to know about the volume before relying on it; empty if there is nothing. A volume made from this one has those
+   * Warnings: things to know about the volume before relying on it; empty if there are none. A volume made from this one has those
    * that still hold for it.
    */
   get warnings(): Warning[] {

@@ -75,8 +75,7 @@ codes! {
     Precision = "precision",
     /// The surface was moved towards the origin, since where it is it could not be represented.
     Recentred = "recentred",
-    /// Voxels of the volume are so much longer along one axis than along the others that the shape between the slices is
-    /// a guess.
+    /// Voxels of the volume are far longer along one axis than along the others: the shape between the slices is a guess.
     Anisotropic = "anisotropic",
     /// Something that the reader of the file noticed: an assumption that it made, or a part that it left out.
     Reader = "reader",

@@ -9,7 +9,8 @@ import { invalid } from '../check.js';
 import type { VolumeInit, VoxelArray } from '../data.js';
 import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
-import { mergedWarnings, type Warning } from '../warning.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { affineOf, MeshReader, polygons, voxels } from './source.js';
 
@@ -114,7 +115,7 @@ export class CornerstoneSurfaces {
     return this.#map.surfaces.labels;
   }
 
-  /** What to know about the surfaces before relying on them; empty if there is nothing. */
+  /** Warnings about the surfaces; empty if there are none. */
   get warnings(): Warning[] {
     return mergedWarnings(...this.segments.map((one) => this.mesh(one).warnings));
   }

@@ -90,8 +90,8 @@ export class NiivueSurface {
   }
 
   /**
-   * What to know about the surface before relying on it: the warnings of the mesh, and `recentred` if it is shown where
-   * the mesh is not; empty if there is nothing.
+   * Warnings about the surface: those of the mesh, and `recentred` if it is shown where the mesh is not; empty if there are
+   * none.
    */
   get warnings(): Warning[] {
     const { warnings } = this.#reader;

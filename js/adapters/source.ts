@@ -13,7 +13,7 @@ export interface MeshSource {
   readonly topologyVersion: number;
   /** Counter that increases when any vertex moves, so that adapters know when to update the positions. */
   readonly geometryVersion: number;
-  /** What to know about the surface before relying on it, for the `warnings` of the adapter. */
+  /** Warnings about the surface, for the `warnings` of the adapter. */
   readonly warnings?: readonly Warning[];
   /**
    * Returns the surface in its present state; if positions are to be `relative`, they may be so to the `origin` that is
@@ -79,7 +79,7 @@ export class MeshReader {
     return { ...frame, origin, topology };
   }
 
-  /** What to know about the mesh last read. */
+  /** Warnings of the mesh last read. */
   get warnings(): Warning[] {
     return [...this.#warnings];
   }

@@ -187,7 +187,7 @@ export class ThreeSurface {
     this.#reader = new MeshReader(options.space, options.worldSpace, typeof object.position?.set === 'function');
   }
 
-  /** What to know about the mesh of the last update before relying on it; empty if there is nothing. */
+  /** Warnings of the mesh of the last update; empty if there are none. */
   get warnings(): Warning[] {
     return this.#reader.warnings;
   }

@@ -4,7 +4,8 @@ import type { Space, VoxelArray } from '../data.js';
 import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
 import type { Volume } from '../volume.js';
-import { mergedWarnings, type Warning } from '../warning.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { type VtkImage, volumeFromVtk } from './vtk-image.js';
 import { type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
@@ -65,7 +66,7 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
     return this.#surfaceOf(label).polyData;
   }
 
-  /** What to know about the surfaces before relying on them; empty if there is nothing. */
+  /** Warnings about the surfaces; empty if there are none. */
   get warnings(): Warning[] {
     return mergedWarnings(...this.labels.map((one) => this.mesh(one).warnings));
   }

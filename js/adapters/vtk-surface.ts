@@ -72,7 +72,7 @@ export class VtkSurface<P extends VtkPolyData> {
     this.polyData.getPointData().setNormals(this.#normals);
   }
 
-  /** What to know about the mesh of the last update before relying on it; empty if there is nothing. */
+  /** Warnings of the mesh of the last update; empty if there are none. */
   get warnings(): Warning[] {
     return this.#reader.warnings;
   }

@@ -2,7 +2,8 @@
 import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
-import { mergedWarnings, type Warning } from '../warning.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import init, { type Stepper, type Vec3 } from '../worker.js';
 import { fetched, json, MODELS, type ModelWithView, parseStart } from './models.js';
 import { STYLE } from './style.js';
@@ -59,7 +60,7 @@ export class VesicleLab extends HTMLElement {
     return this.#model;
   }
 
-  /** What to know about the result so far before relying on it; empty if there is nothing. */
+  /** Warnings about data and result so far; empty if there are none. */
   get warnings(): readonly Warning[] {
     return this.#warnings;
   }

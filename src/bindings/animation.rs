@@ -19,9 +19,9 @@ impl RawAnimation {
         RawAnimation::default()
     }
 
-    /// Adds notes for the reader of the file, each `code: text`.
-    pub fn note(&mut self, notes: Vec<String>) {
-        self.0.note(&notes);
+    /// Sets notes for the reader of the file: lines `code: text`.
+    pub fn note(&mut self, notes: &str) {
+        self.0.note(notes);
     }
 
     /// Appends a frame that shows a mesh in its current state.

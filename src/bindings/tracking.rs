@@ -104,11 +104,11 @@ impl RawTracker {
     }
 
     /// Returns the surfaces of the finished frames as the bytes of an animated GLB in which each lasts `frame_seconds`. Each
-    /// of the `notes` for the reader of the file is `code: text`.
+    /// line of `notes` for the reader of the file is `code: text`.
     #[wasm_bindgen(js_name = toGlb)]
-    pub fn to_glb(&self, frame_seconds: f64, notes: Vec<String>) -> Result<Vec<u8>, JsValue> {
+    pub fn to_glb(&self, frame_seconds: f64, notes: &str) -> Result<Vec<u8>, JsValue> {
         let mut animation = AnimationWriter::default();
-        animation.note(&notes);
+        animation.note(notes);
         let tracker = self.0.borrow();
         tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
         Ok(animation.finish(frame_seconds).map_err(Failure::from)?)

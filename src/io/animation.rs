@@ -46,9 +46,9 @@ pub struct AnimationWriter {
 }
 
 impl AnimationWriter {
-    /// Adds notes for the reader of the file, as [`write_noted_mesh`](super::write_noted_mesh) writes them.
-    pub fn note(&mut self, notes: &[String]) {
-        self.parts.notes.extend_from_slice(notes);
+    /// Sets notes for the reader of the file, as [`write_noted_mesh`](super::write_noted_mesh) writes them.
+    pub fn note(&mut self, notes: &str) {
+        self.parts.notes = String::from(notes);
     }
 
     /// Appends a frame that shows `mesh`.

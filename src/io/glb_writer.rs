@@ -17,8 +17,8 @@ const INDICES: Option<u32> = Some(34963);
 ///
 /// # Errors
 /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
-pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Result<Vec<u8>, MeshError> {
-    let mut parts = DocumentBuilder { notes: notes.to_vec(), ..DocumentBuilder::default() };
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Result<Vec<u8>, MeshError> {
+    let mut parts = DocumentBuilder { notes: String::from(notes), ..DocumentBuilder::default() };
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
@@ -47,7 +47,7 @@ pub(super) struct DocumentBuilder {
     textures: Vec<Arc<Texture>>,
     images: Vec<String>,
     /// Notes for the reader of the file, in `extras` of the asset.
-    pub(super) notes: Vec<String>,
+    pub(super) notes: String,
 }
 
 impl DocumentBuilder {

@@ -163,20 +163,16 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
 /// single precision only, where that is too coarse for the mesh; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
 /// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
-    write_noted_mesh(mesh, format, &[])
+    write_noted_mesh(mesh, format, "")
 }
 
 /// Returns the bytes of a file as [`write_mesh`] does, with notes for the reader of the file, which programs ignore: comment
 /// lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of STL; MZ3 has no
-/// room for any. A note is `code: text`, of which STL only has the code.
+/// room for any. Each line of `notes` is one, `code: text`, of which STL has only the code.
 ///
 /// # Errors
 /// As [`write_mesh`].
-pub fn write_noted_mesh(
-    mesh: &TriangleMesh,
-    format: MeshFormat,
-    notes: &[String],
-) -> Result<Vec<u8>, MeshError> {
+pub fn write_noted_mesh(mesh: &TriangleMesh, format: MeshFormat, notes: &str) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
     let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {

@@ -199,8 +199,8 @@ fn numbers<'a>(
 }
 
 /// Returns the text of an OBJ file of the mesh, with numbers in the shortest form that reads back exactly.
-pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Vec<u8> {
-    let mut text: String = comments(notes).map(|note| format!("# {note}\n")).collect();
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
+    let mut text = comments(notes, "# warning ", "\n");
     text.push_str("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
         if mesh.origin == DVec3::ZERO {

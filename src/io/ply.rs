@@ -422,7 +422,7 @@ impl Reader {
 
 /// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits, and positions in double
 /// precision if the mesh has an origin.
-pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Vec<u8> {
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
     let mut out = header(mesh, notes).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {
         if is_double(mesh) {
@@ -456,9 +456,9 @@ fn is_double(mesh: &TriangleMesh) -> bool {
     mesh.origin != DVec3::ZERO
 }
 
-fn header(mesh: &TriangleMesh, notes: &[String]) -> String {
-    let mut lines = vec!["ply".into(), "format binary_little_endian 1.0".into()];
-    lines.extend(comments(notes).map(|note| format!("comment {note}")));
+fn header(mesh: &TriangleMesh, notes: &str) -> String {
+    let comments = comments(notes, "\ncomment warning ", "");
+    let mut lines = vec!["ply".into(), format!("format binary_little_endian 1.0{comments}")];
     let properties = |lines: &mut Vec<String>, kind: &str, names: &[&str]| {
         lines.extend(names.iter().map(|name| format!("property {kind} {name}")));
     };

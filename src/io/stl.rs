@@ -102,7 +102,7 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
 ///
 /// # Errors
 /// [`MeshError::Precision`] if single precision is too coarse for the mesh where it is in world space.
-pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Result<Vec<u8>, MeshError> {
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Result<Vec<u8>, MeshError> {
     let positions = mesh.world_positions()?;
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.

@@ -8,7 +8,7 @@ use crate::mesh::TriangleMesh;
 
 /// Returns the text of a VTP file of the mesh with points and triangles; normals, texture coordinates and colours are
 /// point data, for which vertices on texture seams are duplicated.
-pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Vec<u8> {
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {
         split = mesh.split_at_seams();
@@ -17,8 +17,7 @@ pub(super) fn write(mesh: &TriangleMesh, notes: &[String]) -> Vec<u8> {
         mesh
     };
     let mut xml = String::from("<?xml version=\"1.0\"?>\n");
-    // XML has no two hyphens in comments.
-    comments(notes).for_each(|note| xml += &format!("<!-- {} -->\n", note.replace("--", "- -")));
+    xml += &comments(notes, "<!-- warning ", " -->\n");
     xml += "<VTKFile type=\"PolyData\" version=\"1.0\" ";
     xml += "byte_order=\"LittleEndian\" header_type=\"UInt32\">\n<PolyData>\n";
     xml += &format!(

@@ -32,7 +32,7 @@ impl Volume {
         self
     }
 
-    /// Returns a warning of this volume as it holds for one that is made of it; `None` if it no longer does.
+    /// Returns a warning of this volume for one that is made of it; `None` if it no longer holds.
     fn kept(&self, warning: &Warning, how: Derivation) -> Option<Warning> {
         let holds = match how {
             Derivation::Same | Derivation::Interpolated | Derivation::Frame(_) => true,
@@ -77,7 +77,7 @@ impl Volume {
         self
     }
 
-    /// Returns a warning of this volume as it is about a sequence in which the frames of this one begin at `first`.
+    /// Returns a warning of this volume for a sequence in which the frames of this one begin at `first`.
     fn moved(&self, warning: &Warning, first: usize) -> Vec<Warning> {
         let frames = match warning.place {
             Some(Place::Frame(frame)) => frame as usize..frame as usize + 1,

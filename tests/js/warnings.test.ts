@@ -1,7 +1,7 @@
-// What a result that is given says of itself: warnings of volumes, meshes and models, in files, and in a worker.
+// Warnings of volumes, meshes and models, in files, and in a worker.
 import { expect, test } from 'vitest';
 import { ThreeSurface } from '../../pkg/adapters/three.js';
-import { parseVolume } from '../../pkg/import/index.js';
+import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import {
   animationGlb,
   DeformableModel,
@@ -73,7 +73,16 @@ test('the mesh of a model has the warnings of its data', () => {
   expect(model.mesh.warnings).toEqual([LONG, ...warnings.filter(({ code }) => code !== LONG.code)]);
   const sphere = Mesh.icosphere([0, 0, 0], 1, 0.5).arrays();
   const detail = Mesh.fromArrays(sphere.positions, sphere.indices, { warnings: [CORNER] });
-  const ellipsoids = [{ center: [0, 0, 0] as [number, number, number], axes: [0.5, 0.5, 0.5] }];
+  const ellipsoids = [
+    {
+      center: [0, 0, 0],
+      axes: [
+        [0.5, 0, 0],
+        [0, 0.5, 0],
+        [0, 0, 0.5],
+      ],
+    },
+  ];
   expect(new MultiresolutionModel({ detail, ellipsoids } as never).mesh.warnings).toEqual([CORNER]);
 });
 
@@ -103,7 +112,8 @@ test('files of a mesh have its warnings and those given, and are read as without
   }
 });
 
-test('what has no warnings is as ever', () => {
+test('what has no warnings is as ever', async () => {
+  await startReaders();
   const none = ball(16, 5);
   const model = new DeformableModel({ volume: none, params: { iso: 100 } });
   expect([none.warnings, model.step(5).warnings, model.mesh.warnings]).toEqual([[], [], []]);

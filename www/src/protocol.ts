@@ -120,7 +120,7 @@ export interface VolumeView extends LevelView {
   /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
-  /** What to know about the volume before relying on it. */
+  /** Warnings about the volume. */
   warnings: readonly Warning[];
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
@@ -219,7 +219,7 @@ export interface RunCode {
 export interface ExportRequest {
   format: MeshFormat;
   /** Warnings that the file is to have in comments, besides those of the mesh. */
-  warnings: readonly Warning[];
+  warnings?: readonly Warning[];
 }
 
 /** Requests of the page to the workers of all labs whose model runs. */

@@ -143,7 +143,7 @@ export class ExtractParts extends RunParts<Example> {
   adopt(volume: VolumeView, source: ExtractSource): void {
     const { example, unit = unitOf(volume) } = source;
     this.saving.name = volume.name;
-    this.warnings.showData(volume.warnings);
+    this.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;

@@ -81,7 +81,7 @@ export abstract class LabParts<Example extends Listed> {
   readonly status = new StatusLine();
   readonly banner: ErrorBanner;
   readonly data: ExamplePanel<Example>;
-  /** What to know about data and result before relying on them. */
+  /** Warnings about data and result. */
   readonly warnings = new WarningList();
   readonly saving = new Saving((message) => this.status.say(message));
   /** Starts or continues the run, in labs whose model runs. */
@@ -293,7 +293,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   }
 
   /** The warnings that concern the surface shown. */
-  protected get surfaceWarnings(): readonly Warning[] {
+  get surfaceWarnings(): readonly Warning[] {
     return this.warnings.all;
   }
 

@@ -146,7 +146,7 @@ export class TrackParts extends RunParts<TrackExample> {
     this.#thresholdHolder.replaceWith(this.#threshold.element);
   }
 
-  protected override get surfaceWarnings(): readonly Warning[] {
+  override get surfaceWarnings(): readonly Warning[] {
     return concerning(super.surfaceWarnings, { frame: this.frames.frame });
   }
 

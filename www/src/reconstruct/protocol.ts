@@ -33,7 +33,7 @@ export interface Cloud {
   normals?: Float32Array;
   /** Colours of the points, rgb in 0..1. */
   colors?: Float32Array;
-  /** What to know about the points before relying on them. */
+  /** Warnings about the points. */
   warnings?: readonly Warning[];
 }
 

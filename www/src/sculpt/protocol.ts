@@ -84,7 +84,7 @@ export interface OpenedScene extends Ready {
   bands: number;
   /** The texture of the surface; undefined if it has none. */
   texture: MeshTexture | undefined;
-  /** What to know about the meshes before relying on them. */
+  /** Warnings about the meshes. */
   warnings: readonly Warning[];
   /** Milliseconds spent building the model, most of them for its base. */
   buildMs: number;

@@ -63,7 +63,7 @@ export interface SurfaceUpdate {
 /** The surfaces that have changed, after a step; `done` says whether they are smooth. */
 export interface StepUpdate extends SurfaceUpdate {
   done: boolean;
-  /** What to know about the surfaces before relying on them. */
+  /** Warnings about the surfaces. */
   warnings: readonly Warning[];
 }
 
@@ -76,7 +76,7 @@ export interface OpenedLabels extends SurfaceUpdate {
   known: KnownLabel[];
   /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
   labelFile: string | undefined;
-  /** What to know about the volume and the label map before relying on them. */
+  /** Warnings about the volume and the label map. */
   warnings: readonly Warning[];
 }
 

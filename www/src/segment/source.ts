@@ -27,7 +27,7 @@ export interface OpenMap {
   known: KnownLabel[];
   /** Name of its file, with a note if there is something to say of it; undefined if it has none. */
   file: string | undefined;
-  /** What to know about the map before relying on it. */
+  /** Warnings about the map. */
   warnings: readonly Warning[];
 }
 

@@ -7,10 +7,13 @@ const TRIANGLE = 'M12 2 1 21h22L12 2Zm-1 7h2v6h-2V9Zm0 8h2v2h-2v-2Z';
 /** Number of warnings from which on the list may scroll, and can be reached by the keyboard to do so. */
 const LONG = 4;
 
+/** Kinds that are about a result, and not about data. */
+const OF_RESULTS: readonly string[] = ['begins-in-frame', 'ends-in-frame', 'thin-label'];
+
 /** A report of a run, of which only the warnings matter. */
 type Report = { warnings?: readonly Warning[] };
 
-/** What a click on the place of a warning does, by the kind of place; others are shown as text. */
+/** Actions of a click on the place of a warning, by the kind of place; others are shown as text. */
 export interface PlaceActions {
   frame?: (frame: number) => void;
   label?: (label: number) => void;
@@ -18,7 +21,7 @@ export interface PlaceActions {
 }
 
 /**
- * What to know about the data and the result before relying on them: a list beside the measures of every lab, hidden
+ * Warnings about the data and the result: a list beside the measures of every lab, hidden
  * while it is empty. A warning is announced to screen readers once, when it appears.
  */
 export class WarningList {
@@ -49,8 +52,8 @@ export class WarningList {
   }
 
   /** Shows the warnings of the data that are open. */
-  showData(warnings: readonly Warning[] = []): void {
-    this.#data = warnings;
+  showData(...lists: (readonly Warning[] | undefined)[]): void {
+    this.#data = lists.flatMap((list) => list ?? []);
     this.#restored = [];
     this.#update();
   }
@@ -59,11 +62,11 @@ export class WarningList {
   showReport(report: Report | undefined): void {
     if (report === this.#report) return;
     this.#report = report;
-    this.#restored = [];
+    this.#restored = this.#restored.filter(({ code }) => !OF_RESULTS.includes(code));
     this.#update();
   }
 
-  /** Shows the warnings of a session, until there is another report. */
+  /** Shows the warnings of a session: those of results until there is another report, all until other data are open. */
   restore(warnings: readonly Warning[]): void {
     this.#restored = warnings;
     this.#update();
