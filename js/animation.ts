@@ -2,6 +2,7 @@ import { checkProperties, denseCopy, invalid, number } from './check.js';
 import { type Mesh, meshHandle } from './mesh.js';
 import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
+import { mergedWarnings, notesOf } from './warnings.js';
 
 /**
  * Encodes a sequence of meshes as an animated glb (binary glTF), one mesh a frame. The meshes need not have the same
@@ -10,7 +11,7 @@ import { RawAnimation } from './vesicle.js';
  *
  * Frames equal to the previous one are stored once, and so are equal textures. Each stored frame takes 24 bytes a
  * vertex and 12 a triangle, plus 8 bytes a vertex with texture coordinates and 12 with colours; all of it is in memory
- * twice at the end.
+ * twice at the end. The warnings of all meshes are written as by {@link Mesh.toBytes}, each once.
  *
  * @param frames - At least one. The live mesh of a model has only the present state of the model: add a `clone()` of it
  *   for each frame.
@@ -26,7 +27,9 @@ export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: 
   if (meshes.length === 0) throw invalid('frames', 'must contain at least one Mesh');
   const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
   const animation = call(() => new RawAnimation());
+  const notes = notesOf(mergedWarnings(...meshes.map(({ warnings }) => warnings)));
   try {
+    animation.note(notes);
     for (const handle of handles) handle.use((mesh) => animation.add(mesh));
   } catch (error) {
     call(() => animation.free());

@@ -1,4 +1,5 @@
 // Volumes, meshes and points as plain data: what is passed between modules, and to and from other libraries.
+import type { Warning } from './warning.js';
 
 /** Three numbers: a point, a direction, or one number for each of x, y and z. */
 export type Vec3 = [number, number, number];
@@ -48,6 +49,8 @@ export interface VolumeInit {
   space?: Space;
   /** Length of a world unit, which NIfTI files state. Default unknown. */
   unit?: LengthUnit;
+  /** Findings of the file's reader, for {@link Volume.warnings}; kinds of its own have the code `reader`. */
+  warnings?: readonly Warning[];
 }
 
 /**
@@ -108,6 +111,8 @@ export interface MeshExtra {
   colors?: Float32Array;
   /** The image that texture coordinates refer to. */
   texture?: MeshTexture;
+  /** Findings of the file's reader, for `Mesh.warnings`; kinds of its own have the code `reader`. */
+  warnings?: readonly Warning[];
 }
 
 /** The content of a mesh file: the arguments of `Mesh.fromArrays`. */
@@ -126,4 +131,6 @@ export interface PointData {
   normals?: Float32Array;
   /** Colours, 0..1, if the file has them. */
   colors?: Float32Array;
+  /** Findings of the file's reader, if there are any. */
+  warnings?: readonly Warning[];
 }

@@ -27,6 +27,7 @@ import {
 } from './stepper.js';
 import { RawDeformable, RawStart, type RawVolume } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
+import { ModelWarnings } from './warnings.js';
 
 /** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {
@@ -205,6 +206,7 @@ export class DeformableModel implements Stepper {
   readonly #volume: Handle<RawVolume> | undefined;
   readonly #sparse: SparseParts | undefined;
   readonly #runner = new Runner();
+  readonly #warnings: ModelWarnings;
 
   /**
    * Creates a model with its initial surface, ready to step.
@@ -224,7 +226,9 @@ export class DeformableModel implements Stepper {
       this.#handle = onDense(this.#volume, options, params);
     }
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
-    this.#mesh = wrapMesh(this.#meshHandle, true);
+    const start = options.start instanceof Mesh ? options.start.warnings : [];
+    this.#warnings = new ModelWarnings(source ? [] : (options.volume as Volume).warnings, start);
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of());
   }
 
   /**
@@ -296,7 +300,7 @@ export class DeformableModel implements Stepper {
 
   #step(iterations: number): StepReport {
     const report = this.#handle.use((raw) => raw.step(iterations) as StepReport | { needs: SparseBox[] });
-    if (!('needs' in report)) return report;
+    if (!('needs' in report)) return this.#warnings.take(report);
     throw new NeedsDataError((options) => this.#load(report.needs, options));
   }
 
@@ -322,7 +326,7 @@ export class DeformableModel implements Stepper {
    */
   seed(): StepReport {
     this.#runner.refuseWhileRunning('seed');
-    return this.#handle.use((raw) => raw.seed() as StepReport);
+    return this.#warnings.take(this.#handle.use((raw) => raw.seed() as StepReport));
   }
 
   /**
@@ -406,6 +410,7 @@ export class DeformableModel implements Stepper {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
+    this.#warnings.forget();
   }
 
   /** Frees the memory; the model and its live mesh cannot be used afterwards. */

@@ -4,7 +4,9 @@ import { type Mesh, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawCameras, RawImplicit } from './vesicle.js';
-import { type Volume, wrapVolume } from './volume.js';
+import { type Volume, withWarnings, wrapVolume } from './volume.js';
+import type { Warning } from './warning.js';
+import { checkedWarnings, ModelWarnings } from './warnings.js';
 
 /**
  * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. The unit of
@@ -97,6 +99,8 @@ export interface ImplicitOptions {
   keepComponents?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
+  /** Findings of the points' reader, for the `warnings` of the mesh; kinds of its own have the code `reader`. */
+  warnings?: readonly Warning[];
 }
 
 /** Manual edits of the points of an {@link ImplicitSurface}, for {@link ImplicitSurface.setEdits}. */
@@ -141,7 +145,7 @@ interface Statistics {
 
 const OPTIONS = [
   ...['points', 'normals', 'confidence', 'colors', 'exterior', 'cameras'],
-  ...['maxPoints', 'keepComponents', 'params'],
+  ...['maxPoints', 'keepComponents', 'params', 'warnings'],
 ];
 
 /**
@@ -160,6 +164,7 @@ export class ImplicitSurface implements Stepper {
   readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
   readonly #mesh: Mesh;
   readonly #runner = new Runner();
+  readonly #warnings: ModelWarnings;
 
   /**
    * Creates a surface from points; the work begins with the first step.
@@ -171,7 +176,8 @@ export class ImplicitSurface implements Stepper {
     const known = checked(given);
     this.#handle = new Handle('ImplicitSurface', () => rawSurface(known));
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
-    this.#mesh = wrapMesh(this.#meshHandle, true);
+    this.#warnings = new ModelWarnings(known.warnings);
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of());
   }
 
   /**
@@ -250,7 +256,7 @@ export class ImplicitSurface implements Stepper {
   }
 
   #step(iterations: number): StepReport {
-    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+    return this.#warnings.take(this.#handle.use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -336,7 +342,8 @@ export class ImplicitSurface implements Stepper {
    * the extraction continues, and during colouring all of it; empty in other phases.
    */
   preview(): Mesh {
-    return wrapMesh(new Handle('Mesh', () => this.#handle.use((raw) => raw.preview())));
+    const warnings = this.#warnings.of();
+    return wrapMesh(new Handle('Mesh', () => this.#handle.use((raw) => raw.preview())), false, () => warnings);
   }
 
   /**
@@ -348,7 +355,8 @@ export class ImplicitSurface implements Stepper {
    */
   toVolume(dims: Vec3): Volume {
     const sizes = Uint32Array.from(numbers('dims', dims, 3), (size) => integer('dims', size, { min: 2, max: 4096 }));
-    return wrapVolume(() => this.#handle.use((raw) => raw.toVolume(sizes)));
+    const warnings = this.#warnings.of();
+    return wrapVolume(() => this.#handle.use((raw) => withWarnings(raw.toVolume(sizes), warnings)));
   }
 
   /**
@@ -379,6 +387,7 @@ export class ImplicitSurface implements Stepper {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
+    this.#warnings.forget();
   }
 
   /** Frees the memory; the model and its live mesh cannot be used afterwards. */
@@ -402,7 +411,9 @@ function checked(given: ImplicitOptions): ImplicitOptions {
   if (known.exterior !== undefined) pointArray('exterior', known.exterior);
   if (known.maxPoints !== undefined) integer('maxPoints', known.maxPoints);
   if (known.keepComponents !== undefined) integer('keepComponents', known.keepComponents, { min: 1 });
-  return { ...known, cameras: checkedCameras(known.cameras ?? []), params: shallowCopy('params', known.params ?? {}) };
+  const warnings = checkedWarnings('warnings', known.warnings);
+  const [cameras, params] = [checkedCameras(known.cameras ?? []), shallowCopy('params', known.params ?? {})];
+  return { ...known, cameras, params, warnings };
 }
 
 function checkedCameras(cameras: readonly Camera[]): Camera[] {

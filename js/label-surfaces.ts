@@ -5,6 +5,7 @@ import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawLabelSurfaces } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
+import { ModelWarnings } from './warnings.js';
 
 /** Parameters of {@link LabelSurfaces}; `paramSpecs('labels')` has their ranges, defaults and descriptions. */
 export interface LabelParams {
@@ -48,6 +49,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   readonly #volume: Volume;
   readonly #meshes = new Map<number, { mesh: Mesh; handle: Handle<import('./vesicle.js').RawMesh> }>();
   readonly #runner = new Runner();
+  readonly #warnings: ModelWarnings;
 
   /**
    * Creates the surfaces along the faces of the voxels; the first steps smooth them.
@@ -60,6 +62,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     const image = volumeHandle('volume', volume);
     const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
     this.#volume = volume;
+    this.#warnings = new ModelWarnings(volume.warnings);
     this.#handle = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params)));
   }
 
@@ -85,7 +88,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     let known = this.#meshes.get(label);
     if (!known) {
       const handle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(label)));
-      known = { handle, mesh: wrapMesh(handle, true) };
+      known = { handle, mesh: wrapMesh(handle, true, () => this.#warnings.of({ label })) };
       this.#meshes.set(label, known);
     }
     return known.mesh;
@@ -130,7 +133,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   }
 
   #step(iterations: number): StepReport {
-    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+    return this.#warnings.take(this.#handle.use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -159,6 +162,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
+    this.#warnings.forget();
   }
 
   /** Frees the memory; the surfaces and their live meshes cannot be used afterwards. */

@@ -18,7 +18,9 @@ import type { MeshExtra, MeshTexture, PointArray, Vec3 } from './data.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
-import { type Volume, volumeHandle, wrapVolume } from './volume.js';
+import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
+import type { Warning } from './warning.js';
+import { checkedWarnings, mergedWarnings, notesOf } from './warnings.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -173,9 +175,9 @@ const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'
 export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
 /**
  * Creates a mesh from the handle of a WebAssembly object, for the other modules of the library. A live mesh belongs to
- * its model, which frees it.
+ * its model, which frees it. `warnings` returns those of the mesh.
  */
-export let wrapMesh: (handle: Handle<RawMesh>, live?: boolean) => Mesh;
+export let wrapMesh: (handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[]) => Mesh;
 
 /**
  * A triangle mesh.
@@ -189,21 +191,23 @@ export let wrapMesh: (handle: Handle<RawMesh>, live?: boolean) => Mesh;
 export class Mesh {
   readonly #handle: Handle<RawMesh>;
   readonly #live: boolean;
+  readonly #warnings: () => readonly Warning[];
 
   static {
-    wrapMesh = (handle, live = false) => new Mesh(handle, live);
+    wrapMesh = (...parts) => new Mesh(...parts);
     meshHandle = (parameter, mesh) => {
       if (mesh instanceof Mesh) return mesh.#handle;
       throw invalid(parameter, 'must be a Mesh');
     };
   }
 
-  private constructor(handle: Handle<RawMesh>, live: boolean) {
+  private constructor(handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[]) {
     if (!(handle instanceof Handle)) {
       throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
     this.#handle = handle;
     this.#live = live;
+    this.#warnings = warnings;
   }
 
   /**
@@ -231,11 +235,12 @@ export class Mesh {
     const vertices = pointArray('positions', positions).length / 3;
     checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
     const given = checkExtra(extra, vertices, indices.length / 3);
-    const { normals, uvs, cornerUvs, colors, texture } = given;
+    const { normals, uvs, cornerUvs, colors, texture, warnings } = given;
+    const kept = checkedWarnings('warnings', warnings);
     return made(() => {
       const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
       return RawMesh.fromArrays(positions, indices, rest);
-    });
+    }, kept);
   }
 
   /**
@@ -270,7 +275,7 @@ export class Mesh {
     number('iso', iso);
     integer('frame', frame);
     const handle = volumeHandle('volume', volume);
-    return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame)));
+    return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame), inFrame(volume.warnings, frame)));
   }
 
   /** Number of vertices. */
@@ -314,6 +319,17 @@ export class Mesh {
    */
   get origin(): Vec3 {
     return this.#handle.use((raw) => triple(raw.origin()));
+  }
+
+  /**
+   * Warnings: things to know about the mesh before relying on it; empty if there are none. The mesh of a model has those of
+   * its data and of its last report (after `restore`, of the next one), the mesh of a file those of its reader; copies
+   * and edits keep them, and {@link Mesh.toBytes} writes them.
+   */
+  get warnings(): Warning[] {
+    // Throws if the mesh was freed.
+    this.#handle.use(() => undefined);
+    return this.#warnings().map((warning) => ({ ...warning }));
   }
 
   /**
@@ -369,12 +385,12 @@ export class Mesh {
    * without seams is copied unchanged.
    */
   splitAtSeams(): Mesh {
-    return this.#handle.use((raw) => made(() => raw.splitAtSeams()));
+    return this.#handle.use((raw) => made(() => raw.splitAtSeams(), this.warnings));
   }
 
   /** Returns the connected components, each as a mesh of its own. */
   components(): Mesh[] {
-    return this.#handle.use((raw) => raw.components()).map((part) => made(() => part));
+    return this.#handle.use((raw) => raw.components()).map((part) => made(() => part, this.warnings));
   }
 
   /**
@@ -594,7 +610,10 @@ export class Mesh {
     if (value !== undefined && kind !== 'mask') throw invalid('value', `only a mask has a value, not a ${kind} volume`);
     const inside = integer('value', value ?? 1, { min: 1 });
     const handle = volumeHandle('like', like);
-    return wrapVolume(() => this.#handle.use((raw) => handle.use((grid) => raw.toVolume(grid, kind, inside))));
+    const { warnings } = this;
+    return wrapVolume(() =>
+      this.#handle.use((raw) => handle.use((grid) => withWarnings(raw.toVolume(grid, kind, inside), warnings))),
+    );
   }
 
   /**
@@ -676,20 +695,26 @@ export class Mesh {
    * Where the mesh has an {@link Mesh.origin} of its own, ply and vtp have positions in double precision, and a glb a
    * node at the origin. stl and mz3 have single precision only.
    *
+   * Its {@link Mesh.warnings} are written as comments, which readers ignore: lines of the header of ply, of obj and of
+   * vtp, `extras.warnings` of a glb's `asset`, and their codes, as far as there is room, in the header of stl. Without
+   * any, the bytes are the same as ever.
+   *
    * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
+   *   `warnings`: further ones to write.
    * @throws {@link VesicleError} `invalid-argument`: no such format; `precision` for stl and mz3, as {@link Mesh.arrays},
    *   unless it is recentred.
    */
-  toBytes(format: MeshFormat, options: { recentre?: boolean } = {}): Uint8Array {
+  toBytes(format: MeshFormat, options: { recentre?: boolean; warnings?: readonly Warning[] } = {}): Uint8Array {
     choice('format', format, FORMATS);
-    const { recentre = false } = checkProperties('options', options, ['recentre']);
+    const { recentre = false, warnings } = checkProperties('options', options, ['recentre', 'warnings']);
     boolean('recentre', recentre);
-    return this.#handle.use((raw) => raw.toBytes(format, recentre));
+    const notes = notesOf(mergedWarnings(this.#warnings(), checkedWarnings('warnings', warnings)));
+    return this.#handle.use((raw) => raw.toBytes(format, recentre, notes));
   }
 
   /** Returns an independent copy; for a model's live mesh, of its present state. */
   clone(): Mesh {
-    return this.#handle.use((raw) => made(() => raw.clone()));
+    return this.#handle.use((raw) => made(() => raw.clone(), this.warnings));
   }
 
   /**
@@ -721,8 +746,13 @@ function edgeBounds(edge: { min: number; max: number }): [number, number] {
   throw invalid('edge.max', `must be more than twice edge.min, ${min}, got ${max}`);
 }
 
-function made(make: () => RawMesh): Mesh {
-  return wrapMesh(new Handle('Mesh', make));
+function made(make: () => RawMesh, warnings: readonly Warning[] = []): Mesh {
+  return wrapMesh(new Handle('Mesh', make), false, () => warnings);
+}
+
+/** Returns the warnings of a volume that concern one of its frames. */
+function inFrame(warnings: readonly Warning[], frame: number): Warning[] {
+  return warnings.filter(({ where }) => !where || !('frame' in where) || where.frame === frame);
 }
 
 /** Arrays of a {@link MeshExtra}: name, and how many numbers they have per vertex or per triangle. */
@@ -734,7 +764,7 @@ const EXTRA_ARRAYS = [
 ] as const;
 
 function checkExtra(extra: MeshExtra, vertices: number, triangles: number): MeshExtra {
-  const given = checkProperties('extra', extra, [...EXTRA_ARRAYS.map(([name]) => name), 'texture']);
+  const given = checkProperties('extra', extra, [...EXTRA_ARRAYS.map(([name]) => name), 'texture', 'warnings']);
   for (const [name, stride, part] of EXTRA_ARRAYS) {
     const array = given[name];
     const length = stride * (part === 'vertex' ? vertices : triangles);

@@ -4,6 +4,7 @@ import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawMultires, TriangleCopy } from './vesicle.js';
+import { ModelWarnings } from './warnings.js';
 
 /**
  * A solid ellipsoid that supports the low-frequency surface of a {@link MultiresolutionModel} and drives its
@@ -102,6 +103,7 @@ export class MultiresolutionModel implements Stepper {
   readonly #meshHandles: Handle<import('./vesicle.js').RawMesh>[];
   readonly #meshes: Mesh[];
   readonly #runner = new Runner();
+  readonly #warnings: ModelWarnings;
 
   /**
    * Creates a model whose surface is the base with the detail.
@@ -121,7 +123,8 @@ export class MultiresolutionModel implements Stepper {
       return new RawMultires(detail, base, packed, params);
     });
     this.#meshHandles = [0, 1, 2].map((which) => new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(which))));
-    this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true));
+    this.#warnings = new ModelWarnings(known.detail?.warnings, known.base?.warnings);
+    this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true, () => this.#warnings.of()));
   }
 
   /**
@@ -236,7 +239,7 @@ export class MultiresolutionModel implements Stepper {
   }
 
   #step(iterations: number): StepReport {
-    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+    return this.#warnings.take(this.#handle.use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -254,7 +257,8 @@ export class MultiresolutionModel implements Stepper {
    */
   levelMeshes(): Mesh[] {
     const levels = this.#handle.use((raw) => raw.levelMeshes());
-    return levels.map((level) => wrapMesh(new Handle('Mesh', () => level)));
+    const warnings = this.#warnings.of();
+    return levels.map((level) => wrapMesh(new Handle('Mesh', () => level), false, () => warnings));
   }
 
   /**
@@ -285,6 +289,7 @@ export class MultiresolutionModel implements Stepper {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
+    this.#warnings.forget();
   }
 
   /** Frees the memory; the model and its live meshes cannot be used afterwards. */

@@ -43,7 +43,7 @@ export interface StepReport {
   };
   /** Durations of the parts of the last step by name (forces, motion, normals, topology, and so on), milliseconds. */
   times: Record<string, number>;
-  /** Notes to read before relying on the result so far; empty if there is nothing to note. */
+  /** Warnings: things to know about the result so far before relying on it; empty if there are none. */
   warnings: Warning[];
 }
 

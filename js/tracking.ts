@@ -5,6 +5,7 @@ import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawTracker, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
+import { ModelWarnings, notesOf } from './warnings.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {
@@ -134,6 +135,7 @@ export class SurfaceTracker implements Stepper {
   readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
   readonly #mesh: Mesh;
   readonly #runner = new Runner();
+  readonly #warnings: ModelWarnings;
   readonly #frameSeconds: number;
 
   /**
@@ -156,7 +158,8 @@ export class SurfaceTracker implements Stepper {
       image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), params)),
     );
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
-    this.#mesh = wrapMesh(this.#meshHandle, true);
+    this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }));
   }
 
   /**
@@ -247,7 +250,7 @@ export class SurfaceTracker implements Stepper {
   }
 
   #step(iterations: number): StepReport {
-    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+    return this.#warnings.take(this.#handle.use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -286,8 +289,11 @@ export class SurfaceTracker implements Stepper {
     if (integer('frame', frame, { max: frames - 1 }) >= done) {
       throw invalid('frame', `${frame} is not tracked yet; ${done} of ${frames} frames are`);
     }
+    const warnings = this.#warnings.of({ frame });
     return wrapMesh(
       new Handle('Mesh', () => this.#handle.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
+      false,
+      () => warnings,
     );
   }
 
@@ -298,13 +304,13 @@ export class SurfaceTracker implements Stepper {
 
   /**
    * Encodes the frames tracked so far as an animated glb: one node per frame, shown in turn, each for the frame time of
-   * the volume or 0.1 s. Nothing is shown in frames without the object.
+   * the volume or 0.1 s. Nothing is shown in frames without the object. Warnings are written as by {@link Mesh.toBytes}.
    *
    * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
   toGlb(): Uint8Array {
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
-    return this.#handle.use((raw) => raw.toGlb(seconds));
+    return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of())));
   }
 
   /**
@@ -325,6 +331,7 @@ export class SurfaceTracker implements Stepper {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
     this.#handle.use((raw) => raw.restore(state));
+    this.#warnings.forget();
   }
 
   /** Frees the memory; the tracker and its live mesh cannot be used afterwards. */

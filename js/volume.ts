@@ -19,10 +19,11 @@ import { Handle } from './runtime.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
 import type { Warning } from './warning.js';
+import { checkedWarnings, placeOf } from './warnings.js';
 
 const INIT = [
   ...['data', 'dims', 'affine', 'spacing', 'origin'],
-  ...['slope', 'intercept', 'frameSeconds', 'space', 'unit'],
+  ...['slope', 'intercept', 'frameSeconds', 'space', 'unit', 'warnings'],
 ];
 const UNITS: readonly LengthUnit[] = ['m', 'mm', 'um'];
 
@@ -166,7 +167,10 @@ export class Volume {
     return this.#handle.use((raw) => raw.space() as Space);
   }
 
-  /** Notes to read before relying on the volume; empty if there is nothing to note. */
+  /**
+   * Warnings: things to know about the volume before relying on it; empty if there are none. A volume made from this one has those
+   * that still hold for it.
+   */
   get warnings(): Warning[] {
     return this.#handle.use((raw) => raw.warnings() as Warning[]);
   }
@@ -432,6 +436,7 @@ function fromInit(init: VolumeInit): RawVolume {
   const given = checkProperties('init', init, INIT);
   const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS', unit } = given;
   if (unit !== undefined) choice('unit', unit, UNITS);
+  const warnings = checkedWarnings('warnings', given.warnings);
   const volume = new RawVolume(
     voxelArray('data', data),
     dims(given.dims),
@@ -441,7 +446,12 @@ function fromInit(init: VolumeInit): RawVolume {
     frameSeconds === undefined ? 0 : positive('frameSeconds', frameSeconds),
     choice('space', space, ['RAS', 'LPS']),
   );
-  return unit === undefined ? volume : volume.withUnit(unit);
+  return withWarnings(unit === undefined ? volume : volume.withUnit(unit), warnings);
+}
+
+/** Returns a volume with warnings added. */
+export function withWarnings(volume: RawVolume, warnings: readonly Warning[]): RawVolume {
+  return warnings.reduce((raw, one) => raw.withWarning(one.code, one.text, ...placeOf(one)), volume);
 }
 
 function voxelArray(parameter: string, data: unknown): VoxelArray {

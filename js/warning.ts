@@ -14,8 +14,10 @@ export type WarningCode =
   | 'precision'
   /** A surface that was moved towards the origin, since where it is it could not be represented. */
   | 'recentred'
-  /** Voxels that are far longer along one axis, so that the shape between the slices is a guess. */
-  | 'anisotropic';
+  /** Voxels far longer along one axis, so that the shape between the slices is a guess. */
+  | 'anisotropic'
+  /** Something that the reader of the file noticed: an assumption that it made, or a part that it left out. */
+  | 'reader';
 
 /** Something to know about a volume or a result before relying on it. */
 export interface Warning {

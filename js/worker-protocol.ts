@@ -104,6 +104,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     geometryVersion: 'value',
     texture: 'value',
     origin: 'value',
+    warnings: 'value',
     arrays: 'method',
     copyTo: 'method',
     info: 'method',

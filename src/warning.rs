@@ -3,7 +3,7 @@
 //! A result is right, or it is refused with an error, or it carries a [`Warning`]. Volumes and reports hold theirs, and
 //! user interfaces show them beside the result.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Something that a user should know about a volume or a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -41,25 +41,74 @@ pub enum Place {
     Point([f64; 3]),
 }
 
-/// The kinds of warnings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum WarningCode {
+/// Declares the kinds of warnings, each with the name that programs know it by.
+macro_rules! codes {
+    ($($(#[$doc:meta])* $Code:ident = $name:literal,)*) => {
+        /// The kinds of warnings.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum WarningCode {
+            $($(#[$doc])* $Code,)*
+        }
+
+        impl WarningCode {
+            /// All kinds of warnings.
+            pub const ALL: &[Self] = &[$(Self::$Code),*];
+
+            /// Returns the name that programs know the kind by.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Code => $name,)*
+                }
+            }
+        }
+    };
+}
+
+codes! {
     /// A part of the surface ends in this frame: there is no object in the image from here on.
-    EndsInFrame,
+    EndsInFrame = "ends-in-frame",
     /// A part of the surface begins in this frame: there was no object in the image before.
-    BeginsInFrame,
+    BeginsInFrame = "begins-in-frame",
     /// The intensity step at the surface differs so much from that in the frames around it that the surface may be off.
-    UnevenBrightness,
+    UnevenBrightness = "uneven-brightness",
     /// The object is so small that its volume is uncertain.
-    SmallObject,
+    SmallObject = "small-object",
     /// A label is so thin that the volume of its surface is not that of its voxels.
-    ThinLabel,
+    ThinLabel = "thin-label",
     /// Positions or intensities are rounded more than the result should suffer.
-    Precision,
+    Precision = "precision",
     /// The surface was moved towards the origin, since where it is it could not be represented.
-    Recentred,
-    /// Voxels of the volume are far longer along one axis than along the others, so that the shape between the slices is a
-    /// guess.
-    Anisotropic,
+    Recentred = "recentred",
+    /// Voxels of the volume are far longer along one axis than along the others: the shape between the slices is a guess.
+    Anisotropic = "anisotropic",
+    /// Something that the reader of the file noticed: an assumption that it made, or a part that it left out.
+    Reader = "reader",
+}
+
+impl WarningCode {
+    /// Returns the kind of this name; `None` if there is none.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|code| code.name() == name)
+    }
+}
+
+impl Serialize for WarningCode {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn each_kind_of_warning_has_a_name_of_its_own() {
+        for &code in WarningCode::ALL {
+            assert_eq!(WarningCode::named(code.name()), Some(code));
+        }
+        assert_eq!(WarningCode::named("Reader"), None);
+    }
 }

@@ -4,7 +4,7 @@
 import type { AnyModel, Initialize, Render } from '@anywidget/types';
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import init, { DeformableModel, type DeformableParams, Volume, type VoxelArray } from 'vesicle/inline';
+import init, { DeformableModel, type DeformableParams, Volume, type VoxelArray, type Warning } from 'vesicle/inline';
 import { type MeshSource, ThreeSurface } from 'vesicle/three';
 
 /** A NumPy array as bytes. The first axis is fastest in volumes, the last in arrays of vertices and triangles. */
@@ -24,6 +24,7 @@ export interface Traits {
   state: 'loading' | 'running' | 'paused' | 'done' | 'error';
   message: string;
   iteration: number;
+  warnings: Warning[];
   vertices: Packed | null;
   triangles: Packed | null;
 }
@@ -67,7 +68,7 @@ class Growth {
 
   /** Starts a new model with the current traits. */
   async begin(): Promise<void> {
-    this.#tell({ state: 'loading', message: '', iteration: 0, vertices: null, triangles: null });
+    this.#tell({ state: 'loading', message: '', iteration: 0, warnings: [], vertices: null, triangles: null });
     try {
       await init();
       const surface = this.#make();
@@ -130,7 +131,9 @@ class Growth {
   /** Sends the mesh and the state to Python. */
   #rest(surface: DeformableModel, state: 'done' | 'paused'): true {
     const { positions, indices } = surface.mesh.arrays();
-    this.#tell({ state, vertices: packed('float32', positions), triangles: packed('uint32', indices) });
+    const { warnings } = surface.mesh;
+    for (const view of this.views) view.warn(warnings);
+    this.#tell({ state, warnings, vertices: packed('float32', positions), triangles: packed('uint32', indices) });
     return true;
   }
 
@@ -146,6 +149,7 @@ class Growth {
     this.views.add(view);
     if (this.#surface) view.begin(this.#surface.mesh);
     view.say(this.#model.get('message') || `Step ${this.#model.get('iteration')}`);
+    view.warn(this.#model.get('warnings') ?? []);
   }
 
   free(): void {
@@ -166,6 +170,7 @@ class View {
   readonly #surface = new ThreeSurface(THREE, this.#object);
   readonly #controls: OrbitControls;
   readonly #status = document.createElement('output');
+  readonly #warnings = document.createElement('ul');
 
   constructor(element: HTMLElement) {
     const canvas = this.#renderer.domElement;
@@ -173,7 +178,7 @@ class View {
     this.#renderer.setSize(640, 360);
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label', 'The surface');
-    element.append(canvas, this.#status);
+    element.append(canvas, this.#status, this.#warnings);
     this.#camera.add(new THREE.DirectionalLight(0xffffff, 2));
     this.#camera.up.set(0, 0, 1);
     this.#scene.add(this.#camera, this.#object, new THREE.HemisphereLight(0xffffff, 0x665544, 1.5));
@@ -205,6 +210,13 @@ class View {
   /** Displays a status text. */
   say(words: string): void {
     this.#status.textContent = words;
+  }
+
+  /** Lists warnings; an empty list takes no room. */
+  warn(warnings: readonly Warning[]): void {
+    const items = warnings.map(({ text }) => Object.assign(document.createElement('li'), { textContent: `⚠ ${text}` }));
+    this.#warnings.replaceChildren(...items);
+    this.#warnings.hidden = items.length === 0;
   }
 
   #draw(): void {

@@ -50,6 +50,7 @@ class Surface(anywidget.AnyWidget):
     levels: number of pyramid levels above the volume, through which the fit goes from coarse to fine.
 
     `state` is loading, running, paused, done or error, and `message` describes an error; `running` pauses and resumes.
+    `warnings` is a list of what to know about the result, each with `code` and `text`, and `where` if it is a part of it.
     `vertices` (n x 3, world) and `triangles` (m x 3, counter-clockwise from outside) are set when it is paused or done.
     """
 
@@ -64,6 +65,7 @@ class Surface(anywidget.AnyWidget):
     state = traitlets.Unicode("loading").tag(sync=True)
     message = traitlets.Unicode("").tag(sync=True)
     iteration = traitlets.Int(0).tag(sync=True)
+    warnings = traitlets.List().tag(sync=True)
     vertices = array_trait("C")
     triangles = array_trait("C")
 

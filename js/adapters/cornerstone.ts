@@ -9,6 +9,8 @@ import { invalid } from '../check.js';
 import type { VolumeInit, VoxelArray } from '../data.js';
 import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { affineOf, MeshReader, polygons, voxels } from './source.js';
 
@@ -111,6 +113,11 @@ export class CornerstoneSurfaces {
   /** Indices of the segments that have voxels, in ascending order. */
   get segments(): readonly number[] {
     return this.#map.surfaces.labels;
+  }
+
+  /** Warnings about the surfaces; empty if there are none. */
+  get warnings(): Warning[] {
+    return mergedWarnings(...this.segments.map((one) => this.mesh(one).warnings));
   }
 
   /** Returns the surface of a segment as a live mesh of this library, in LPS, such as to save it. */

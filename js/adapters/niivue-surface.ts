@@ -89,11 +89,15 @@ export class NiivueSurface {
     return this.#adapter.mesh;
   }
 
-  /** Notes on the surface in NiiVue: `recentred` if it is not where the mesh is; empty otherwise. */
+  /**
+   * Warnings about the surface: those of the mesh, and `recentred` if it is shown where the mesh is not; empty if there are
+   * none.
+   */
   get warnings(): Warning[] {
-    if (this.#origin.every((coordinate) => coordinate === 0)) return [];
+    const { warnings } = this.#reader;
+    if (this.#origin.every((coordinate) => coordinate === 0)) return warnings;
     const text = `The surface is shown at the origin, and is at ${this.#origin.join(', ')}: too far for NiiVue to draw it.`;
-    return [{ code: 'recentred', text, where: { point: this.#origin } }];
+    return [...warnings, { code: 'recentred', text, where: { point: this.#origin } }];
   }
 
   /**

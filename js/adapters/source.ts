@@ -2,6 +2,7 @@
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import type { MeshArrays, PositionOptions } from '../mesh.js';
+import type { Warning } from '../warning.js';
 
 /**
  * A changing surface that an adapter can show: a `Mesh`, the `mesh` of a model, or arrays of your own with two
@@ -12,6 +13,8 @@ export interface MeshSource {
   readonly topologyVersion: number;
   /** Counter that increases when any vertex moves, so that adapters know when to update the positions. */
   readonly geometryVersion: number;
+  /** Warnings about the surface, for the `warnings` of the adapter. */
+  readonly warnings?: readonly Warning[];
   /**
    * Returns the surface in its present state; if positions are to be `relative`, they may be so to the `origin` that is
    * returned with them.
@@ -44,6 +47,7 @@ export class MeshReader {
   readonly #relative: boolean;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
   #mesh: MeshSource | undefined;
+  #warnings: readonly Warning[] = [];
   #topology = 0;
   #geometry = 0;
 
@@ -65,6 +69,7 @@ export class MeshReader {
    */
   read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
+    this.#warnings = mesh.warnings ?? [];
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
     const frame = this.#take(mesh);
@@ -72,6 +77,11 @@ export class MeshReader {
     const origin: Vec3 = [...(frame.origin ?? ([0, 0, 0] as const))];
     if (this.#rotated) for (const values of [frame.positions, frame.normals, origin]) rotate180(values);
     return { ...frame, origin, topology };
+  }
+
+  /** Warnings of the mesh last read. */
+  get warnings(): Warning[] {
+    return [...this.#warnings];
   }
 
   #take(mesh: MeshSource): MeshArrays {
@@ -84,6 +94,7 @@ export class MeshReader {
   /** Forgets the mesh last read, so that the next read returns it in full. */
   clear(): void {
     this.#mesh = undefined;
+    this.#warnings = [];
   }
 }
 

@@ -8,6 +8,7 @@
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
+import type { Warning } from '../warning.js';
 import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
@@ -184,6 +185,11 @@ export class ThreeSurface {
     this.#three = three;
     this.#object = object;
     this.#reader = new MeshReader(options.space, options.worldSpace, typeof object.position?.set === 'function');
+  }
+
+  /** Warnings of the mesh of the last update; empty if there are none. */
+  get warnings(): Warning[] {
+    return this.#reader.warnings;
   }
 
   /**

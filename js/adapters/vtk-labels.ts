@@ -4,6 +4,8 @@ import type { Space, VoxelArray } from '../data.js';
 import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
 import type { Volume } from '../volume.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { type VtkImage, volumeFromVtk } from './vtk-image.js';
 import { type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
@@ -62,6 +64,11 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
    */
   polyData(label: number): P {
     return this.#surfaceOf(label).polyData;
+  }
+
+  /** Warnings about the surfaces; empty if there are none. */
+  get warnings(): Warning[] {
+    return mergedWarnings(...this.labels.map((one) => this.mesh(one).warnings));
   }
 
   /** Returns the surface of a label as a live mesh of this library, such as to save it. */

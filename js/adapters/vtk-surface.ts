@@ -1,6 +1,7 @@
 // Shows a surface in vtk.js that follows a mesh.
 import { invalid } from '../check.js';
 import type { Space } from '../data.js';
+import type { Warning } from '../warning.js';
 import { MeshReader, type MeshSource, polygons } from './source.js';
 
 interface DataArray {
@@ -69,6 +70,11 @@ export class VtkSurface<P extends VtkPolyData> {
       values: new Float32Array(),
     });
     this.polyData.getPointData().setNormals(this.#normals);
+  }
+
+  /** Warnings of the mesh of the last update; empty if there are none. */
+  get warnings(): Warning[] {
+    return this.#reader.warnings;
   }
 
   /**

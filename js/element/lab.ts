@@ -2,6 +2,8 @@
 import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
+import type { Warning } from '../warning.js';
+import { mergedWarnings } from '../warnings.js';
 import init, { type Stepper, type Vec3 } from '../worker.js';
 import { fetched, json, MODELS, type ModelWithView, parseStart } from './models.js';
 import { STYLE } from './style.js';
@@ -27,8 +29,9 @@ const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
  * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of
  * the pyramid and `start`, `contour` (the default) or `enclosing`, of the deformable model; `paused`, not to start
  * automatically. Changing an attribute other than `paused` restarts the method. Events: `vesicle-step` after one step
- * or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`,
- * `controls` and `status` can be styled.
+ * or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error, `vesicle-warnings` when there
+ * are others than before, with all {@link Warning}s. The parts `view`, `controls`, `status` and `warnings`, a list that is
+ * hidden while it is empty, can be styled.
  */
 export class VesicleLab extends HTMLElement {
   static readonly observedAttributes = ATTRIBUTES;
@@ -39,6 +42,9 @@ export class VesicleLab extends HTMLElement {
   });
   #view: View | undefined;
   #model: Stepper | undefined;
+  /** Warnings of the data. */
+  #known: readonly Warning[] = [];
+  #warnings: readonly Warning[] = [];
   /** Number of resets so far, by which results of an earlier one are recognised and discarded. */
   #opening = 0;
   #viewDirection: Vec3 = [0, -1, 0];
@@ -52,6 +58,11 @@ export class VesicleLab extends HTMLElement {
   /** The model in its worker, as in `vesicle/worker`; undefined before it is created. */
   get model(): Stepper | undefined {
     return this.#model;
+  }
+
+  /** Warnings about data and result so far; empty if there are none. */
+  get warnings(): readonly Warning[] {
+    return this.#warnings;
   }
 
   connectedCallback(): void {
@@ -80,9 +91,12 @@ export class VesicleLab extends HTMLElement {
     this.#setState('loading', 'Loading.');
     try {
       const { model, from } = await this.#make();
+      const known = (await model.mesh.warnings) as Warning[];
       if (opening !== this.#opening) return void model.free();
       [this.#model, this.#viewDirection, this.#fitted] = [model, from, false];
       this.#view?.begin();
+      this.#known = known;
+      this.#warn([]);
       await this.#show();
       this.#setState('paused', 'Ready.');
       if (!this.hasAttribute('paused')) await this.play();
@@ -152,6 +166,7 @@ export class VesicleLab extends HTMLElement {
     const report = await model.step(steps);
     if (model !== this.#model) return;
     this.#parts.figures(report);
+    this.#warn(report.warnings);
     this.dispatchEvent(new CustomEvent('vesicle-step', { detail: report }));
     if (report.done) this.#finish(report);
     await this.#show();
@@ -161,6 +176,15 @@ export class VesicleLab extends HTMLElement {
     const parts = components === 1 ? 'one component' : `${components} components`;
     this.#setState('done', `Done: ${vertices.toLocaleString('en')} vertices in ${parts}.`);
     this.dispatchEvent(new CustomEvent('vesicle-done'));
+  }
+
+  /** Shows the warnings of the data and of a report, and dispatches an event if they are others than before. */
+  #warn(found: readonly Warning[]): void {
+    const warnings = mergedWarnings(this.#known, found);
+    if (JSON.stringify(warnings) === JSON.stringify(this.#warnings)) return;
+    this.#warnings = warnings;
+    this.#parts.warn(warnings);
+    this.dispatchEvent(new CustomEvent('vesicle-warnings', { detail: warnings }));
   }
 
   async #show(): Promise<void> {
@@ -196,6 +220,7 @@ class Parts {
   readonly #step = document.createElement('button');
   readonly #status = document.createElement('output');
   readonly #figures = document.createElement('span');
+  readonly #warnings = document.createElement('ul');
 
   constructor(root: ShadowRoot, acts: { play: () => void; step: () => void; reset: () => void }) {
     const style = new CSSStyleSheet();
@@ -219,7 +244,11 @@ class Parts {
     this.#status.setAttribute('aria-live', 'polite');
     this.#figures.className = 'figures';
     controls.append(this.#play, this.#step, reset, this.#status, this.#figures);
-    root.append(this.#canvas, controls);
+    this.#warnings.setAttribute('part', 'warnings');
+    this.#warnings.setAttribute('aria-label', 'Warnings');
+    this.#warnings.setAttribute('aria-live', 'polite');
+    this.#warnings.hidden = true;
+    root.append(this.#canvas, this.#warnings, controls);
   }
 
   /** Creates the 3D view of the surface; without WebGL, shows a message instead and returns undefined. */
@@ -252,9 +281,31 @@ class Parts {
     this.#status.className = state;
   }
 
+  /** Shows a list of warnings; those that stay are not announced again. */
+  warn(warnings: readonly Warning[]): void {
+    const known = new Map(Array.from(this.#warnings.children, (item) => [item.textContent, item]));
+    const items = warnings.map((warning) => {
+      const words = `⚠ ${placed(warning)}${warning.text}`;
+      const item = known.get(words) ?? document.createElement('li');
+      item.textContent = words;
+      return item;
+    });
+    this.#warnings.hidden = items.length === 0;
+    for (const item of known.values()) if (!items.includes(item)) item.remove();
+    for (const [at, item] of items.entries())
+      if (this.#warnings.children[at] !== item) this.#warnings.insertBefore(item, this.#warnings.children[at] ?? null);
+  }
+
   figures({ iteration, vertices, phase }: StepReport): void {
     this.#figures.textContent = `Step ${iteration}, ${phase}: ${vertices.toLocaleString('en')} vertices`;
   }
+}
+
+/** Returns the place of a warning in words, if it has one. */
+function placed({ where }: Warning): string {
+  if (!where) return '';
+  if ('frame' in where) return `Frame ${where.frame + 1}: `;
+  return 'label' in where ? `Label ${where.label}: ` : `At ${where.point.join(', ')}: `;
 }
 
 function canvas(): HTMLCanvasElement {

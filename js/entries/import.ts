@@ -21,6 +21,7 @@ import { MeshFile, VolumeFile } from '../files.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
 import { checkTexture, rawTexture, textureOf } from '../texture.js';
+import type { Warning } from '../warning.js';
 
 export type {
   LengthUnit,
@@ -36,6 +37,7 @@ export type {
 } from '../data.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from '../error.js';
 export { type InitInput, init as default, initSync } from '../runtime.js';
+export type { Warning, WarningCode } from '../warning.js';
 
 /**
  * Parses a volume file like `Volume.parse` of `vesicle`, and returns what the constructor of `Volume` takes.
@@ -89,6 +91,7 @@ function inOwnInstance<T>(work: () => T): T {
 function volumeData(file: VolumeFile): VolumeInit {
   const [nx = 0, ny = 0, nz = 0] = file.dims();
   const [frames, frameSeconds, unit] = [file.frames(), file.frameSeconds(), file.unit()];
+  const warnings = file.warnings() as Warning[];
   return {
     data: file.voxels() as VoxelArray,
     dims: frames > 1 ? [nx, ny, nz, frames] : [nx, ny, nz],
@@ -98,6 +101,7 @@ function volumeData(file: VolumeFile): VolumeInit {
     ...(frameSeconds > 0 && { frameSeconds }),
     space: file.space() as Space,
     ...(unit !== '' && { unit: unit as LengthUnit }),
+    ...(warnings.length > 0 && { warnings }),
   };
 }
 

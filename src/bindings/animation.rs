@@ -19,6 +19,11 @@ impl RawAnimation {
         RawAnimation::default()
     }
 
+    /// Sets notes for the reader of the file: lines `code: text`.
+    pub fn note(&mut self, notes: &str) {
+        self.0.note(notes);
+    }
+
     /// Appends a frame that shows a mesh in its current state.
     pub fn add(&mut self, mesh: &RawMesh) -> Result<(), JsValue> {
         Ok(self.0.add(&mesh.triangles()).map_err(Failure::from)?)

@@ -5,7 +5,7 @@ use js_sys::{
 };
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{columns, flat, in_world, packed, space_name, unit_name};
+use super::convert::{columns, flat, in_world, packed, space_name, to_js, unit_name};
 use super::readers::{read_mesh, read_volume};
 use super::texture::RawTexture;
 use vesicle::mesh::TriangleMesh;
@@ -72,6 +72,11 @@ impl VolumeFile {
     /// Returns which anatomical directions the axes of world space have: `RAS` or `LPS`.
     pub fn space(&self) -> String {
         space_name(self.0.space()).to_owned()
+    }
+
+    /// Returns what a user should know about the volume, as an array of `Warning`.
+    pub fn warnings(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(self.0.warnings())?)
     }
 
     /// Returns the length of a world unit: `m`, `mm` or `um`, or an empty string if the file does not state it.

@@ -13,7 +13,7 @@ use super::convert::{
 use super::error::Failure;
 use super::texture::RawTexture;
 use super::volume::RawVolume;
-use vesicle::io::{MeshFormat, write_mesh};
+use vesicle::io::{MeshFormat, write_noted_mesh};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{
     Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report, world_origin,
@@ -313,16 +313,16 @@ impl RawMesh {
     }
 
     /// Returns the mesh as the bytes of a file; `format` is glb, ply, stl, obj, vtp or mz3. If it `is_recentred`, positions
-    /// are those relative to the origin of the mesh.
+    /// are those relative to the origin of the mesh. Each line of `notes` for the reader of the file is `code: text`.
     #[wasm_bindgen(js_name = toBytes)]
-    pub fn to_bytes(&self, format: &str, is_recentred: bool) -> Result<Vec<u8>, JsValue> {
+    pub fn to_bytes(&self, format: &str, is_recentred: bool, notes: &str) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
             .ok_or_else(|| Failure::invalid("format", "must be one of glb, ply, stl, obj, vtp, mz3"))?;
         let mut mesh = self.with_normals();
         if is_recentred && mesh.origin != DVec3::ZERO {
             Rc::make_mut(&mut mesh).origin = DVec3::ZERO;
         }
-        Ok(write_mesh(&mesh, format).map_err(Failure::from)?)
+        Ok(write_noted_mesh(&mesh, format, notes).map_err(Failure::from)?)
     }
 
     /// Returns an independent copy; that of a live mesh no longer changes with its model.

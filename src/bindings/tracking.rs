@@ -12,7 +12,7 @@ use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
-use vesicle::io::write_animation;
+use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
 use vesicle::methods::tracking::{
     Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams,
@@ -108,11 +108,15 @@ impl RawTracker {
         Ok(to_js(&statistics)?)
     }
 
-    /// Returns the surfaces of the finished frames as the bytes of an animated GLB in which each lasts `frame_seconds`.
+    /// Returns the surfaces of the finished frames as the bytes of an animated GLB in which each lasts `frame_seconds`. Each
+    /// line of `notes` for the reader of the file is `code: text`.
     #[wasm_bindgen(js_name = toGlb)]
-    pub fn to_glb(&self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
+    pub fn to_glb(&self, frame_seconds: f64, notes: &str) -> Result<Vec<u8>, JsValue> {
+        let mut animation = AnimationWriter::default();
+        animation.note(notes);
         let tracker = self.0.borrow();
-        Ok(write_animation(tracker.meshes(), frame_seconds).map_err(Failure::from)?)
+        tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
+        Ok(animation.finish(frame_seconds).map_err(Failure::from)?)
     }
 }
 

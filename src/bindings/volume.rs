@@ -11,6 +11,7 @@ use super::error::Failure;
 use vesicle::io::write_nifti;
 use vesicle::math::DAffine3;
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::warning::{Place, Warning, WarningCode};
 
 /// The raw handle of the TypeScript class `Volume`: a 3D or 4D volume.
 #[wasm_bindgen]
@@ -48,6 +49,26 @@ impl RawVolume {
     #[wasm_bindgen(js_name = withUnit)]
     pub fn with_unit(self, unit: &str) -> RawVolume {
         RawVolume(self.0.with_unit(unit_named(unit)))
+    }
+
+    /// Returns the volume with a warning added: the name of its code, its text, and its place: the number of a `frame` or
+    /// `label`, the coordinates of a `point`, or none for any other `kind`.
+    #[wasm_bindgen(js_name = withWarning)]
+    pub fn with_warning(
+        self,
+        code: &str,
+        text: String,
+        kind: &str,
+        place: &[f64],
+    ) -> Result<RawVolume, JsValue> {
+        let place = match (kind, place) {
+            ("frame", &[frame]) => Some(Place::Frame(frame as u32)),
+            ("label", &[label]) => Some(Place::Label(label)),
+            ("point", &[x, y, z]) => Some(Place::Point([x, y, z])),
+            _ => None,
+        };
+        let code = WarningCode::named(code).ok_or_else(|| Failure::invalid("warnings", "unknown code"))?;
+        Ok(RawVolume(self.0.with_warning(Warning { code, text, place })))
     }
 
     /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if that cannot represent the volume.

@@ -47,6 +47,11 @@ pub struct AnimationWriter {
 }
 
 impl AnimationWriter {
+    /// Sets notes for the reader of the file, as [`write_noted_mesh`](super::write_noted_mesh) writes them.
+    pub fn note(&mut self, notes: &str) {
+        self.parts.notes = String::from(notes);
+    }
+
     /// Appends a frame that shows `mesh`.
     ///
     /// # Errors

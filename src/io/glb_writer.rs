@@ -2,6 +2,7 @@
 
 use super::glb::container;
 use super::mesh_file::push_floats;
+use super::notes::extras;
 use crate::math::{Bounds, DVec3, Vec2, Vec3};
 use crate::mesh::{ImageKind, MeshError, Texture, TriangleMesh};
 use std::sync::Arc;
@@ -16,8 +17,8 @@ const INDICES: Option<u32> = Some(34963);
 ///
 /// # Errors
 /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
-pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
-    let mut parts = DocumentBuilder::default();
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Result<Vec<u8>, MeshError> {
+    let mut parts = DocumentBuilder { notes: String::from(notes), ..DocumentBuilder::default() };
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
@@ -45,6 +46,8 @@ pub(super) struct DocumentBuilder {
     pub(super) nodes: Vec<String>,
     textures: Vec<Arc<Texture>>,
     images: Vec<String>,
+    /// Notes for the reader of the file, in `extras` of the asset.
+    pub(super) notes: String,
 }
 
 impl DocumentBuilder {
@@ -182,7 +185,8 @@ impl DocumentBuilder {
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
     pub(super) fn finish(mut self, extra_json: &str) -> Result<Vec<u8>, MeshError> {
-        let mut json = String::from(r#"{"asset":{"version":"2.0","generator":"vesicle"},"scene":0"#);
+        let asset = format!(r#"{{"version":"2.0","generator":"vesicle"{}}}"#, extras(&self.notes));
+        let mut json = format!(r#"{{"asset":{asset},"scene":0"#);
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
         json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
         json += extra_json;

@@ -163,6 +163,16 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
 /// single precision only, where that is too coarse for the mesh; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
 /// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
+    write_noted_mesh(mesh, format, "")
+}
+
+/// Returns the bytes of a file as [`write_mesh`] does, with notes for the reader of the file, which programs ignore: comment
+/// lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of STL; MZ3 has no
+/// room for any. Each line of `notes` is one, `code: text`, of which STL has only the code.
+///
+/// # Errors
+/// As [`write_mesh`].
+pub fn write_noted_mesh(mesh: &TriangleMesh, format: MeshFormat, notes: &str) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
     let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
@@ -172,11 +182,11 @@ pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, Me
     });
     let mesh = turned.as_ref().unwrap_or(mesh);
     Ok(match format {
-        MeshFormat::Glb => glb_writer::write(mesh)?,
-        MeshFormat::Ply => ply::write(mesh),
-        MeshFormat::Stl => stl::write(mesh)?,
-        MeshFormat::Obj => obj::write(mesh),
-        MeshFormat::Vtp => vtp::write(mesh),
+        MeshFormat::Glb => glb_writer::write(mesh, notes)?,
+        MeshFormat::Ply => ply::write(mesh, notes),
+        MeshFormat::Stl => stl::write(mesh, notes)?,
+        MeshFormat::Obj => obj::write(mesh, notes),
+        MeshFormat::Vtp => vtp::write(mesh, notes),
         MeshFormat::Mz3 => mz3::write(mesh)?,
     })
 }

@@ -1,6 +1,7 @@
 //! Reader and writer of Wavefront OBJ: vertices, texture coordinates, normals and faces. Everything else is ignored.
 
 use super::mesh_file::is_text;
+use super::notes::comments;
 use super::text::numbered_lines;
 use super::{FormatError, PointCloud};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -198,8 +199,9 @@ fn numbers<'a>(
 }
 
 /// Returns the text of an OBJ file of the mesh, with numbers in the shortest form that reads back exactly.
-pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
-    let mut text = String::from("# vertices and faces\n");
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
+    let mut text = comments(notes, "# warning ", "\n");
+    text.push_str("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
         if mesh.origin == DVec3::ZERO {
             line(&mut text, "v", &p.to_array());

@@ -2,12 +2,13 @@
 
 use super::base64;
 use super::mesh_file::{color_bytes, push_floats};
+use super::notes::comments;
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
 /// Returns the text of a VTP file of the mesh with points and triangles; normals, texture coordinates and colours are
 /// point data, for which vertices on texture seams are duplicated.
-pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {
         split = mesh.split_at_seams();
@@ -15,7 +16,9 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     } else {
         mesh
     };
-    let mut xml = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" ");
+    let mut xml = String::from("<?xml version=\"1.0\"?>\n");
+    xml += &comments(notes, "<!-- warning ", " -->\n");
+    xml += "<VTKFile type=\"PolyData\" version=\"1.0\" ";
     xml += "byte_order=\"LittleEndian\" header_type=\"UInt32\">\n<PolyData>\n";
     xml += &format!(
         "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",

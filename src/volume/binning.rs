@@ -1,5 +1,6 @@
 //! Binning of a volume: fewer, larger voxels, each the mean of a block of the original ones.
 
+use super::derived::Derivation;
 use super::error::{VolumeError, reserve};
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
@@ -52,7 +53,7 @@ impl Volume {
             frame_seconds: self.frame_seconds,
             space: self.space,
         })?;
-        Ok(volume.with_unit(self.unit))
+        Ok(volume.derived(self, Derivation::Averaged))
     }
 
     /// Returns the mean of the finite stored values in one block of voxels, for binning: `size` voxels along each axis,

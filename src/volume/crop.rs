@@ -1,5 +1,6 @@
 //! Parts of a volume: a box of its voxels, or one of its frames.
 
+use super::derived::Derivation;
 use super::error::VolumeError;
 use super::{Region, Volume, VolumeInit};
 use crate::math::{DAffine3, DVec3};
@@ -23,14 +24,12 @@ impl Volume {
         let voxels = self.voxels.gathered(region.len() * self.frames(), rows)?;
         let first = DAffine3::from_translation(DVec3::from(min.map(|i| i as f64)));
         let [nx, ny, nz] = region.dims;
-        self.part(
-            "box",
-            VolumeInit {
-                dims: [nx, ny, nz, self.frames()],
-                affine: self.affine * first,
-                ..self.init_with(voxels)
-            },
-        )
+        let init = VolumeInit {
+            dims: [nx, ny, nz, self.frames()],
+            affine: self.affine * first,
+            ..self.init_with(voxels)
+        };
+        self.part("box", init, Derivation::Box(region))
     }
 
     /// Returns one frame as a 3D volume, without a time between frames.
@@ -43,15 +42,21 @@ impl Volume {
         let voxels =
             self.voxels.gathered(self.frame_len(), std::iter::once(start..start + self.frame_len()))?;
         let [nx, ny, nz] = self.dims();
-        self.part("frame", VolumeInit { dims: [nx, ny, nz, 1], frame_seconds: 0.0, ..self.init_with(voxels) })
+        let init = VolumeInit { dims: [nx, ny, nz, 1], frame_seconds: 0.0, ..self.init_with(voxels) };
+        self.part("frame", init, Derivation::Frame(index))
     }
 
     /// Creates a volume of some voxels of this one, which `parameter` selects.
-    fn part(&self, parameter: &'static str, init: VolumeInit) -> Result<Volume, VolumeError> {
+    fn part(
+        &self,
+        parameter: &'static str,
+        init: VolumeInit,
+        how: Derivation,
+    ) -> Result<Volume, VolumeError> {
         if init.voxels.finite_range().is_none() {
             return Err(VolumeError::invalid(parameter, "must have at least one finite voxel"));
         }
-        Ok(Volume::new(init)?.with_unit(self.unit))
+        Ok(Volume::new(init)?.derived(self, how))
     }
 }
 

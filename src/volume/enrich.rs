@@ -1,6 +1,7 @@
 //! Interpolation of further slices in volumes with thick slices, so that the spacing becomes nearly isotropic (dynamic
 //! surfaces from 4D cardiac MRI, section 5.2).
 
+use super::derived::Derivation;
 use super::error::{VolumeError, reserve};
 use super::flow::{Flow, Image, symmetric_flow};
 use super::voxels::Voxels;
@@ -66,7 +67,7 @@ impl Volume {
             frame_seconds: self.frame_seconds,
             space: self.space,
         })?;
-        Ok(volume.with_unit(self.unit))
+        Ok(volume.derived(self, Derivation::Interpolated))
     }
 
     /// Returns the axis of the largest spacing, across which slices are interpolated; of equal ones z if it is among

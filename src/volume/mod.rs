@@ -28,6 +28,7 @@ mod contour;
 mod coverage;
 mod crop;
 pub(crate) mod cube_cases;
+mod derived;
 mod dice;
 mod enrich;
 mod error;
@@ -76,6 +77,7 @@ pub use voxels::Voxels;
 
 use crate::math::{DAffine3, DVec3};
 use crate::warning::Warning;
+use derived::Derivation;
 use error::reserve;
 use std::sync::Arc;
 use voxels::each;
@@ -192,7 +194,7 @@ impl Volume {
         let [nx, ny, nz] = self.dims();
         let Self { affine, space, .. } = *self;
         let volume = Volume::new(VolumeInit { affine, space, ..VolumeInit::new(voxels, [nx, ny, nz, 1]) })?;
-        Ok(volume.with_unit(self.unit))
+        Ok(volume.derived(self, Derivation::Grid))
     }
 
     /// Returns the volume with the length unit of its world coordinates set to `unit`.
@@ -368,7 +370,7 @@ impl Volume {
     /// Returns the volume of the 0/1 mask `values`, one per voxel of all frames, on the grid of this volume.
     fn mask(&self, values: Vec<u8>) -> Result<Volume, VolumeError> {
         let init = VolumeInit { slope: 1.0, intercept: 0.0, ..self.init_with(Voxels::U8(values)) };
-        Ok(Volume::new(init)?.with_unit(self.unit))
+        Ok(Volume::new(init)?.derived(self, Derivation::Same))
     }
 
     /// Returns the number of voxels in one frame.

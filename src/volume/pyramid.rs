@@ -6,6 +6,7 @@
 //! h, U apart along each axis. U is the smallest voxel side at level 0 and grows by ρ per level. Samples between voxels
 //! are interpolated linearly; the border is replicated.
 
+use super::derived::Derivation;
 use super::error::{VolumeError, reserve};
 use super::sampling::locate_f64;
 use super::voxels::Voxels;
@@ -91,7 +92,7 @@ impl Volume {
             space: self.space,
             ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], frames.len()])
         })?;
-        Ok(volume.with_unit(self.unit))
+        Ok(volume.derived(self, Derivation::Averaged))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Resampling of a volume to another grid.
 
+use super::derived::Derivation;
 use super::error::{VolumeError, reserve};
 use super::same_grid::GRID_TOLERANCE;
 use super::sampling::trilinear;
@@ -53,7 +54,7 @@ impl Volume {
             space: target.space,
             ..self.init_with(voxels)
         })?;
-        Ok(volume.with_unit(target.unit))
+        Ok(volume.derived(self, Derivation::Interpolated).with_unit(target.unit))
     }
 
     /// Returns the grid of `dims` voxels in the field of view of this volume.

@@ -34,7 +34,7 @@ impl Volume {
             frame_seconds: frame_seconds.unwrap_or(first.frame_seconds),
             space: first.space,
         })?;
-        Ok(volume.with_unit(first.unit))
+        Ok(volume.with_unit(first.unit).with_warnings_of(frames))
     }
 }
 

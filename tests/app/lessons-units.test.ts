@@ -26,6 +26,7 @@ const READING: LabReading = {
   example: 'sponge',
   params: { rigidity: 0.3, integrator: 'euler' },
   measures: { chi: -160, volume: 90, closed: true },
+  warnings: [],
 };
 const RECORDS = { first: { volume: 100 } };
 

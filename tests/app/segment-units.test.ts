@@ -255,7 +255,7 @@ describe('fill', () => {
       },
     });
     const voxels = Uint8Array.from({ length: COUNT }, (_, index) => (placeOf(index)[0] === 0 ? 3 : 0));
-    const map = { map: 1, voxels, surfaces: [], known: [], labelFile: undefined, milliseconds: 0 };
+    const map = { map: 1, voxels, surfaces: [], known: [], labelFile: undefined, milliseconds: 0, warnings: [] };
     editing.adopt({ dims: DIMS, spacing: [1, 1, 1] }, map, ['One']);
     const filled = () => [...voxels].filter((label) => label === 1).length;
     return { editing, filled, said };

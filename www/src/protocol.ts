@@ -17,6 +17,7 @@ import type {
   StepReport,
   UncoveredRegion,
   Vec3,
+  Warning,
 } from 'vesicle';
 
 import type { Edit } from './finish/protocol';
@@ -34,6 +35,7 @@ export type {
   StepReport,
   UncoveredRegion,
   Vec3,
+  Warning,
 };
 
 export type ParamValues = Record<string, unknown>;
@@ -120,6 +122,8 @@ export interface VolumeView extends LevelView {
   /** Smallest and largest intensity of the volume. */
   range: [number, number];
   histogram: Uint32Array;
+  /** Warnings about the volume. */
+  warnings: readonly Warning[];
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
    * and the bytes of all.
@@ -217,10 +221,13 @@ export interface RunCode {
   note?: string | undefined;
 }
 
-/** A surface as a file; `recentre` moves it to the origin. */
+/** A surface as a file. */
 export interface ExportRequest {
   format: MeshFormat;
+  /** Whether the surface is moved to the origin. */
   recentre?: boolean;
+  /** Warnings that the file is to have in comments, besides those of the mesh. */
+  warnings?: readonly Warning[];
 }
 
 /** Requests of the page to the workers of all labs whose model runs. */
@@ -252,6 +259,7 @@ export interface Requests extends CodeRequests {
   setParams: { body: ParamValues; reply: ParamValues };
   /** Sets the planes whose cross-sections with the surface are sent from now on, for the outlines on the slices. */
   planes: { body: Plane[]; reply: undefined };
+  /** Replies with the surface as a file, with its own `warnings` and those given. */
   export: { body: ExportRequest; reply: Uint8Array };
   /** Replies with `levels` coarser levels of the volume's pyramid for display, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };

@@ -290,8 +290,8 @@ class Session {
     this.#done = false;
   }
 
-  #export({ format, recentre = false }: ExportRequest): Uint8Array {
-    const bytes = this.#current().mesh.toBytes(format, { recentre });
+  #export({ format, recentre = false, warnings = [] }: ExportRequest): Uint8Array {
+    const bytes = this.#current().mesh.toBytes(format, { recentre, warnings });
     return withTransfer(bytes, [bytes]);
   }
 

@@ -2,6 +2,7 @@ import { text } from '../texts';
 import { h, uniqueId } from '../ui/dom';
 import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
 import { figure } from '../ui/format';
+import { cellOf, type Warning } from '../warnings';
 import { type Finishing, isCancelled } from './finishing';
 import type { Comparison, Distances } from './protocol';
 
@@ -21,6 +22,8 @@ export interface ComparePanelEvents {
   /** Called with the distance of each vertex from the reference, to be shown as colours; undefined for none. */
   onValues: (values: Float32Array | undefined) => void;
   onSave: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
+  /** Returns the warnings that concern the surface. */
+  warnings: () => readonly Warning[];
 }
 
 /** Panel that compares the surface with a reference, a mesh or a label map, from files. */
@@ -186,7 +189,9 @@ export class ReferencePanel {
     if (!found) return;
     const head = ['direction', ...MEASURES.map(([name]) => (name === 'max' ? 'hausdorff' : name))];
     const lines = DIRECTIONS.map(([name]) => [name, ...MEASURES.map(([measure]) => found[name][measure])]);
-    const all = [head, ...lines, ['dice', found.dice ?? '']].map((line) => line.join(','));
+    const warnings = cellOf(this.#events.warnings());
+    const rest = [['dice', found.dice ?? ''], ...(warnings ? [['warnings', warnings]] : [])];
+    const all = [head, ...lines, ...rest].map((line) => line.join(','));
     this.#events.onSave('csv', new TextEncoder().encode(`${all.join('\n')}\n`), 'text/csv', '-comparison');
   }
 }

@@ -4,6 +4,7 @@ import type { ExportRequest, Measures, Vec3 } from '../protocol';
 import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
+import type { Warning } from '../warnings';
 import { isEdit } from './code';
 import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
@@ -17,6 +18,8 @@ export interface FinishHost {
   mesh: () => Promise<Uint8Array>;
   view: EditedView;
   measures: MeasurePanel;
+  /** Returns the warnings that concern the surface. */
+  warnings: () => readonly Warning[];
   save: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
 }
 
@@ -45,6 +48,7 @@ export class Finish {
         this.#show();
       },
       onSave: host.save,
+      warnings: host.warnings,
     });
     const edits = folded(text('finish.title'), this.#edits.element);
     edits.addEventListener('toggle', () => {

@@ -158,7 +158,7 @@ const handlers: Handlers<Requests> = {
   edit,
   undo: () => travel(-1),
   redo: () => travel(1),
-  export: ({ format, recentre = false }) => current().mesh.toBytes(format, { recentre }),
+  export: ({ format, recentre = false, warnings = [] }) => current().mesh.toBytes(format, { recentre, warnings }),
   section: (plane) => sectionOf(current().mesh, plane),
   measure,
   reference: readReference,

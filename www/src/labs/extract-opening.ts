@@ -71,9 +71,9 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   }
 
   /** Opens a volume passed on by another lab, with the parameters passed on with it. */
-  override passedOn({ name, bytes, params }: Handoff): Promise<void> {
+  override passedOn({ name, bytes, params, warnings = [] }: Handoff): Promise<void> {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
-    return this.open({ name, load, linked: { params, attractors: [] }, unit: '', isMade: true });
+    return this.open({ name, load, linked: { params, attractors: [] }, unit: '', isMade: true, warnings });
   }
 
   protected find(id: string): Example | undefined {

@@ -112,6 +112,7 @@ export class ExtractParts extends RunParts<Example> {
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
+    this.warnings.actions = { point: (point) => this.stage.goTo(point) };
     this.layOut({
       name: 'extract',
       options: this.options.element,
@@ -126,7 +127,7 @@ export class ExtractParts extends RunParts<Example> {
         this.paramsSection(true),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.measures.element),
+        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
         this.saveSection(this.stage.subject, this.#sculpt),
         ...this.finishSections(this.stage.editing, this.measures),
@@ -142,6 +143,7 @@ export class ExtractParts extends RunParts<Example> {
   adopt(volume: VolumeView, source: ExtractSource): void {
     const { example, unit = unitOf(volume) } = source;
     this.saving.name = volume.name;
+    this.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
@@ -182,6 +184,7 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   showHistory(): void {
+    this.showRunWarnings();
     this.#plots.update();
     this.#times.update(this.history);
     this.csv.disabled = this.history.reports.length === 0;

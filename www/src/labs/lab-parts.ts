@@ -15,6 +15,8 @@ import { PicturePanel, type PictureSubject } from '../ui/pictures';
 import { type CodeEvents, SessionControls, type SessionEvents } from '../ui/session';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
+import { WarningList } from '../ui/warnings';
+import type { Warning } from '../warnings';
 import type { ExamplePanel, Listed } from './example-panel';
 import { Saving } from './saving';
 
@@ -47,12 +49,11 @@ interface PartsOptions<Example extends Listed> {
   sessionHelp?: string;
 }
 
-/** Returns the present surface as a file. */
+/** Returns the present surface as a file, with warnings besides those that it has itself. */
 export type FetchMesh = (request: ExportRequest) => Promise<Uint8Array>;
 
 interface RunPartsOptions<Example extends Listed> extends PartsOptions<Example> {
   history: History;
-  /** Returns the present surface as a file. */
   fetchMesh: FetchMesh;
   /** Heading of the column of residuals in the data of the plots. */
   residual?: string;
@@ -81,6 +82,8 @@ export abstract class LabParts<Example extends Listed> {
   readonly status = new StatusLine();
   readonly banner: ErrorBanner;
   readonly data: ExamplePanel<Example>;
+  /** Warnings about data and result. */
+  readonly warnings = new WarningList();
   readonly saving = new Saving((message) => this.status.say(message));
   /** Starts or continues the run, in labs whose model runs. */
   protected onRun: (() => void) | undefined;
@@ -229,7 +232,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     });
     this.csv = h(
       'button',
-      { type: 'button', disabled: true, onclick: () => this.saving.plots(history, residual) },
+      { type: 'button', disabled: true, onclick: () => this.saving.plots(history, this.warnings.all, residual) },
       text('labs.plotData'),
     );
   }
@@ -244,7 +247,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   }
 
   /** Returns the surface, edited if it is, as a file. */
-  surfaceFile(request: ExportRequest): Promise<Uint8Array> {
+  surfaceFile(given: ExportRequest): Promise<Uint8Array> {
+    const request = { ...given, warnings: this.surfaceWarnings };
     return this.finish?.exported(request) ?? this.#fetchMesh(request);
   }
 
@@ -275,7 +279,13 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
       return this.#fetchMesh({ format: 'ply' });
     };
     this.#edited = view;
-    this.finish = new Finish({ mesh, view, measures, save: (...file) => this.saving.bytes(...file) });
+    this.finish = new Finish({
+      mesh,
+      view,
+      measures,
+      warnings: () => this.surfaceWarnings,
+      save: (...file) => this.saving.bytes(...file),
+    });
     return this.finish.elements;
   }
 
@@ -294,6 +304,16 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
 
   dispose(): void {
     this.finish?.close();
+  }
+
+  /** The warnings that concern the surface shown. */
+  get surfaceWarnings(): readonly Warning[] {
+    return this.warnings.all;
+  }
+
+  /** Shows the warnings of the last report of the run. */
+  protected showRunWarnings(): void {
+    this.warnings.showReport(this.history.reports.at(-1));
   }
 
   /** Added to the names of saved surfaces, to distinguish several of the same data. */

@@ -274,8 +274,9 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
 
   /** Opens the present surface in the Sculpt lab, as a mesh to deform. */
   protected toSculpt(mesh: Promise<Uint8Array>, name = text('labs.surfaceName', { name: this.ui.saving.name })): void {
+    const warnings = this.ui.surfaceWarnings;
     this.ask(
-      mesh.then((bytes) => this.passOn({ lab: 'sculpt', name, bytes, params: {} })),
+      mesh.then((bytes) => this.passOn({ lab: 'sculpt', name, bytes, params: {}, warnings })),
       text('labs.toSculptFailed'),
     );
   }

@@ -1,6 +1,7 @@
 /** The interface between the page and its labs. */
 import type { ParamValues } from '../protocol';
 import type { Session } from '../session/file';
+import type { Warning } from '../warnings';
 import type { LAB_IDS } from './address';
 
 /**
@@ -16,6 +17,8 @@ export interface Handoff {
   /** Content of a volume or mesh file. */
   bytes: Uint8Array;
   params: ParamValues;
+  /** Warnings about it, which its file does not have. */
+  warnings?: readonly Warning[];
 }
 
 /** A lab that is open, as the page controls it. */

@@ -4,6 +4,7 @@ import type { Failure, NamedBytes, ParamSpec } from '../protocol';
 import type { Session } from '../session/file';
 import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
+import type { Warning } from '../warnings';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
 
@@ -29,6 +30,8 @@ export interface Source<Example, Linked, Data> {
   isChange?: boolean;
   /** Whether the data are nowhere but in the app, since another lab has made them. */
   isMade?: boolean;
+  /** Warnings about the data, which they do not have themselves. */
+  warnings?: readonly Warning[];
 }
 
 /** The controls of a lab that opening data affects. */

@@ -103,7 +103,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
       ],
       results: [
         section(text('labs.sectionProgress'), this.phases.element),
-        section(text('labs.sectionSurface'), this.measures.element),
+        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
         this.saveSection(this.view.subject, ...this.#uses),
         ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
@@ -114,7 +114,8 @@ export class ReconstructParts extends RunParts<CloudExample> {
 
   /** Shows newly opened points with their cameras and facts. */
   adopt(cloud: Cloud, photographs: Photograph[], example: CloudExample | undefined, name: string): void {
-    const { points, colors, normals } = cloud;
+    const { points, colors, normals, warnings } = cloud;
+    this.warnings.showData(warnings);
     this.#photographs = photographs;
     this.saving.name = name;
     this.measures.unit = '';

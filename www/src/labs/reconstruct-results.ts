@@ -126,6 +126,7 @@ export class ReconstructResults {
   #showHistory(): void {
     const last = this.#history.reports.at(-1);
     this.#ui.transport.showReport(last && { ...last, progress: overallProgress(last) });
+    this.#ui.warnings.showReport(last);
     this.#ui.phases.update(this.#history, this.#states.value === 'running');
     this.#ui.plots.update();
     this.#ui.csv.disabled = this.#history.reports.length === 0;

@@ -164,9 +164,10 @@ export class ReconstructLab extends RunLab<CloudExample> {
   #toExtract(): void {
     this.ui.status.say(text('reconstruct.samplingVolume'));
     const name = text('reconstruct.volumeName', { name: this.ui.saving.name });
+    const { surfaceWarnings: warnings } = this.ui;
     const volume = this.client.request('volume', { size: VOLUME_SIZE });
     const passed = volume.then(({ bytes, level }) =>
-      this.passOn({ lab: 'extract', name, bytes, params: { iso: level, isoForce: -1 } }),
+      this.passOn({ lab: 'extract', name, bytes, params: { iso: level, isoForce: -1 }, warnings }),
     );
     this.ask(passed, text('reconstruct.volumeFailed'));
   }

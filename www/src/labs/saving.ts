@@ -1,6 +1,7 @@
 import { text } from '../texts';
 import { download } from '../ui/files';
 import type { History } from '../ui/history';
+import type { Warning } from '../warnings';
 import { toCsv } from './csv';
 
 /** Saves a lab's results as files named after the open volume or mesh; `say` shows the name of each saved file. */
@@ -26,9 +27,9 @@ export class Saving {
     return this.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '').replaceAll(' ', '-');
   }
 
-  /** Saves the data of the plots as CSV; `residual` is the heading of the residual's column. */
-  plots(history: History, residual?: string): void {
-    this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
+  /** Saves the data of the plots as CSV, with warnings; `residual` is the heading of the residual's column. */
+  plots(history: History, warnings: readonly Warning[], residual?: string): void {
+    this.bytes('csv', new TextEncoder().encode(toCsv(history, warnings, residual)), 'text/csv');
   }
 
   /**

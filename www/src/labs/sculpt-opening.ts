@@ -43,8 +43,8 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
   }
 
   /** Opens a mesh passed on by another lab. */
-  override passedOn({ name, bytes }: Handoff): Promise<void> {
-    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }), isMade: true });
+  override passedOn({ name, bytes, warnings = [] }: Handoff): Promise<void> {
+    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }), isMade: true, warnings });
   }
 
   protected find(id: string): SculptExample | undefined {

@@ -16,6 +16,7 @@ import { Plots } from '../ui/plots';
 import { SculptOptionControls } from '../ui/sculpt-options';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
+import type { Warning } from '../warnings';
 import { DragLatency } from './drag-latency';
 import { type RunEvents, RunParts } from './lab-parts';
 import { ACCEPT } from './mesh-files';
@@ -79,7 +80,7 @@ export class SculptParts extends RunParts<SculptExample> {
         this.paramsSection(),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.measures.element),
+        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
         this.saveSection(this.view.subject),
         ...this.finishSections(this.view.editing, this.measures),
         section(text('labs.sectionPlots'), this.plots.element, this.csv),
@@ -87,13 +88,15 @@ export class SculptParts extends RunParts<SculptExample> {
     });
   }
 
-  /** Shows a newly opened scene: meshes with their texture, ellipsoids and facts. */
+  /** Shows a newly opened scene: meshes with their texture, ellipsoids and facts, and warnings `known` before. */
   adopt(
-    { box, start, pose, detail, bands, buildMs, texture }: OpenedScene,
+    { box, start, pose, detail, bands, buildMs, texture, warnings }: OpenedScene,
     example: SculptExample | undefined,
     name: string,
+    known: readonly Warning[] = [],
   ): void {
     this.saving.name = example?.id ?? name;
+    this.warnings.showData(known, warnings);
     this.measures.unit = '';
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);

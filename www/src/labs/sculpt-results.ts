@@ -159,7 +159,9 @@ export class SculptResults {
 
   #showHistory(): void {
     this.#shownAt = performance.now();
-    this.#ui.transport.showReport(this.#history.reports.at(-1));
+    const last = this.#history.reports.at(-1);
+    this.#ui.transport.showReport(last);
+    this.#ui.warnings.showReport(last);
     this.#ui.plots.update();
     this.#ui.csv.disabled = this.#history.reports.length === 0;
   }

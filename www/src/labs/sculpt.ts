@@ -107,7 +107,7 @@ export class SculptLab extends RunLab<SculptExample> {
       if (example?.params[name] === undefined) delete this.#usual[name];
       else if (Object.is(opened.params[name], value)) this.#usual[name] = example.params[name];
     this.#results.clear();
-    this.ui.adopt(opened, example, name);
+    this.ui.adopt(opened, example, name, source.warnings);
     const film = filmOf(linked ?? { params: {} }, example?.film);
     const { pose, params } = opened;
     this.#settings.adopt({ pose, names: example?.names ?? [], posed: linked?.pose !== undefined, film, params });

@@ -2,7 +2,7 @@ import { flood, floodBox, sweep } from '../segment/brush';
 import type { SegmentClient } from '../segment/client';
 import { LabelMap, type Patch, rangeOf } from '../segment/label-map';
 import { freeValue, type KnownLabel, type Label, newLabel } from '../segment/labels';
-import type { LabelArray, OpenedLabels, Region, SurfaceUpdate, Vec3, VolumeView } from '../segment/protocol';
+import type { LabelArray, OpenedLabels, Region, StepUpdate, Vec3, VolumeView } from '../segment/protocol';
 import { grown, union } from '../segment/region';
 import { text } from '../texts';
 import { type ToolSettings, usesRange } from '../ui/segment-tools';
@@ -36,7 +36,7 @@ export interface EditedLab {
   /** Called when voxels have changed, before the surfaces follow. */
   onVoxels: () => void;
   /** Called with surfaces that have followed a change; after a large one they are not `smooth` at first. */
-  onUpdate: (update: SurfaceUpdate, smooth: boolean) => void;
+  onUpdate: (update: StepUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
   /** Called when a fill has reached no voxel, with the reason. */

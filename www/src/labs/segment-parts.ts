@@ -66,6 +66,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
       events.onOptions();
     });
     this.labels = new LabelList(events);
+    this.warnings.actions = { label: (label) => events.onActive(label), point: (point) => this.view.goTo(point) };
     this.tools = new SegmentTools(events);
     const maps = MAP_FORMATS.map(({ format, label, help }) =>
       button(label, help, { 'data-map': format }, () => events.onSaveMap(format)),
@@ -89,7 +90,7 @@ export class SegmentParts extends LabParts<SegmentExample> {
         this.paramsSection(),
       ],
       results: [
-        section(text('segment.sectionMeasures'), this.measures.element),
+        section(text('segment.sectionMeasures'), this.warnings.element, this.measures.element),
         section(text('segment.sectionMap'), exported(text('segment.mapsHelp'), ...maps)),
         section(
           text('segment.sectionSurfaces'),

@@ -6,6 +6,7 @@ import type { Label } from '../segment/labels';
 import type { VolumeFormat } from '../segment/protocol';
 import { RECENTRED } from '../ui/exports';
 import type { SegmentView } from '../view/segmentation';
+import { concerning, type Warning } from '../warnings';
 import type { Saving } from './saving';
 import type { SurfaceFormat } from './segment-parts';
 
@@ -33,20 +34,21 @@ export async function saveMap(
 export async function saveSurfaces(
   format: SurfaceFormat,
   client: SegmentClient,
-  saving: Saving,
+  { saving, warnings: { all } }: { saving: Saving; warnings: { all: readonly Warning[] } },
   labels: readonly Label[],
   surfaces: ReturnType<SegmentView['surfaces']>,
   recentre = false,
 ): Promise<void> {
   if (format === 'glb') {
     const { toGlb } = await import('../segment/glb');
-    return saving.bytes('glb', await toGlb(labels, surfaces), 'model/gltf-binary', '-labels');
+    return saving.bytes('glb', await toGlb(labels, surfaces, all), 'model/gltf-binary', '-labels');
   }
   const files: Record<string, Uint8Array> = {};
   for (const { value, name } of labels) {
     if (!surfaces.has(value)) continue;
+    const body = { value, format, warnings: concerning(all, { label: value }) };
     const stem = `${value}-${name.replace(/[^\p{L}\p{N}]+/gu, '-')}`;
-    files[`${stem}.${format}`] = await client.request('exportMesh', { value, format, recentre });
+    files[`${stem}.${format}`] = await client.request('exportMesh', { ...body, recentre });
   }
   saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip', `-${format}${recentre ? RECENTRED : ''}`);
 }

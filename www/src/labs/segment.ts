@@ -78,7 +78,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#editing = new SegmentEditing(this.client, {
       onLabels: () => this.#showLabels(),
       onVoxels: () => ui.view.showLabels(),
-      onUpdate: (update, smooth) => this.#take(update, smooth),
+      onUpdate: (update, smooth) => {
+        ui.warnings.showReport(update);
+        this.#take(update, smooth);
+      },
       onBusy: () => states.setModelState('running'),
       onNothing: (reason) => {
         this.#isUnfilled = true;
@@ -218,6 +221,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #showAll(opened: OpenedLabels): void {
+    this.ui.warnings.showData(opened.warnings);
     this.#measures.clear();
     this.#released = undefined;
     this.#latency = {};
@@ -409,7 +413,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #saveSurfaces(format: SurfaceFormat, recentre = false): void {
     this.ui.offer.hide();
     const surfaces = this.ui.view.surfaces();
-    const saving = saveSurfaces(format, this.client, this.ui.saving, this.#editing.labels, surfaces, recentre);
+    const saving = saveSurfaces(format, this.client, this.ui, this.#editing.labels, surfaces, recentre);
     const offering = saving.catch((error) => {
       const [first] = surfaces.values();
       if (toFailure(error).code !== 'precision' || !first) throw error;

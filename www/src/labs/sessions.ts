@@ -4,6 +4,8 @@ import { isSession } from '../session/recognise';
 import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import type { ErrorBanner, StatusLine } from '../ui/status';
+import type { WarningList } from '../ui/warnings';
+import { warningsIn } from '../warnings';
 import type { LAB_IDS } from './address';
 import type { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
@@ -13,7 +15,13 @@ import type { Saving } from './saving';
 /** A lab, as its sessions need it. */
 interface SessionLab {
   id: (typeof LAB_IDS)[number];
-  ui: { banner: ErrorBanner; status: StatusLine; saving: Saving; finish?: Finish | undefined };
+  ui: {
+    banner: ErrorBanner;
+    status: StatusLine;
+    saving: Saving;
+    warnings: WarningList;
+    finish?: Finish | undefined;
+  };
   states: LabStates;
   // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
   opening: Opening<any, any, any, any>;
@@ -67,6 +75,7 @@ export class Sessions {
       ui.status.say(text('sessions.saving'));
       // A run that is paused and continued ends them.
       const { log: edits = [], undone = [] } = ui.finish ?? {};
+      const warnings = ui.warnings.all;
       const [{ describe, writeSession }, body, data] = await Promise.all([format(), content(), source.load()]);
       if (!body) throw new Error(text('sessions.notSaved'));
       const files = await describe(opening.filesOf(data), included || source.isMade === true);
@@ -76,7 +85,7 @@ export class Sessions {
         lab,
         hash: address(source),
         source: from,
-        content: { ...body, edits, undone },
+        content: { ...body, edits, undone, ...(warnings.length > 0 && { warnings }) },
       });
       ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
     } catch (error) {
@@ -107,8 +116,10 @@ export class Sessions {
   async #restore(session: Session, files: File[]): Promise<void> {
     const { opening, ui, states } = this.#lab;
     await opening.session(session, files);
-    const { edits, undone = [] } = session.content;
-    if (opening.source?.session !== session || !Array.isArray(edits) || !Array.isArray(undone)) return;
+    const { edits, undone = [], warnings } = session.content;
+    if (opening.source?.session !== session) return;
+    ui.warnings.restore(warningsIn(warnings));
+    if (!Array.isArray(edits) || !Array.isArray(undone)) return;
     await ui.finish?.repeat(edits, undone).catch((error) => states.fail(text('sessions.editsFailed'), error));
   }
 

@@ -3,6 +3,7 @@ import { beatOf } from '../track/curve';
 import type { TrackedFrame } from '../track/protocol';
 import { count, figure } from '../ui/format';
 import type { ExtraMeasure } from '../ui/measures';
+import { cellOf, concerning, type Warning } from '../warnings';
 
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const round = (value: number) => figure(Number(value.toPrecision(3)));
@@ -90,16 +91,23 @@ const COLUMNS = [
 
 /**
  * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units. `truth`
- * are the true volumes of the frames, if known.
+ * are the true volumes of the frames, if known. If there are warnings, a last column has the codes of those that concern
+ * the frame.
  */
-export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
+export function framesCsv(
+  frames: readonly TrackedFrame[],
+  truth: readonly number[] | undefined,
+  warnings: readonly Warning[] = [],
+): string {
   const known = frames.some(({ error }) => error);
-  const head = ['frame', ...COLUMNS, 'self-intersections', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];
+  const ofError = known ? ['error', 'error (95 %)', 'true volume'] : [];
+  const head = ['frame', ...COLUMNS, 'self-intersections', ...ofError, ...(warnings.length > 0 ? ['warnings'] : [])];
   const lines = frames.map(({ facts, measures, error }, i) => [
     i + 1,
     ...COLUMNS.map((name) => facts[name as keyof typeof facts]),
     measures.report?.selfIntersections ?? '',
     ...(known ? [error?.mean ?? '', error?.p95 ?? '', truth?.[i] ?? ''] : []),
+    ...(warnings.length > 0 ? [cellOf(concerning(warnings, { frame: i }))] : []),
   ]);
   return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
 }

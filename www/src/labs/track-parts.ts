@@ -21,6 +21,7 @@ import { TRACK_OPTIONS } from '../ui/track-options';
 import { OptionControls } from '../ui/view-options';
 import { VolumeCurve } from '../ui/volume-curve';
 import { TrackView, type TrackViewOptions } from '../view/track';
+import { concerning, type Warning } from '../warnings';
 import { type RunEvents, RunParts } from './lab-parts';
 import { TRACK_ROWS } from './track-measures';
 import { factsOf, imageData } from './track-page';
@@ -106,6 +107,7 @@ export class TrackParts extends RunParts<TrackExample> {
     });
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
     this.view.onMoved = events.onMoved;
+    this.warnings.actions = { frame: stopAt, point: (point) => this.view.goTo(point) };
     this.layOut({
       name: 'track',
       options: this.options.element,
@@ -123,7 +125,7 @@ export class TrackParts extends RunParts<TrackExample> {
       ],
       results: [
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
-        section(text('track.sectionSurface'), this.measures.element),
+        section(text('track.sectionSurface'), this.warnings.element, this.measures.element),
         this.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
         ...this.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
         folded(text('labs.frames'), this.table.element),
@@ -142,6 +144,10 @@ export class TrackParts extends RunParts<TrackExample> {
       (value) => this.view.preview(value, this.#window),
     );
     this.#thresholdHolder.replaceWith(this.#threshold.element);
+  }
+
+  override get surfaceWarnings(): readonly Warning[] {
+    return concerning(super.surfaceWarnings, { frame: this.frames.frame });
   }
 
   protected override get suffix(): string {

@@ -166,7 +166,9 @@ export class TrackResults {
     measures.showExtra(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
     this.showCurve();
     this.showFigures();
-    this.#ui.transport.showReport(this.#history.reports.at(-1));
+    const last = this.#history.reports.at(-1);
+    this.#ui.transport.showReport(last);
+    this.#ui.warnings.showReport(last);
     const { value, modelState, ready } = this.#states;
     this.#ui.showState(value, modelState, ready, this.#frames.length, tracked !== undefined);
     this.#root.dataset.frame = String(this.#frame + 1);

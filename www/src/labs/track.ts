@@ -94,7 +94,7 @@ export class TrackLab extends RunLab<TrackExample> {
       onMoved: () => this.#results?.showFigures(),
       onCompare: (other) => void this.#compare(other),
       onCancelCompare: () => this.ask(this.client.request('cancelCompare', undefined)),
-      onSave: (what) => this.ask(saveTrack(what, this.client, this.ui.saving, this.#results), text('track.fileFailed')),
+      onSave: (what) => this.ask(saveTrack(what, this.client, this.ui, this.#results), text('track.fileFailed')),
       onSculpt: () => this.#frameToSculpt(),
     };
   }
@@ -143,6 +143,7 @@ export class TrackLab extends RunLab<TrackExample> {
 
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
+    this.ui.warnings.showData(volume.warnings);
     this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 

@@ -140,7 +140,9 @@ export class LessonView {
     if (this.#now)
       this.#now.textContent = tick ? this.#tickedText(check, tick, reading) : this.#missing(check, reading);
     if (tick || !holds(check, reading, recordsOf(this.#progress))) return;
-    this.#progress.ticks[id] = { at: new Date().toISOString(), link: location.href, measures: reading.measures };
+    const { measures, warnings } = reading;
+    const known = warnings.length > 0 && { warnings };
+    this.#progress.ticks[id] = { at: new Date().toISOString(), link: location.href, measures, ...known };
     this.#save();
     this.#body.querySelector('.lesson-check')?.toggleAttribute('data-ticked', true);
     this.#news.textContent = text('lessons.tickedNews', { number: this.#progress.step + 1 });

@@ -10,6 +10,8 @@ export interface Tick {
   /** Link to the state of the lab. */
   link: string;
   measures: Record<string, Value>;
+  /** The warnings beside the measures, in words, if there were any. */
+  warnings?: string[];
 }
 
 export interface Progress {

@@ -14,6 +14,8 @@ export interface LabReading {
   params: Record<string, Value>;
   /** Measures of the surface and `iteration`; area and volume only when they are those of the surface shown. */
   measures: Record<string, Value>;
+  /** The warnings, in words. */
+  warnings: string[];
 }
 
 const isValue = (value: unknown): value is Value => ['number', 'string', 'boolean'].includes(typeof value);
@@ -26,7 +28,13 @@ export function readLab(root: HTMLElement): LabReading {
     example: root.querySelector<HTMLSelectElement>('.data select')?.value ?? '',
     params: paramsIn(root),
     measures: measuresIn(root),
+    warnings: warningsIn(root),
   };
+}
+
+function warningsIn(root: HTMLElement): string[] {
+  const shown = root.querySelector<HTMLElement>('[data-warning-list]')?.dataset.warningList ?? '[]';
+  return JSON.parse(shown) as string[];
 }
 
 function measuresIn(root: HTMLElement): Record<string, Value> {

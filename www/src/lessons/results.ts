@@ -65,6 +65,7 @@ function stepResult(step: Step, number: number, progress: Progress, label: (meas
             ` (${new Date(tick.at).toLocaleString(LANGUAGE)})`,
           ),
           h('dl', {}, ...measures),
+          ...(tick.warnings ?? []).map((words) => h('p', { class: 'warning' }, `⚠ ${words}`)),
         ]
       : []),
     ...(answer ?? []),

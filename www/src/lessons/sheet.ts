@@ -56,6 +56,7 @@ function studentParts(step: Step, { ticks, answers }: Progress): HTMLElement[] {
   const ticked = ticks[step.id] !== undefined;
   check?.classList.add('lesson-check');
   check?.toggleAttribute('data-ticked', ticked);
+  for (const words of ticks[step.id]?.warnings ?? []) check?.append(h('p', {}, `⚠ ${words}`));
   if (question) question.append(h('p', { class: 'room' }, answers[step.id] ?? ''));
   return [goal, act, watch, check, question].filter((part) => part !== undefined);
 }

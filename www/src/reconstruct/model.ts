@@ -23,13 +23,13 @@ export async function cloudFrom(source: CloudSource): Promise<Cloud> {
  * `setup`, and restores a saved state, if given.
  */
 export function buildModel(
-  { points, normals, colors }: Cloud,
+  { points, normals, colors, warnings = [] }: Cloud,
   cameras: CameraView[],
   setup: Setup,
   state?: Uint8Array,
 ): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
-  const options: ImplicitOptions = { points, cameras, params };
+  const options: ImplicitOptions = { points, cameras, params, warnings };
   if (normals) options.normals = normals;
   if (colors) options.colors = colors;
   if (maxPoints !== undefined) options.maxPoints = maxPoints;

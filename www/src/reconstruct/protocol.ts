@@ -20,6 +20,7 @@ import type {
   StepReport,
   Surface,
   Vec3,
+  Warning,
 } from '../protocol';
 import type { RunLog } from '../worker/run-log';
 import type { VolumeBytes } from '../worker/volumes';
@@ -33,6 +34,8 @@ export interface Cloud {
   normals?: Float32Array;
   /** Colours of the points, rgb in 0..1. */
   colors?: Float32Array;
+  /** Warnings about the points. */
+  warnings?: readonly Warning[];
 }
 
 /** The camera of a photograph that the points were computed from, with the photograph if there is one. */

@@ -20,6 +20,7 @@ import type {
   StepReport,
   Surface,
   Vec3,
+  Warning,
 } from '../protocol';
 import type { RunLog } from '../worker/run-log';
 import type { Film } from './film';
@@ -71,6 +72,8 @@ export interface OpenedScene extends Ready {
   bands: number;
   /** The texture of the surface; undefined if it has none. */
   texture: MeshTexture | undefined;
+  /** Warnings about the meshes. */
+  warnings: readonly Warning[];
   /** Milliseconds spent building the model, most of them for its base. */
   buildMs: number;
 }

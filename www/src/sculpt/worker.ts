@@ -95,7 +95,8 @@ class Session {
     stages: (kind) => stagesOf(kind),
     record: (body) => this.#record(body.frameSeconds),
     cancelRecord: () => this.#recording.stop(),
-    export: ({ format, recentre = false }) => this.#current().mesh.toBytes(format, { recentre }),
+    export: ({ format, recentre = false, warnings = [] }) =>
+      this.#current().mesh.toBytes(format, { recentre, warnings }),
   };
 
   shown({ serial }: ShownMessage): void {
@@ -134,8 +135,9 @@ class Session {
       this.#origins = originsOf(source);
       const { bandCount: bands, mesh } = this.#current();
       const detail = scene.detail?.triangleCount;
-      const { texture } = mesh;
-      return { ...ready, box: mesh.info().bounds, detail, bands, texture, buildMs: performance.now() - began };
+      const { texture, warnings } = mesh;
+      const buildMs = performance.now() - began;
+      return { ...ready, box: mesh.info().bounds, detail, bands, texture, warnings, buildMs };
     } catch (error) {
       freeScene(scene);
       throw error;

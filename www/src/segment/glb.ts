@@ -1,12 +1,21 @@
 /** Writes surfaces of labels as one GLB; loaded when it is first needed. */
 import { BufferAttribute, BufferGeometry, Mesh, MeshStandardMaterial, Scene } from 'three';
 import { GLTFExporter } from 'three/addons/exporters/GLTFExporter.js';
+import { cellOf, type Warning } from '../warnings';
 import type { Label } from './labels';
 import type { Surface } from './protocol';
 
-/** Returns a GLB with a node for each label that has a surface, in world coordinates; nodes have the labels' names. */
-export async function toGlb(labels: readonly Label[], surfaces: ReadonlyMap<number, Surface>): Promise<Uint8Array> {
+/**
+ * Returns a GLB with a node for each label that has a surface, in world coordinates; nodes have the labels' names, and
+ * `extras` of the scene the warnings.
+ */
+export async function toGlb(
+  labels: readonly Label[],
+  surfaces: ReadonlyMap<number, Surface>,
+  warnings: readonly Warning[],
+): Promise<Uint8Array> {
   const scene = new Scene();
+  if (warnings.length > 0) scene.userData.warnings = warnings.map((one) => `${cellOf([one])}: ${one.text}`);
   for (const label of labels) {
     const surface = surfaces.get(label.value);
     if (surface) scene.add(meshOf(label, surface));

@@ -12,6 +12,7 @@ import type {
   Surface,
   Vec3,
   VolumeView,
+  Warning,
 } from '../protocol';
 import type { KnownLabel, Label } from './labels';
 
@@ -62,6 +63,8 @@ export interface SurfaceUpdate {
 /** The surfaces that have changed, after a step; `done` says whether they are smooth. */
 export interface StepUpdate extends SurfaceUpdate {
   done: boolean;
+  /** Warnings about the surfaces. */
+  warnings: readonly Warning[];
 }
 
 /** The open label map, with the surfaces of all its labels, which are not smooth yet. */
@@ -73,6 +76,8 @@ export interface OpenedLabels extends SurfaceUpdate {
   known: KnownLabel[];
   /** Name of the file with the label map; undefined if there is none, and the map was made by the lab. */
   labelFile: string | undefined;
+  /** Warnings about the volume and the label map. */
+  warnings: readonly Warning[];
 }
 
 export interface OpenedImage extends OpenedLabels {

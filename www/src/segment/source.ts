@@ -4,6 +4,7 @@ import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
 import { importSegmentation, importVolume, isDicom, isSegmentation, isTiff } from '../importers';
 import { count, text } from '../texts';
 import { invert, toWorld } from '../view/anatomy';
+import { merged, type Warning } from '../warnings';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
 import { readFiles } from '../worker/volumes';
@@ -26,6 +27,8 @@ export interface OpenMap {
   known: KnownLabel[];
   /** Name of its file, with a note if there is something to say of it; undefined if it has none. */
   file: string | undefined;
+  /** Warnings about the map. */
+  warnings: readonly Warning[];
 }
 
 /** A volume and its label map, in the same grid. */
@@ -44,7 +47,7 @@ export async function openImage({ files, labelling }: ImageSource): Promise<Open
   const [image, map] = await readBoth(files);
   const volume = new Volume(image.init);
   try {
-    const labels = map ? labelsOf(map, volume) : { voxels: computed(volume, labelling), known: [], file: undefined };
+    const labels = map ? labelsOf(map, volume) : computed(volume, labelling);
     return { volume, map: labels, unit: image.init.unit };
   } catch (error) {
     volume.free();
@@ -60,10 +63,14 @@ export async function openLabels(files: NamedBytes[], volume: Volume): Promise<O
   return labelsOf(await readMap(first), volume);
 }
 
-/** Returns the label map as a volume in the geometry of another one. */
-export function mapLike(volume: Volume, data: LabelArray, unit: LengthUnit | undefined): Volume {
+/** Returns the label map as a volume in the geometry of another one, with the warnings of both. */
+export function mapLike(
+  { volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>,
+  data: LabelArray,
+  own: readonly Warning[],
+): Volume {
   const { dims, affine, space } = volume;
-  return new Volume({ data, dims, affine, space, ...(unit && { unit }) });
+  return new Volume({ data, dims, affine, space, ...(unit && { unit }), warnings: merged(volume.warnings, own) });
 }
 
 interface NamedVolume {
@@ -139,7 +146,7 @@ function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume)
     const count = map.dims.reduce((product, size) => product * size, 1);
     const isPlain = (init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0;
     const voxels = isPlain ? (init.data.slice(0, count) as LabelArray) : Int32Array.from(map.intensities());
-    return { voxels: isCropped ? placed(map, voxels, volume) : voxels, known, file: name };
+    return { voxels: isCropped ? placed(map, voxels, volume) : voxels, known, file: name, warnings: map.warnings };
   } finally {
     map.free();
   }
@@ -224,8 +231,11 @@ const LABELLINGS: Record<Labelling, (intensities: Float32Array, dims: Vec3) => U
   head: labelHead,
 };
 
-function computed(volume: Volume, labelling: Labelling | undefined): LabelArray {
+/** Returns the label map of a volume without one: computed from its intensities, or empty. */
+function computed(volume: Volume, labelling: Labelling | undefined): OpenMap {
   const { dims } = volume;
-  if (labelling) return LABELLINGS[labelling](volume.intensities(), dims);
-  return new Uint8Array(dims[0] * dims[1] * dims[2]);
+  const voxels = labelling
+    ? LABELLINGS[labelling](volume.intensities(), dims)
+    : new Uint8Array(dims[0] * dims[1] * dims[2]);
+  return { voxels, known: [], file: undefined, warnings: [] };
 }

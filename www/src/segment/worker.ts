@@ -3,6 +3,7 @@
 import { LabelSurfaces, type Volume } from 'vesicle';
 import { quantize } from '../quantize';
 import { text } from '../texts';
+import type { Warning } from '../warnings';
 import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
@@ -39,14 +40,15 @@ class LiveMap {
   readonly #sent = new Map<number, number>();
 
   constructor(
-    { volume, unit }: Pick<OpenVolume, 'volume' | 'unit'>,
+    image: Pick<OpenVolume, 'volume' | 'unit'>,
     voxels: LabelArray,
+    warnings: readonly Warning[],
     params: ParamValues,
     state?: Uint8Array,
   ) {
     this.voxels = voxels;
-    this.map = mapLike(volume, voxels, unit);
-    this.#voxelVolume = Math.abs(determinant(volume.affine));
+    this.map = mapLike(image, voxels, warnings);
+    this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
       this.surfaces = new LabelSurfaces({ volume: this.map, ...params });
       if (state) this.surfaces.restore(state);
@@ -132,17 +134,15 @@ class Session {
       const file = map.toBytes(format, { gzip: true });
       return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
     },
-    exportMesh: ({ value, ...request }) =>
-      this.#current()
-        .surfaces.mesh(value)
-        .toBytes(request.format, { recentre: request.recentre ?? false }),
+    exportMesh: ({ value, format, recentre = false, warnings = [] }) =>
+      this.#current().surfaces.mesh(value).toBytes(format, { recentre, warnings }),
   };
 
   async #openImage({ name, source, params, labels, state }: Requests['open']['body']): Promise<OpenedImage> {
     const began = performance.now();
     const opened = await openImage(source);
     try {
-      const live = new LiveMap(opened, labels ?? opened.map.voxels, params, state);
+      const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, state);
       this.#adopt(live);
       this.#open?.volume.free();
       this.#open = opened;
@@ -163,7 +163,7 @@ class Session {
     const began = performance.now();
     const image = this.#image();
     const opened = await openLabels(files, image.volume);
-    const live = new LiveMap(image, opened.voxels, { ...this.#current().surfaces.params });
+    const live = new LiveMap(image, opened.voxels, opened.warnings, { ...this.#current().surfaces.params });
     this.#adopt(live);
     const all = this.#all(live, opened, began);
     return withTransfer(all, [...arraysOf(all), all.voxels]);
@@ -173,11 +173,11 @@ class Session {
   #step(map: number, block?: LabelBlock): StepUpdate {
     const began = performance.now();
     const live = this.#current();
-    if (map !== live.id) return { surfaces: [], milliseconds: 0, done: true };
+    if (map !== live.id) return { surfaces: [], milliseconds: 0, done: true, warnings: [] };
     if (block) live.write(block);
-    const { done } = live.surfaces.step(1);
+    const { done, warnings } = live.surfaces.step(1);
     const update = this.#update(done || block ? live.changed : [], began);
-    return withTransfer({ ...update, done }, arraysOf(update));
+    return withTransfer({ ...update, done, warnings }, arraysOf(update));
   }
 
   #adopt(live: LiveMap): void {
@@ -187,7 +187,8 @@ class Session {
 
   #all(live: LiveMap, { known, file }: OpenMap, began: number): OpenedLabels {
     const update = this.#update(live.surfaces.labels, began);
-    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file };
+    const { warnings } = live.map;
+    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file, warnings };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {

@@ -302,10 +302,10 @@ class Session {
     return toCode(this.#log.log, program, edits);
   }
 
-  #export({ frame, format, recentre = false }: Requests['export']['body']): Uint8Array {
+  #export({ frame, format, recentre = false, warnings = [] }: Requests['export']['body']): Uint8Array {
     const mesh = this.#current().meshAt(frame);
     try {
-      return mesh.toBytes(format, { recentre });
+      return mesh.toBytes(format, { recentre, warnings });
     } finally {
       mesh.free();
     }

@@ -160,6 +160,11 @@ export class SegmentView {
     if (dims) this.#moveTo(nearestVoxel(index, dims));
   }
 
+  /** Moves the crosshair to the voxel nearest to a point in world space. */
+  goTo(point: Vec3): void {
+    if (this.#scene) this.goToVoxel(toWorld(this.#scene.inverse, point));
+  }
+
   /** Moves on by a number of axial slices. */
   goAlong(slices: number): void {
     this.goToVoxel(this.#crosshair.map((x, axis) => (axis === this.axial ? x + slices : x)) as Vec3);

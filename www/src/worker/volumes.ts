@@ -6,6 +6,7 @@ import type { Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } fro
 import { shapeVoxels } from '../shapes';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
+import { concerning, type Warning } from '../warnings';
 import { toNrrd } from './nrrd';
 import { Refusal } from './refusal';
 
@@ -59,13 +60,19 @@ export interface OpenFrame {
  * one that other libraries read.
  */
 export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
-  const { frameSeconds: _, ...init } = await read(source);
+  const { frameSeconds: _, warnings = [], ...init } = await read(source);
   const [x, y, z, frames = 1] = init.dims;
   if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
     throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
   const size = x * y * z;
   const data = init.data.subarray(frame * size, (frame + 1) * size);
-  return { volume: new Volume({ ...init, data, dims: [x, y, z] }), frames, unit: init.unit };
+  const own = concerning(warnings, { frame }).map((warning) => withoutFrame(warning));
+  return { volume: new Volume({ ...init, data, dims: [x, y, z], warnings: own }), frames, unit: init.unit };
+}
+
+/** Returns a warning without its place if that is a frame, which is all there is. */
+function withoutFrame({ code, text, where }: Warning): Warning {
+  return where && !('frame' in where) ? { code, text, where } : { code, text };
 }
 
 async function read(source: VolumeSource): Promise<VolumeInit> {
@@ -102,7 +109,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   // Quantiles, because a few extreme voxels (metal, noise) must not make all others grey.
   const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
   const window: [number, number] = high > low ? [low, high] : range;
-  const { dims, frames, spacing, affine, space } = volume;
+  const { dims, frames, spacing, affine, space, warnings } = volume;
   return {
     name,
     dims,
@@ -113,6 +120,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
     range,
     histogram,
     window,
+    warnings,
     voxels: intensitiesOf(volume, pictures),
   };
 }
