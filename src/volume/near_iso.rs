@@ -178,11 +178,30 @@ impl Volume {
         if self.has_steps_above(least) {
             return Ok(None);
         }
-        let Some(contrast) = self.contrast_at(iso, frame)?.filter(|&contrast| contrast < least) else {
-            return Ok(None);
+        let contrast = match self.contrast_at(iso, frame)? {
+            Some(contrast) => contrast,
+            // No voxel may be rounded up to the iso value.
+            None if iso > self.range[0] => self.nearest_to(iso, frame)?,
+            None => return Ok(None),
         };
+        if contrast >= least {
+            return Ok(None);
+        }
         let half = 0.5 * WINDOW * contrast;
         Ok(Some([iso - half, iso + half]))
+    }
+
+    /// Returns the least difference of a finite voxel from `iso`, infinite if it is 0 or there is none.
+    fn nearest_to(&self, iso: f64, frame: usize) -> Result<f64, VolumeError> {
+        let start = self.frame_start(frame)?;
+        Ok(
+            each!(self.voxels.as_ref(), values => self.nearest_of(&values[start..start + self.frame_len()], iso)),
+        )
+    }
+
+    fn nearest_of<T: Copy + Into<f64>>(&self, stored: &[T], iso: f64) -> f64 {
+        let differences = stored.iter().map(|&v| (v.into() * self.slope + self.intercept - iso).abs());
+        differences.filter(|&difference| difference > 0.0).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns one frame as a grid with intensities scaled from `range` to [0, 1]; those beyond it become its ends, as

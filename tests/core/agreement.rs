@@ -586,7 +586,7 @@ fn anisotropic(random: &mut Random) -> Vec3 {
 }
 
 /// Asserts that on fields without thin features no method was refused or has another topology, and that nearly all volumes
-/// agree: the contour of a stepped or a small object lacks up to two percent of linear interpolation.
+/// agree: the contour of a stepped or a small object lacks up to three percent of linear interpolation.
 fn assert_agreement(tally: &Tally) {
     let (mut agree, mut differ) = (0, 0);
     for (&(kind, method, outcome), count) in tally.counts.iter().filter(|((kind, ..), _)| *kind != Kind::Thin)
@@ -601,7 +601,7 @@ fn assert_agreement(tally: &Tally) {
     for (&(kind, method), &(_, most, _)) in
         tally.differences.iter().filter(|((kind, _), _)| *kind != Kind::Thin)
     {
-        assert!(most.abs() < 0.03, "{kind:?} {method}: {most}");
+        assert!(most.abs() < 0.04, "{kind:?} {method}: {most}");
     }
 }
 
