@@ -231,7 +231,7 @@ fn case(seed: u64) -> Case {
     let plain = DeformableOptions { params: Some(params.clone()), ..Default::default() };
     let options = match random.below(4) {
         0 => ("default", plain),
-        1 if seed % 2 == 0 => ("levels 1", DeformableOptions { levels: 1, ..plain }),
+        1 if seed.is_multiple_of(2) => ("levels 1", DeformableOptions { levels: 1, ..plain }),
         1 => ("levels 2", DeformableOptions { levels: 2, ..plain }),
         2 => {
             // Other starts than the contour do not search for cavities by default.
