@@ -89,7 +89,7 @@ fn apply(tool: Tool, surface: &TriangleMesh, scale: f64, choice: &Choice) -> Res
             cut_by_plane(&mut mesh, Plane { origin: choice.normal * 0.1 * scale, normal: choice.normal })?
         }
         Tool::KeepComponents => {
-            return Ok(surface.without_components_below((scale * scale * scale)));
+            return Ok(surface.without_components_below(scale * scale * scale));
         }
         Tool::FillCavities => {
             let (outer, parts) = (outer_components(surface)?, surface.components());
