@@ -1,8 +1,8 @@
 //! Volume that a moving surface has lost or gained since the beginning, and the displacements that give it back where
 //! that was: smoothing takes it from what is thin or convex, which is not where the area is.
 //!
-//! What each vertex has swept since the beginning, and how it has moved, is averaged over neighbours. The averages are
-//! taken back: the volume by an offset along the normal, the displacement along the surface, without which ends of thin
+//! The volume that each vertex has swept since the beginning, and its displacement, are averaged over neighbours. The
+//! averages are undone: the volume by an offset along the normal, the displacement along the surface, without which ends of thin
 //! parts would grow into needles of hardly any volume. Both count from the beginning, and not from move to move, so that
 //! errors do not add up: whatever extends over more than the average stays where it is, however often the surface is
 //! smoothed.

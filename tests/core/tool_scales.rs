@@ -89,7 +89,7 @@ fn apply(tool: Tool, surface: &TriangleMesh, scale: f64, choice: &Choice) -> Res
             cut_by_plane(&mut mesh, Plane { origin: choice.normal * 0.1 * scale, normal: choice.normal })?
         }
         Tool::KeepComponents => {
-            return Ok(surface.without_components_below(scale.powi(3)));
+            return Ok(surface.without_components_below(scale * scale * scale));
         }
         Tool::FillCavities => {
             let (outer, parts) = (outer_components(surface)?, surface.components());
@@ -110,7 +110,7 @@ fn difference(a: &TriangleMesh, b: &TriangleMesh, scale: f64) -> f64 {
     }
     let off = |x: f64, y: f64| (y / x - 1.0).abs();
     let size = |bounds: [DVec3; 2]| (bounds[1] - bounds[0]).max_element();
-    off(a.volume, b.volume / scale.powi(3))
+    off(a.volume, b.volume / (scale * scale * scale))
         .max(off(a.area, b.area / (scale * scale)))
         .max(off(size(a.bounds), size(b.bounds) / scale))
 }

@@ -140,10 +140,9 @@ fn check_volumes(surfaces: &mut LabelSurfaces, volume: &Volume, what: &str) -> u
         let (off, is_warned) = (off * 100.0, warning.is_some());
         assert!((off.abs() > 0.999) <= is_warned, "{what}: label {} is {off} % off", label.value);
         let text = warning.map_or("", |warning| &warning.text);
-        assert!(
-            !is_warned || off.abs() > 0.999 && text.contains(&format!("{:.1} %", off.abs())),
-            "{what}: {off} {text}"
-        );
+        // Rounding may go either way.
+        let names = |off: f64| text.contains(&format!("{off:.1} %"));
+        assert!(!is_warned || [-0.01, 0.01].iter().any(|by| names(off.abs() + by)), "{what}: {off} {text}");
     }
     warnings.len()
 }

@@ -48,7 +48,7 @@ struct ThinLabel {
     voxels: f64,
     /// Whether all of its cells move.
     is_whole: bool,
-    /// What is missing of its volume beside what its polygons tell, which may be divided otherwise.
+    /// Volume that is missing beside that of its polygons, which may be divided otherwise.
     bias: f64,
     polygons: Vec<ThinPolygon>,
     /// Indices in the zone of the cells that move and have the label.
@@ -59,7 +59,7 @@ struct ThinLabel {
     is_pair: Vec<bool>,
 }
 
-/// What is missing around a cell.
+/// Volume that is missing around a cell.
 #[derive(Clone, Copy, Default)]
 struct Missing {
     /// The volume that the label lacks, and the amount of surface that can be moved.
@@ -178,7 +178,7 @@ impl Zone {
             if cell.simple == 1 { Vec3::ZERO } else { clear * (GAP / 2.0) }
         };
         let of_polygon = |polygon: &Polygon| {
-            // What the label of the lower number gains, the other one loses.
+            // Gains are those of the label of the lower number.
             let side = if polygon.labels.iter().all(|&other| other >= number) { 1.0 } else { -1.0 };
             ThinPolygon {
                 polygon: *polygon,
@@ -248,13 +248,13 @@ impl Zone {
 }
 
 impl Nets {
-    /// Returns whether a label of so many voxels, whose surface has so many triangles, is thin.
+    /// Returns whether a label is thin, from the numbers of its voxels and of the triangles of its surface.
     pub fn is_thin(voxels: usize, triangles: usize) -> bool {
         (voxels as f64) < THIN * triangles as f64 / 2.0
     }
 
-    /// Returns whether a label of so many voxels, whose surface has so many triangles, is hardly more than a sheet or a
-    /// thread.
+    /// Returns whether a label is hardly more than a sheet or a thread, from the numbers of its voxels and of the triangles
+    /// of its surface.
     pub fn is_sheet(voxels: usize, triangles: usize) -> bool {
         (voxels as f64) < SHEET * triangles as f64 / 2.0
     }
