@@ -196,7 +196,7 @@ describe('extrapolated display of a surface', () => {
 
   /** Returns a frame with one point on a ball at x that moves to `goal`. */
   function frame(x: number, goal: number, poseId: number) {
-    const one = { positions: Float32Array.of(x + 1, 0, 0) };
+    const one = { positions: Float32Array.of(x + 1, 0, 0), vertices: 1, origin: [0, 0, 0] };
     const event = { result: one, ellipsoids: [ball(x, 0, 0, 1)], pose: [ball(goal, 0, 0, 1)], poseId };
     return event as unknown as Parameters<SurfaceCarrier['frameShown']>[0];
   }
