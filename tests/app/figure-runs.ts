@@ -46,6 +46,7 @@ async function run(preset: Preset, variant: Variant, levels: number | undefined)
     const report = await model.run({ maxIterations: 3000, onStep });
     expect(report.done).toBe(true);
     expect(model.mesh.check()).toMatchObject({ closed: true, oriented: true });
+    expect(model.mesh.warnings).toEqual([]);
     const { vertices, components, genus, area, volume: inside } = model.mesh.info();
     // `work`: number of vertices, summed over all steps.
     return { iterations: report.iteration, vertices, components, genus, area, volume: inside, work };

@@ -60,6 +60,7 @@ async function outcomeOf(
   try {
     expect((await model.run()).done).toBe(true);
     expect(model.mesh.check()).toMatchObject({ closed: true, oriented: true, selfIntersections: 0 });
+    expect(model.mesh.warnings).toEqual([]);
     const { components, genus } = model.mesh.info();
     const { mean: fitness, meanCurvature } = model.fitness();
     return { components, genus, fitness, meanCurvature };

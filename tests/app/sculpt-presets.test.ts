@@ -63,6 +63,7 @@ describe.each(POSED)('figure %s', (id, preset, { pose, expected }) => {
     while (!model.step(1).done && frames < PATIENCE) frames += 1;
     expect(frames).toBeLessThan(PATIENCE);
     expectSound(model.mesh);
+    expect(model.mesh.warnings).toEqual([]);
     const { folded, areaLow, areaHigh } = factsOf(model);
     expectWithin(model.mesh.info().components, expected?.components, 'components');
     expectWithin(folded, expected?.folded, 'folded');
