@@ -7,6 +7,8 @@ import type { Warning, WarningCode } from './warning.js';
 const CODES: Record<WarningCode, true> = {
   'ends-in-frame': true,
   'begins-in-frame': true,
+  'uneven-brightness': true,
+  'small-object': true,
   'thin-label': true,
   ...{ precision: true, recentred: true, anisotropic: true, reader: true },
 };
