@@ -1,4 +1,4 @@
-/** What the app computes on the page of data far from the origin of world space: the same as beside the origin. */
+/** Computations of the page on data far from the origin of world space: the same as beside the origin. */
 import { beforeAll, describe, expect, test, vi } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import init, { Mesh, Volume } from '../../pkg/index.js';
@@ -36,7 +36,7 @@ function surfaceOf(mesh: Mesh): Surface {
   return { positions, normals, indices, ...counts, origin: mesh.origin };
 }
 
-/** What the writer of GLB uses of a browser's FileReader. */
+/** The part of a browser's FileReader that the writer of GLB uses. */
 class BlobReader {
   result: ArrayBuffer | undefined;
   onloadend: () => void = () => undefined;
@@ -141,7 +141,7 @@ describe('a surface far away', () => {
     vi.stubGlobal('FileReader', BlobReader);
     const surface = surfaceOf(far());
     const label = { value: 1, name: 'one', color: '#ff0000', visible: true };
-    const mesh = Mesh.parse(await toGlb([label], new Map([[1, surface]])));
+    const mesh = Mesh.parse(await toGlb([label], new Map([[1, surface]]), []));
     expect(off(mesh.info().centroid, far().info().centroid)).toBeLessThan(1e-4);
   });
 });

@@ -49,7 +49,8 @@ impl Placement {
     fn measured(&self, mesh: &TriangleMesh) -> Measured {
         let Measures { volume, centroid, components, euler, .. } = measure(mesh);
         let centroid = (centroid - self.offset) / self.scale;
-        Measured { volume: volume / self.scale.powi(3), centroid, components, euler }
+        let volume = volume / (self.scale * self.scale * self.scale);
+        Measured { volume, centroid, components, euler }
     }
 }
 

@@ -20,7 +20,7 @@ import {
   Volume,
 } from '../../pkg/index.js';
 import init, * as worker from '../../pkg/worker.js';
-import { failure, HEALTHY, rejection } from './helpers.js';
+import { failure, HEALTHY, rejection, wrong } from './helpers.js';
 
 /** Metres of a UTM zone, in Bavaria. */
 const UTM: Vec3 = [512434, 5405590, 348];
@@ -204,9 +204,12 @@ describe('in other software', () => {
   });
 
   test('vtk.js gets it as the position of an actor, without which it is refused', () => {
-    const classes = { vtkPolyData, vtkDataArray };
+    // The declarations of vtk.js lack some of its own members.
+    const classes = { vtkPolyData: wrong(vtkPolyData), vtkDataArray: wrong(vtkDataArray) };
     expect(failure(() => new VtkSurface(classes).update(far())).code).toBe('precision');
-    const actor = vtkActor.newInstance();
+    const actor: { setPosition(x: number, y: number, z: number): void; getPosition(): Vec3 } = wrong(
+      vtkActor.newInstance(),
+    );
     new VtkSurface(classes, { actor }).update(far());
     expect(actor.getPosition()).toEqual(far().origin);
   });

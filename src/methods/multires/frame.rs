@@ -33,7 +33,7 @@ impl MultiresolutionModel {
     /// Returns the parameters for the next frame: edge bounds scaled so that one frame can reach them, to a target edge
     /// within a factor of 2 of the current mean edge of the deformed base.
     pub(super) fn params_now(&self) -> MultiresParams {
-        let ratio = self.params.target() / mean_edge(&self.surface);
+        let ratio = self.model_params.target() / mean_edge(&self.surface);
         let factor = if ratio > MAX_CHANGE {
             MAX_CHANGE / ratio
         } else if ratio * MAX_CHANGE < 1.0 {
@@ -41,15 +41,15 @@ impl MultiresolutionModel {
         } else {
             1.0
         };
-        let (edge_min, edge_max) = (factor * self.params.edge_min, factor * self.params.edge_max);
-        MultiresParams { edge_min, edge_max, ..self.params.clone() }
+        let (edge_min, edge_max) = (factor * self.model_params.edge_min, factor * self.model_params.edge_max);
+        MultiresParams { edge_min, edge_max, ..self.model_params.clone() }
     }
 
     /// Returns whether no further frame would remesh the membrane towards the edge bounds. Wide bounds may be met by
     /// edges far from the target edge.
     pub(super) fn has_edges_as_wanted(&self) -> bool {
         let now = self.params_now();
-        now == self.params || edges_within_bounds(&self.surface, now.bounds())
+        now == self.model_params || edges_within_bounds(&self.surface, now.bounds())
     }
 
     /// Advances the model by one frame, adds the duration of each part to `times`, and returns the edits made. If it
@@ -79,7 +79,7 @@ impl MultiresolutionModel {
     }
 
     fn residual_of(&self, mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> f64 {
-        residual(mesh, ellipsoids, self.params.energy) / self.params.target()
+        residual(mesh, ellipsoids, self.model_params.energy) / self.model_params.target()
     }
 
     /// Predicts the membrane for the next positions of the ellipsoids, `ellipsoids_after`, at the start of a frame.
@@ -113,8 +113,8 @@ impl MultiresolutionModel {
         }
         let positions = pushed_positions(&prediction.predicted, &prediction.ellipsoids_after);
         let depth = |v: VertexId| prediction.predicted.position(v).distance(positions[v.index()]);
-        let deepest =
-            f64::from(prediction.predicted.vertices().map(depth).fold(0.0, f32::max)) / self.params.target();
+        let deepest = f64::from(prediction.predicted.vertices().map(depth).fold(0.0, f32::max))
+            / self.model_params.target();
         if deepest > TOLERANCE {
             return None;
         }
@@ -142,7 +142,7 @@ impl MultiresolutionModel {
         let base = self.bands.base();
         let mut correspondence = project(&next, &before, &base.walker, f64::MAX);
         lap.end("project");
-        for _ in 0..self.params.distribute {
+        for _ in 0..self.model_params.distribute {
             distribute(&next, &base.walker, &mut correspondence);
         }
         unfold(&next, &base.walker, &base.normals, &mut correspondence);

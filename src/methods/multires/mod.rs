@@ -83,9 +83,10 @@ pub struct MultiresolutionModel {
     space: ModelSpace,
     bands: Bands,
     ellipsoids: MovingEllipsoids,
-    params: MultiresParams,
+    /// The parameters with lengths in units of the model.
+    model_params: MultiresParams,
     /// The parameters with lengths in world units, as the caller knows them.
-    given_params: MultiresParams,
+    params: MultiresParams,
     /// The deformed base S, a membrane over the ellipsoids.
     surface: Mesh,
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
@@ -167,12 +168,12 @@ impl MultiresolutionModel {
         let correspondence = project(&surface, &before, walker, f64::MAX);
         let detailed = detailed(&surface, &correspondence, &bands, &mut guard, detail_sampling(&params));
         let mut model = Self {
-            given_params: space.params_in_world(&params),
+            params: space.params_in_world(&params),
             space,
             components: 0,
             bands,
             ellipsoids: moving,
-            params,
+            model_params: params,
             surface,
             correspondence,
             detailed,
@@ -215,7 +216,7 @@ impl MultiresolutionModel {
         let mut levels = Vec::new();
         let ellipsoids = self.ellipsoids.now();
         let mut mesh = self.surface.clone();
-        solve_with(&mut mesh, &ellipsoids, &self.params, self.params.levels, |mesh| {
+        solve_with(&mut mesh, &ellipsoids, &self.model_params, self.model_params.levels, |mesh| {
             levels.push(self.space.in_world(mesh.to_triangles()));
         });
         levels
@@ -247,7 +248,7 @@ impl MultiresolutionModel {
 
     /// Returns the current parameters.
     pub fn params(&self) -> &MultiresParams {
-        &self.given_params
+        &self.params
     }
 
     /// Sets the parameters, also during a run. On an error they are unchanged.
@@ -261,9 +262,9 @@ impl MultiresolutionModel {
         let inner = self.space.params(&params);
         check_tips(&self.ellipsoids.targets(), inner.edge_max)?;
         check_size(area(&self.surface), &inner)?;
-        self.given_params = params;
-        let before = std::mem::replace(&mut self.params, inner);
-        if self.params != before {
+        self.params = params;
+        let before = std::mem::replace(&mut self.model_params, inner);
+        if self.model_params != before {
             self.apply_params(&before);
         }
         Ok(())
@@ -272,8 +273,8 @@ impl MultiresolutionModel {
     /// Applies parameters that differ from those `before`: a change of `supersample` alone only reconstructs the
     /// detail, after any other the next steps solve the membrane again.
     fn apply_params(&mut self, before: &MultiresParams) {
-        let supersample = self.params.supersample;
-        if self.params == (MultiresParams { supersample, ..before.clone() }) {
+        let supersample = self.model_params.supersample;
+        if self.model_params == (MultiresParams { supersample, ..before.clone() }) {
             self.reconstruct_detail();
         } else {
             self.solve_again();
@@ -297,7 +298,7 @@ impl MultiresolutionModel {
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
         let given = &self.space.ellipsoids(given);
-        check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
+        check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.model_params.edge_max)?;
         let surface = &self.surface;
         self.ellipsoids
             .set_targets(given, |target| contains_centres(surface, std::slice::from_ref(target))[0]);
@@ -369,7 +370,7 @@ impl MultiresolutionModel {
             &self.correspondence,
             &self.bands,
             &mut self.guard,
-            detail_sampling(&self.params),
+            detail_sampling(&self.model_params),
         );
         let replaced = std::mem::replace(&mut self.detailed, detailed);
         self.detailed.mesh.advance_versions_past(&replaced.mesh);

@@ -35,7 +35,7 @@ impl MultiresolutionModel {
             &MAGIC,
             &State {
                 fingerprint: self.fingerprint(),
-                params: self.params.clone(),
+                params: self.model_params.clone(),
                 moving: self.ellipsoids.clone(),
                 surface: self.surface.clone(),
                 correspondence: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
@@ -70,8 +70,9 @@ impl MultiresolutionModel {
         let Some(correspondence) = self.correspondence_of(&state.correspondence) else {
             return bad("link", "refers to a missing triangle");
         };
-        (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);
-        self.given_params = self.space.params_in_world(&self.params);
+        (self.model_params, self.ellipsoids, self.correspondence) =
+            (state.params, state.moving, correspondence);
+        self.params = self.space.params_in_world(&self.model_params);
         let replaced = std::mem::replace(&mut self.surface, state.surface);
         self.surface.advance_versions_past(&replaced);
         (self.iteration, self.refreshed_frames) = (state.iteration, state.passing);
