@@ -1,4 +1,4 @@
-/** Computations of the page on data far from the origin of world space: the same as beside the origin. */
+/** Computations on the page with data far from the origin of world space: the same as beside the origin. */
 import { beforeAll, describe, expect, test, vi } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import init, { Mesh, Volume } from '../../pkg/index.js';
@@ -36,7 +36,7 @@ function surfaceOf(mesh: Mesh): Surface {
   return { positions, normals, indices, ...counts, origin: mesh.origin };
 }
 
-/** The part of a browser's FileReader that the writer of GLB uses. */
+/** The methods of a browser that the writer of GLB calls. */
 class BlobReader {
   result: ArrayBuffer | undefined;
   onloadend: () => void = () => undefined;

@@ -5,6 +5,7 @@ import { apply } from '../../www/src/finish/code';
 import type { Edit } from '../../www/src/finish/protocol';
 import { uniform } from '../../www/src/random';
 import type { CameraView, CloudSource, Edits, ParamValues, Requests, Setup } from '../../www/src/reconstruct/protocol';
+import { asText, ballPoints, FAR } from './far';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
@@ -16,6 +17,8 @@ const programs = await programsIn('reconstruct');
 
 const NONE: Edits = { added: [], removed: [], outside: [] };
 const SETUP: Setup = { params: { cell: 0.12 }, maxPoints: 300, keepComponents: undefined, edits: NONE };
+
+const FAR_SETUP: Setup = { ...SETUP, params: { cell: 0.5 }, maxPoints: undefined };
 
 /** Acts at random on opened points, and returns the surface. */
 async function interactiveRun(seed: number, source: CloudSource, cameras: CameraView[]): Promise<Uint8Array> {
@@ -80,6 +83,20 @@ test('the code of random runs gives the same surfaces, of computed points and of
   await programs.add(1, await code());
   await programs.expectSame([surface], [{ name: 'balls.xyz', bytes }]);
   await expect(worker.request('data', undefined)).rejects.toThrow('no file but those');
+});
+
+test('the code of a survey far from the origin, with points added by hand, gives the same surface in place', async () => {
+  const bytes = asText(ballPoints(FAR, 5, 1));
+  await worker.request('load', { source: { file: { name: 'survey.xyz', bytes } }, cameras: [], setup: FAR_SETUP });
+  const over = FAR.map((value, axis) => value + (axis === 2 ? 5.25 : 0.001)) as typeof FAR;
+  await worker.request('setEdits', { added: [over], removed: [3, 4], outside: [] });
+  await worker.request('step', { count: 10_000 });
+  const surface = await worker.request('export', { format: 'ply' });
+  expect((await code()).code).toContain(`added: new Float64Array([${over.join(', ')}])`);
+  await programs.add(1, await code());
+  await programs.expectSame([surface], [{ name: 'survey.xyz', bytes: asText(ballPoints(FAR, 5, 1)) }]);
+  const { centroid } = Mesh.parse(surface).info();
+  expect(Math.hypot(...centroid.map((value, axis) => value - (FAR[axis] ?? 0)))).toBeLessThan(0.1);
 });
 
 test('the code has cameras, and says that it lacks their pictures', async () => {

@@ -168,6 +168,15 @@ test.each([1, 0.1])('volumes at voxels of %d give surfaces where they are', (s) 
   }
 });
 
+test('a seed given in double precision is where it was put', () => {
+  const spacing: Vec3 = [1, 1, 1];
+  const volume = new Volume({ data: new Uint8Array(8 ** 3), dims: [8, 8, 8], spacing, origin: UTM });
+  const seed = UTM.map((value) => value + 3.3);
+  const start = { seeds: Float64Array.from(seed), radius: 2 };
+  const model = new DeformableModel({ volume, params: { iso: 1 }, start });
+  expect(distance(model.mesh.info().centroid, seed)).toBeLessThan(1e-3);
+});
+
 test('a lamp far away keeps its volume', () => {
   const at = (center: Vec3) =>
     new MultiresolutionModel({
