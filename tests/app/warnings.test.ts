@@ -1,5 +1,6 @@
 /** Warnings beside the measures: shown, announced, a way to their place, and carried into files. */
 import { readFile, writeFile } from 'node:fs/promises';
+import axe, { type Result } from 'axe-core';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { readSession, writeSession } from '../../www/src/session/file';
@@ -36,6 +37,14 @@ async function picture(page: Page, name: string): Promise<void> {
   if (folder) await writeFile(`${folder}/${name}.png`, await page.screenshot());
 }
 
+/** Returns axe's findings in the list of warnings. */
+function findings(page: Page): Promise<string[]> {
+  return page.evaluate(async () => {
+    const { axe } = window as unknown as { axe: { run: (part: string) => Promise<{ violations: Result[] }> } };
+    return (await axe.run('[data-warning-list]')).violations.map(({ id, help }) => `${id}: ${help}`);
+  });
+}
+
 test('warnings are shown beside the measures, lead to their place, and are in all files', async () => {
   const { page } = app;
   await open(app, 'extract?example=linked-rings&v=2');
@@ -57,8 +66,11 @@ test('warnings are shown beside the measures, lead to their place, and are in al
   const news = page.locator('[data-warning-list] [role=status]');
   expect(await news.textContent()).toMatch(/^2 warnings: Voxels .* At 12, 0, 0: A slice is missing here\.$/);
   await list.scrollIntoViewIfNeeded();
+  await page.evaluate(axe.source);
+  expect(await findings(page)).toEqual([]);
   await picture(page, 'light');
   await page.emulateMedia({ colorScheme: 'dark' });
+  expect(await findings(page)).toEqual([]);
   await picture(page, 'dark');
   await page.setViewportSize({ width: 360, height: 720 });
   await list.scrollIntoViewIfNeeded();
