@@ -1,10 +1,12 @@
 /** Warnings beside the measures: shown, announced, a way to their place, and carried into files. */
 import { readFile, writeFile } from 'node:fs/promises';
+import axe, { type Result } from 'axe-core';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { readSession, writeSession } from '../../www/src/session/file';
 import type { Warning } from '../../www/src/warnings';
-import { type App, drop, open, openApp, reach } from './browser';
+import { type App, drop, open, openApp, QUICK, reach } from './browser';
+import { LONG } from './long';
 
 /** None of the examples has a warning, so they come with a session. */
 const WARNINGS: Warning[] = [
@@ -36,6 +38,14 @@ async function picture(page: Page, name: string): Promise<void> {
   if (folder) await writeFile(`${folder}/${name}.png`, await page.screenshot());
 }
 
+/** Returns axe's findings in the list of warnings. */
+function findings(page: Page): Promise<string[]> {
+  return page.evaluate(async () => {
+    const { axe } = window as unknown as { axe: { run: (part: string) => Promise<{ violations: Result[] }> } };
+    return (await axe.run('[data-warning-list]')).violations.map(({ id, help }) => `${id}: ${help}`);
+  });
+}
+
 test('warnings are shown beside the measures, lead to their place, and are in all files', async () => {
   const { page } = app;
   await open(app, 'extract?example=linked-rings&v=2');
@@ -57,8 +67,11 @@ test('warnings are shown beside the measures, lead to their place, and are in al
   const news = page.locator('[data-warning-list] [role=status]');
   expect(await news.textContent()).toMatch(/^2 warnings: Voxels .* At 12, 0, 0: A slice is missing here\.$/);
   await list.scrollIntoViewIfNeeded();
+  await page.evaluate(axe.source);
+  expect(await findings(page)).toEqual([]);
   await picture(page, 'light');
   await page.emulateMedia({ colorScheme: 'dark' });
+  expect(await findings(page)).toEqual([]);
   await picture(page, 'dark');
   await page.setViewportSize({ width: 360, height: 720 });
   await list.scrollIntoViewIfNeeded();
@@ -84,4 +97,29 @@ test('warnings are shown beside the measures, lead to their place, and are in al
 
   await open(app, 'extract?example=sponge&v=2');
   await expect.poll(() => list.isVisible()).toBe(false);
+});
+
+/** Opens a session of a lab's example that has a warning about a place, and clicks on it. */
+async function goTo(lab: 'track' | 'segment', where: Warning['where'], place: string): Promise<void> {
+  const { page } = app;
+  await open(app, QUICK[lab]);
+  await reach(page, 'done');
+  const session = await readSession(await saved(page, '[data-action=session]'));
+  const warnings = [{ code: 'reader', text: 'Something is missing.', where }];
+  const bytes = await writeSession({ ...session, content: { ...session.content, warnings } });
+  await drop(page, [{ name: 'a.vesicle.zip', bytes }]);
+  await page.locator('.warnings').getByRole('button', { name: place }).click();
+}
+
+test('a click on a frame shows it, and one on a label chooses it', LONG, async () => {
+  const { page } = app;
+  await goTo('track', { frame: 1 }, 'Frame 2');
+  await page.waitForSelector('[data-frame="2"]');
+  await open(app, QUICK.segment);
+  await reach(page, 'done');
+  const radios = page.locator('[data-control=active]');
+  const label = await radios.last().getAttribute('data-value');
+  await radios.first().check();
+  await goTo('segment', { label: Number(label) }, `Label ${label}`);
+  await page.waitForSelector(`[data-control=active][data-value="${label}"]:checked`, { state: 'attached' });
 });

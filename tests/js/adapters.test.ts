@@ -74,7 +74,8 @@ test('adapters import neither hosts nor the module', async () => {
     const code = await readFile(new URL(file, folder), 'utf8');
     const imports = [...code.matchAll(/^(?:import|export) [^;]*?from '(.*)';$/gm)].map(([, from = '']) => from);
     expect(code.match(/^import|import\(/gm)?.length ?? 0, file).toBeLessThanOrEqual(imports.length);
-    for (const from of imports) expect(['../check.js', ...files.map((name) => `./${name}`)], file).toContain(from);
+    for (const from of imports)
+      expect(['../check.js', '../warnings.js', ...files.map((name) => `./${name}`)], file).toContain(from);
   }
 });
 

@@ -189,7 +189,9 @@ export class SegmentEditing {
     this.press(at, axis, settings)?.drop();
   }
 
+  /** Chooses the label to paint with, if there is such a one. */
   setActive(value: number): void {
+    if (!this.labels.some((label) => label.value === value)) return;
     this.#active = value;
     this.#lab.onLabels();
   }
