@@ -8,7 +8,13 @@ const TRIANGLE = 'M12 2 1 21h22L12 2Zm-1 7h2v6h-2V9Zm0 8h2v2h-2v-2Z';
 const LONG = 4;
 
 /** Kinds that are about a result, and not about data. */
-const OF_RESULTS: readonly string[] = ['begins-in-frame', 'ends-in-frame', 'small-object', 'thin-label', 'uneven-brightness'];
+const OF_RESULTS: readonly string[] = [
+  'begins-in-frame',
+  'ends-in-frame',
+  'small-object',
+  'thin-label',
+  'uneven-brightness',
+];
 
 /** A report of a run, of which only the warnings matter. */
 type Report = { warnings?: readonly Warning[] };
