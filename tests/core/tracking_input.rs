@@ -105,6 +105,7 @@ use WarningCode::{BeginsInFrame, EndsInFrame, SmallObject, UnevenBrightness};
 /// The balls in each frame, the volumes expected, and the warnings.
 type Case<'a> = (&'a [&'a Vec<Ball>], &'a [f64], &'a [(WarningCode, u32)]);
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn frames_without_the_object_have_an_empty_surface_and_are_told() {
     let (ball, none) = (vec![BALL], Vec::new());
@@ -224,6 +225,7 @@ fn an_object_that_is_dim_in_one_frame_stays_and_one_that_jumps_is_found_again() 
     assert_eq!((again.warnings(), again.save()), (tracker.warnings(), tracker.save()));
 }
 
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_restored_run_with_frames_without_the_object_continues_bit_for_bit() {
     let frames = [vec![], vec![BALL], vec![], vec![], vec![BALL]];

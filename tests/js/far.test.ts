@@ -110,7 +110,7 @@ describe('a mesh', () => {
     const near = Mesh.icosphere([0, 0, 0], 5, 1);
     near.transform([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...UTM, 1]);
     expect(near.distanceTo(far()).hausdorff).toBeLessThan(1e-5);
-    const node = new TextDecoder().decode(animationGlb([near, far()])).match(/"translation":\[[^\]]*\]/g);
+    const node = new TextDecoder().decode(animationGlb([near, far(4)])).match(/"translation":\[[^\]]*\]/g);
     expect(node).toHaveLength(2);
   });
 });
@@ -135,7 +135,11 @@ describe('points', () => {
     const [value = 0] = surface.evaluate(Float64Array.from(UTM));
     expect(value).toBeGreaterThan(0);
     const { surface: used } = surface.constraints();
-    expect(distance(used.subarray(0, 3), surveyed(200).subarray(0, 3))).toBeLessThan(1e-4);
+    const all = surveyed(200);
+    const nearest = Math.min(
+      ...Array.from({ length: 200 }, (_, k) => distance(used.subarray(0, 3), all.subarray(3 * k))),
+    );
+    expect(nearest).toBeLessThan(1e-4);
     surface.setEdits({ added: Float64Array.of(UTM[0], UTM[1], UTM[2] + 2.2) });
     expect(distance(surface.edits.added, [UTM[0], UTM[1], UTM[2] + 2.2])).toBeLessThan(1e-6);
     const grid = surface.toVolume([20, 20, 20]);
