@@ -79,8 +79,8 @@ use crate::math::{DAffine3, DVec3};
 use crate::warning::Warning;
 use derived::Derivation;
 use error::reserve;
+use std::ops::Range;
 use std::sync::Arc;
-use voxels::each;
 
 /// Orientation of the world axes relative to the patient.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -296,7 +296,7 @@ impl Volume {
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
-        each!(self.voxels.as_ref(), values => self.convert(&values[start..end]))
+        converted(&self.voxels, start..end, |v| self.finite(v * self.slope + self.intercept))
     }
 
     /// Returns one frame as a grid of `f32` intensities in index coordinates.
@@ -318,7 +318,7 @@ impl Volume {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
         let normalised = self.normalisation();
-        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], normalised))?;
+        let values = converted(&self.voxels, start..end, normalised)?;
         Ok(Grid { dims: self.dims(), values })
     }
 
@@ -331,7 +331,7 @@ impl Volume {
         region.check("region", self.dims())?;
         let voxels = self.voxels.gathered(region.len(), region.rows(self.dims(), start))?;
         let normalised = self.normalisation();
-        let values = each!(&voxels, values => converted(values, normalised))?;
+        let values = converted(&voxels, 0..voxels.len(), normalised)?;
         Ok(Grid { dims: region.dims, values })
     }
 
@@ -406,10 +406,6 @@ impl Volume {
             self.range[0]
         }
     }
-
-    fn convert<T: Copy + Into<f64>>(&self, stored: &[T]) -> Result<Vec<f32>, VolumeError> {
-        converted(stored, |v| self.finite(v * self.slope + self.intercept))
-    }
 }
 
 /// The map from stored values to intensities scaled from a range to [0, 1].
@@ -440,12 +436,13 @@ fn span([low, high]: [f64; 2]) -> f64 {
     if high > low { high - low } else { 1.0 }
 }
 
-fn converted<T: Copy + Into<f64>>(
-    stored: &[T],
+fn converted(
+    stored: &Voxels,
+    indices: Range<usize>,
     intensity: impl Fn(f64) -> f64,
 ) -> Result<Vec<f32>, VolumeError> {
-    let mut out = reserve(stored.len())?;
-    out.extend(stored.iter().map(|&v| intensity(v.into()) as f32));
+    let mut out = reserve(indices.len())?;
+    stored.for_each_part(indices, |part| out.extend(part.iter().map(|&value| intensity(value) as f32)));
     Ok(out)
 }
 

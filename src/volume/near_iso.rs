@@ -3,11 +3,12 @@
 //! Neither the outside of a volume nor NaN is ever part of an object, whatever the iso value. An infinite voxel is
 //! on its side of every iso value. A surface ends halfway between a voxel of the object and one that is outside or NaN.
 
-use super::error::{VolumeError, reserve};
-use super::voxels::{Voxels, each};
+use super::error::VolumeError;
+use super::voxels::Voxels;
 use super::{Grid, Normalisation, Region, Volume};
 use crate::math::order::{rank_f64, sort_by_rank};
 use fixedbitset::FixedBitSet;
+use std::ops::Range;
 
 /// The least difference between neighbouring voxels on opposite sides of an iso value, as a share of the largest number
 /// that is rounded to `f32`, at which rounding does not matter: a surface is then off by 1/256 of a voxel at most. With
@@ -48,16 +49,22 @@ pub(crate) struct NotFinite {
 
 impl NotFinite {
     /// Returns the voxels of `values` that are not finite; `None` if all are.
-    fn of<T: Copy + Into<f64>>(values: &[T]) -> Option<Self> {
-        if values.iter().all(|&value| value.into().is_finite()) {
+    fn of(voxels: &Voxels, indices: Range<usize>) -> Option<Self> {
+        let mut is_finite = true;
+        voxels.for_each_part(indices.clone(), |part| is_finite &= part.iter().all(|value| value.is_finite()));
+        if is_finite {
             return None;
         }
-        let [mut nan, mut high, mut low] = [(); 3].map(|()| FixedBitSet::with_capacity(values.len()));
-        for (k, value) in values.iter().map(|&value| value.into()).enumerate() {
-            nan.set(k, value.is_nan());
-            high.set(k, value == f64::INFINITY);
-            low.set(k, value == f64::NEG_INFINITY);
-        }
+        let [mut nan, mut high, mut low] = [(); 3].map(|()| FixedBitSet::with_capacity(indices.len()));
+        let mut k = 0;
+        voxels.for_each_part(indices, |part| {
+            for &value in part {
+                nan.set(k, value.is_nan());
+                high.set(k, value == f64::INFINITY);
+                low.set(k, value == f64::NEG_INFINITY);
+                k += 1;
+            }
+        });
         Some(Self { nan, high, low })
     }
 
@@ -115,24 +122,21 @@ impl Volume {
         let is_resolved = self.has_steps_above(RESOLVED * largest)
             || self.contrast_at(iso, frame)?.is_some_and(|contrast| contrast >= RESOLVED * largest);
         let (shift, iso) = if is_resolved { (0.0, iso as f32) } else { (iso, 0.0) };
-        let values = each!(self.voxels.as_ref(), values => {
-            self.shifted(&values[start..start + self.frame_len()], shift)?
-        });
+        let values = self.shifted(start..start + self.frame_len(), shift)?;
         Ok((Grid { dims: self.dims(), values }, iso))
     }
 
     /// Returns the intensities of stored values less `shift`, in `f32`; a shift is subtracted in `f64`.
-    fn shifted<T: Copy + Into<f64>>(&self, stored: &[T], shift: f64) -> Result<Vec<f32>, VolumeError> {
-        let mut out = reserve(stored.len())?;
+    fn shifted(&self, indices: Range<usize>, shift: f64) -> Result<Vec<f32>, VolumeError> {
+        let intensity = |v: f64| v * self.slope + self.intercept;
         if shift == 0.0 {
-            out.extend(stored.iter().map(|&v| (v.into() * self.slope + self.intercept) as f32));
-        } else {
-            // Infinite values stay infinite.
-            let near = |d: f64| if d.is_finite() { d.clamp(-LARGEST, LARGEST) } else { d };
-            let intensities = stored.iter().map(|&v| v.into() * self.slope + self.intercept);
-            out.extend(intensities.map(|intensity| near(intensity - shift) as f32));
+            return super::converted(&self.voxels, indices, intensity);
         }
-        Ok(out)
+        super::converted(&self.voxels, indices, |v| {
+            let difference = intensity(v) - shift;
+            // Infinite values stay infinite.
+            if difference.is_finite() { difference.clamp(-LARGEST, LARGEST) } else { difference }
+        })
     }
 
     /// Returns whether voxels may be NaN or infinite, by the type in which they are stored.
@@ -149,8 +153,7 @@ impl Volume {
         if !self.may_lack_values() {
             return Ok(None);
         }
-        let found =
-            each!(self.voxels.as_ref(), values => NotFinite::of(&values[start..start + self.frame_len()]));
+        let found = NotFinite::of(&self.voxels, start..start + self.frame_len());
         Ok(found.map(|found| if self.slope > 0.0 { found } else { found.turned() }))
     }
 
@@ -194,14 +197,12 @@ impl Volume {
     /// Returns the least difference of a finite voxel from `iso`, infinite if it is 0 or there is none.
     fn nearest_to(&self, iso: f64, frame: usize) -> Result<f64, VolumeError> {
         let start = self.frame_start(frame)?;
-        Ok(
-            each!(self.voxels.as_ref(), values => self.nearest_of(&values[start..start + self.frame_len()], iso)),
-        )
-    }
-
-    fn nearest_of<T: Copy + Into<f64>>(&self, stored: &[T], iso: f64) -> f64 {
-        let differences = stored.iter().map(|&v| (v.into() * self.slope + self.intercept - iso).abs());
-        differences.filter(|&difference| difference > 0.0).fold(f64::INFINITY, f64::min)
+        let mut nearest = f64::INFINITY;
+        self.voxels.for_each_part(start..start + self.frame_len(), |part| {
+            let differences = part.iter().map(|v| (v * self.slope + self.intercept - iso).abs());
+            nearest = differences.filter(|&difference| difference > 0.0).fold(nearest, f64::min);
+        });
+        Ok(nearest)
     }
 
     /// Returns one frame as a grid with intensities scaled from `range` to [0, 1]; those beyond it become its ends, as
@@ -212,9 +213,8 @@ impl Volume {
     pub(crate) fn grid_in(&self, range: [f64; 2], frame: usize) -> Result<Grid, VolumeError> {
         let start = self.frame_start(frame)?;
         let scale = Normalisation::new([self.slope, self.intercept], range);
-        let values = each!(self.voxels.as_ref(), values => {
-            super::converted(&values[start..start + self.frame_len()], |stored| scale.of(stored))
-        })?;
+        let frame = start..start + self.frame_len();
+        let values = super::converted(&self.voxels, frame, |stored| scale.of(stored))?;
         Ok(Grid { dims: self.dims(), values })
     }
 
@@ -266,9 +266,7 @@ impl Volume {
         let sparse = (self.frame_len() / FIRST_READ).max(1);
         let mut found = Vec::new();
         for stride in [sparse, 1] {
-            found = each!(self.voxels.as_ref(), values => {
-                self.differences(&values[start..start + self.frame_len()], stride, &counts)
-            });
+            found = self.differences(start, stride, &counts);
             if found.len() >= ENOUGH || sparse == 1 {
                 break;
             }
@@ -279,29 +277,32 @@ impl Volume {
 
     /// Returns the absolute differences between those neighbouring finite voxels that `counts` tells, by their
     /// intensities; of the rows along x, only each `stride`-th is compared with its neighbours.
-    fn differences<T: Copy + Into<f64>>(
-        &self,
-        stored: &[T],
-        stride: usize,
-        counts: &impl Fn(f64, f64) -> bool,
-    ) -> Vec<f64> {
+    fn differences(&self, start: usize, stride: usize, counts: &dyn Fn(f64, f64) -> bool) -> Vec<f64> {
         let [nx, ny, nz] = self.dims();
-        let intensity = |&v: &T| v.into() * self.slope + self.intercept;
         let mut found = Vec::new();
-        let mut compare = |a: &[T], b: &[T]| {
-            for (a, b) in a.iter().map(intensity).zip(b.iter().map(intensity)) {
+        let mut compare = |a: &[f64], b: &[f64]| {
+            for (&a, &b) in a.iter().zip(b) {
                 if counts(a, b) && (a - b).is_finite() {
                     found.push((a - b).abs());
                 }
             }
             found.len() < MOST
         };
-        let row = |k: usize| &stored[k * nx..(k + 1) * nx];
+        let read = |k: usize, row: &mut Vec<f64>| {
+            self.voxels.read(start + k * nx..start + (k + 1) * nx, row);
+            row.iter_mut().for_each(|v| *v = *v * self.slope + self.intercept);
+        };
+        let [mut row, mut other] = [(); 2].map(|()| Vec::with_capacity(nx));
         for k in (0..ny * nz).step_by(stride) {
-            let beside = compare(&row(k)[1..], row(k));
-            let above = k % ny + 1 == ny || compare(row(k + 1), row(k));
-            let behind = k / ny + 1 == nz || compare(row(k + ny), row(k));
-            if !(beside && above && behind) {
+            read(k, &mut row);
+            let mut goes_on = compare(&row[1..], &row);
+            for (step, is_there) in [(1, k % ny + 1 < ny), (ny, k / ny + 1 < nz)] {
+                if goes_on && is_there {
+                    read(k + step, &mut other);
+                    goes_on = compare(&other, &row);
+                }
+            }
+            if !goes_on {
                 break;
             }
         }

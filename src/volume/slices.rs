@@ -2,7 +2,7 @@
 
 use super::Volume;
 use super::error::{VolumeError, reserve};
-use super::voxels::{Voxels, each};
+use std::ops::Range;
 
 /// Largest number of histogram bins: more do not resolve more in 16-bit data.
 const MAX_BINS: usize = 65_536;
@@ -22,21 +22,23 @@ impl Volume {
         }
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
-        Ok(each!(self.voxels.as_ref(), values => self.count(&values[start..end], bins)))
+        Ok(self.count(start..end, bins))
     }
 
-    fn count<T: Copy + Into<f64>>(&self, stored: &[T], bins: usize) -> Vec<u32> {
+    fn count(&self, indices: Range<usize>, bins: usize) -> Vec<u32> {
         let [low, high] = self.range();
         let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };
         let mut counts = vec![0u32; bins];
-        for &v in stored {
-            let value = v.into() * self.slope + self.intercept;
-            if value.is_finite() {
-                let bin = ((value - low) * scale) as usize;
-                let bin = if bin < bins { bin } else { bins - 1 };
-                counts[bin] = counts[bin].saturating_add(1);
+        self.voxels.for_each_part(indices, |part| {
+            for v in part {
+                let value = v * self.slope + self.intercept;
+                if value.is_finite() {
+                    let bin = ((value - low) * scale) as usize;
+                    let bin = if bin < bins { bin } else { bins - 1 };
+                    counts[bin] = counts[bin].saturating_add(1);
+                }
             }
-        }
+        });
         counts
     }
 

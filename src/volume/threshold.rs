@@ -2,7 +2,6 @@
 
 use super::Volume;
 use super::error::{VolumeError, reserve};
-use super::voxels::{Voxels, each};
 
 impl Volume {
     /// Returns the mask of the voxels whose intensity is from `low` to `high`, both included: 1 there, 0 elsewhere, in
@@ -22,16 +21,18 @@ impl Volume {
         if low > high {
             return Err(VolumeError::invalid("low", format!("must be <= high ({high}), got {low}")));
         }
-        let mask = each!(self.voxels.as_ref(), values => self.within(values, low, high))?;
+        let mask = self.within(low, high)?;
         self.mask(mask)
     }
 
-    fn within<T: Copy + Into<f64>>(&self, stored: &[T], low: f64, high: f64) -> Result<Vec<u8>, VolumeError> {
-        let mut mask = reserve(stored.len())?;
-        mask.extend(stored.iter().map(|&v| {
-            let intensity = v.into() * self.slope + self.intercept;
-            u8::from(low <= intensity && intensity <= high)
-        }));
+    fn within(&self, low: f64, high: f64) -> Result<Vec<u8>, VolumeError> {
+        let mut mask = reserve(self.voxels.len())?;
+        self.voxels.for_each_part(0..self.voxels.len(), |part| {
+            mask.extend(part.iter().map(|v| {
+                let intensity = v * self.slope + self.intercept;
+                u8::from(low <= intensity && intensity <= high)
+            }));
+        });
         Ok(mask)
     }
 }
@@ -40,7 +41,7 @@ impl Volume {
 mod tests {
     use super::*;
     use crate::math::{DAffine3, DVec3};
-    use crate::volume::{LengthUnit, Space, VolumeInit};
+    use crate::volume::{LengthUnit, Space, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 

@@ -77,6 +77,10 @@ macro_rules! each_pair {
     };
 }
 
+/// The number of voxels that are converted at a time: they stay in the fastest cache, and the choice of the type takes no
+/// time.
+const PART: usize = 1024;
+
 /// A number type in which voxels are stored.
 pub(crate) trait VoxelNumber: Copy + PartialOrd + Into<f64> {
     /// Returns the number of this type nearest to `value`: integer types round ties away from zero, clamp to their
@@ -122,6 +126,22 @@ impl Voxels {
     /// Returns the stored value at `index` as `f64`, or `None` past the end.
     pub fn get(&self, index: usize) -> Option<f64> {
         each!(self, values => number_at(values, index))
+    }
+
+    /// Replaces `out` by the stored values with the given indices, as `f64`.
+    pub(crate) fn read(&self, indices: Range<usize>, out: &mut Vec<f64>) {
+        out.clear();
+        each!(self, values => out.extend(values[indices].iter().map(|&value| f64::from(value))));
+    }
+
+    /// Calls `visit` with the stored values of the given indices as `f64`, in order, [`PART`] at a time. So a loop over
+    /// voxels is compiled once, not for each type.
+    pub(crate) fn for_each_part(&self, indices: Range<usize>, mut visit: impl FnMut(&[f64])) {
+        let mut part = Vec::with_capacity(PART);
+        for start in indices.clone().step_by(PART) {
+            self.read(start..indices.end.min(start + PART), &mut part);
+            visit(&part);
+        }
     }
 
     /// Returns the smallest and largest finite stored value, or `None` if no value is finite.
