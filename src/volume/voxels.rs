@@ -81,6 +81,10 @@ macro_rules! each_pair {
 /// time.
 const PART: usize = 1024;
 
+fn extend<T: Copy + Into<f64>>(out: &mut Vec<f64>, values: &[T]) {
+    out.extend(values.iter().map(|&value| value.into()));
+}
+
 /// A number type in which voxels are stored.
 pub(crate) trait VoxelNumber: Copy + PartialOrd + Into<f64> {
     /// Returns the number of this type nearest to `value`: integer types round ties away from zero, clamp to their
@@ -131,7 +135,7 @@ impl Voxels {
     /// Replaces `out` by the stored values with the given indices, as `f64`.
     pub(crate) fn read(&self, indices: Range<usize>, out: &mut Vec<f64>) {
         out.clear();
-        each!(self, values => out.extend(values[indices].iter().map(|&value| f64::from(value))));
+        each!(self, values => extend(out, &values[indices]));
     }
 
     /// Calls `visit` with the stored values of the given indices as `f64`, in order, [`PART`] at a time. So a loop over

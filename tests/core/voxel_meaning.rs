@@ -275,3 +275,27 @@ fn a_refresh_takes_up_nan() {
     run(&mut anew);
     assert_near(volume_of(&model.surface()), volume_of(&anew.surface()), 0.02, "half a ball");
 }
+
+/// Regression: the contour of a voxel that is barely object, beside one without a value, is a needle; it got ever more
+/// vertices where small parts count.
+#[test]
+fn a_voxel_that_is_barely_object_beside_nan_gets_few_vertices() {
+    let volume = super::common::scenes::volume([16; 3], |p| {
+        if p == Vec3::splat(3.0) {
+            0.01
+        } else if p == Vec3::new(3.0, 4.0, 3.0) {
+            f32::NAN
+        } else {
+            (4.0 - p.distance(Vec3::splat(9.5))).max(-1.5)
+        }
+    });
+    let params = DeformableParams { iso: 0.0, smallest_part: 1.0, ..DeformableParams::for_volume(&volume) };
+    let options = DeformableOptions { params: Some(params), ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let mut report = model.step().unwrap();
+    while !report.done {
+        assert!(report.vertices < 1500, "{}", report.vertices);
+        report = model.step().unwrap();
+    }
+    assert!(report.vertices < 1500, "{}", report.vertices);
+}

@@ -34,6 +34,10 @@ pub(super) const LARGEST: f32 = 1.6;
 /// bound and is removed; with less, it has hundreds of vertices.
 const SIZE_OF_VOXEL: f64 = 0.4;
 
+/// The least size of a vertex: that on a part of a fiftieth of a voxel. With less, the needle around a voxel that is barely
+/// object, fifty times as long as wide, got tens of thousands of vertices; with more, faint single voxels are lost.
+const LEAST_SIZE: f64 = 0.1;
+
 /// The largest number of vertices of a part of a few voxels; the search for them stops there.
 const MOST_IN_SMALL_PART: usize = 512;
 
@@ -108,7 +112,10 @@ impl DeformableModel {
             if part.len() > MOST_IN_SMALL_PART {
                 continue;
             }
-            let size = SIZE_OF_VOXEL * libm::cbrt(self.volume_within(&part));
+            let (volume, area) = self.volume_and_area(&part);
+            // A part that is nearly flat would get more vertices than fit into memory.
+            let least = (area / MOST_IN_SMALL_PART as f64).sqrt();
+            let size = (SIZE_OF_VOXEL * libm::cbrt(volume)).max(least).max(LEAST_SIZE);
             if size < f64::from(SMALLEST) {
                 let sizes = self.mesh.scalar_mut(self.keys.size);
                 part.iter().for_each(|w| sizes[w.index()] = size as f32 - 1.0);
@@ -116,13 +123,17 @@ impl DeformableModel {
         }
     }
 
-    /// Returns the volume that a component with the given vertices encloses, in voxels of the finest level.
-    fn volume_within(&self, component: &[VertexId]) -> f64 {
-        let Some(&first) = component.first() else { return 0.0 };
+    /// Returns the volume that a component with the given vertices encloses, and its area, in model units.
+    fn volume_and_area(&self, component: &[VertexId]) -> (f64, f64) {
+        let Some(&first) = component.first() else { return (0.0, 0.0) };
         let origin = self.mesh.position(first);
         let corner = |v: VertexId| (self.mesh.position(v) - origin).as_dvec3();
-        let six = |[a, b, c]: [VertexId; 3]| corner(a).cross(corner(b)).dot(corner(c));
-        self.mesh.triangles_at(component).into_iter().map(six).sum::<f64>().abs() / 6.0
+        let (mut six, mut area) = (0.0, 0.0);
+        for [a, b, c] in self.mesh.triangles_at(component).into_iter().map(|corners| corners.map(corner)) {
+            six += a.cross(b).dot(c);
+            area += 0.5 * (b - a).cross(c - a).length();
+        }
+        (six.abs() / 6.0, area)
     }
 
     /// Returns for each vertex in `members`, by slot, the smallest of the sizes, local factors on δ, that the curvature
