@@ -7,10 +7,10 @@ use crate::warning::{Place, Warning, WarningCode};
 /// How a volume was made from another one.
 #[derive(Clone, Copy)]
 pub(super) enum Derivation {
-    /// Of the same voxels in place, or of what is decided voxel by voxel, as a mask is: what holds for the voxels still
-    /// does.
+    /// The same voxels, or a mask decided voxel by voxel: all warnings still hold.
     Same,
-    /// A box of the voxels, in the voxel indices of the other volume: as above, but for points outside of the box.
+    /// A box of the voxels, in the voxel indices of the other volume: all warnings still hold, except at points outside
+    /// of the box.
     Box(Region),
     /// One frame: warnings about other frames no longer hold, and those about this one are about all of it.
     Frame(usize),

@@ -6,7 +6,6 @@ use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
 use super::samples::{Falloff, SampleField};
 use super::vote::{Faces, X, Y, Z};
-use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
@@ -51,7 +50,7 @@ pub(super) fn extract_bright_surface(
     let values = (0..distance.len()).map(value).collect();
     let mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
     let map = region.to_space * DAffine3::from_scale(region.spacing);
-    Ok(WorkingSpace::default().rebased(&mesh.transformed(&map)))
+    Ok(mesh.transformed(&map).relative_to(DVec3::ZERO))
 }
 
 /// Returns the centres of the faces that separate bright from dark in a frame, those with a weight of at least

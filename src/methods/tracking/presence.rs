@@ -28,8 +28,8 @@ use fixedbitset::FixedBitSet;
 const MIN_PRESENT: f64 = 0.1;
 
 /// Share of the vertices without a boundary, or with rejected projections, from which [`MIN_PRESENT`] is tested at all.
-/// With a lower share it is not in doubt.
-const DOUBTFUL: f64 = 0.5;
+/// With lower shares, the object is certainly there.
+const UNCERTAIN: f64 = 0.5;
 
 /// Share of a component's voxels that were bright in the frame before, outside of the tracked surface, from which it
 /// counts as another object that was there before, not as one that begins. Objects that touch overlap by less, and those
@@ -200,9 +200,9 @@ fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
 impl FrameContext<'_> {
     /// Returns whether the frame has an object at a surface that was tracked into it, see the module's documentation.
     fn is_present(&self, mesh: &Mesh, statistics: &FrameStatistics) -> bool {
-        let doubtful = DOUBTFUL * mesh.vertex_count() as f64;
+        let uncertain = UNCERTAIN * mesh.vertex_count() as f64;
         let is_certain =
-            (statistics.without_boundary as f64) < doubtful && (statistics.rejected as f64) < doubtful;
+            (statistics.without_boundary as f64) < uncertain && (statistics.rejected as f64) < uncertain;
         is_certain || self.share_on_boundary(mesh) >= MIN_PRESENT
     }
 

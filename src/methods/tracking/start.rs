@@ -28,7 +28,7 @@ const MIN_EDGE: f64 = 0.1;
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
 /// [`checked_mesh`].
 pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
-    let rebased = region.space.rebased(start);
+    let rebased = start.relative_to(region.space.origin);
     let mesh = checked_mesh("start", &rebased)?;
     let (edge, least) = (measure(&rebased).edge_mean, MIN_EDGE * region.shortest_side());
     if edge < least {

@@ -3,7 +3,7 @@
 
 use super::{FrameStatistics, TrackingParams};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Mesh, TriangleMesh, world_origin};
+use crate::mesh::{Mesh, grid_origin};
 use crate::volume::Volume;
 
 /// Sides of voxels, as powers of two in world units, for which the working space has the scale of the world, so that
@@ -31,17 +31,10 @@ impl Default for WorkingSpace {
 impl WorkingSpace {
     /// Returns the working space for a volume.
     pub fn of(volume: &Volume) -> Self {
-        let last = volume.dims().map(|n| (n - 1) as f64);
-        let corner = |k: usize| {
-            let pick = |axis: usize| if k >> axis & 1 == 0 { -0.5 } else { last[axis] + 0.5 };
-            volume.affine().transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-        };
-        let min = (0..8).map(corner).fold(DVec3::INFINITY, DVec3::min);
-        let max = (0..8).map(corner).fold(DVec3::NEG_INFINITY, DVec3::max);
         let side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let (_, exponent) = libm::frexp(side);
         let power = if ORDINARY_EXPONENTS.contains(&exponent) { 0 } else { -exponent };
-        Self { origin: world_origin(min, max), scale: libm::ldexp(1.0, power) }
+        Self { origin: grid_origin(&volume.affine(), volume.dims()), scale: libm::ldexp(1.0, power) }
     }
 
     /// Returns a point of the world in the working space.
@@ -52,16 +45,6 @@ impl WorkingSpace {
     /// Returns the position relative to the origin, in world units, of a position in the working space.
     pub fn relative(&self, p: Vec3) -> Vec3 {
         p * (1.0 / self.scale) as f32
-    }
-
-    /// Returns a caller's mesh with positions relative to the origin of this space, in world units.
-    pub fn rebased(&self, mesh: &TriangleMesh) -> TriangleMesh {
-        let offset = mesh.origin - self.origin;
-        if offset == DVec3::ZERO {
-            return mesh.clone();
-        }
-        let positions = mesh.positions.iter().map(|p| (p.as_dvec3() + offset).as_vec3()).collect();
-        TriangleMesh { positions, origin: self.origin, ..mesh.clone() }
     }
 
     /// Returns a mesh without triangles, relative to the origin of this space.
