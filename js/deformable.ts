@@ -155,9 +155,9 @@ export interface DeformableOptions {
   /** Initial surface; default 'contour'. */
   start?: DeformableStart;
   /**
-   * Number of pyramid levels above the volume itself. With 0 (the default) the surface is fitted to the volume itself
-   * from the first iteration. The voxels of each level are √3 times larger than those of the next finer one; the
-   * surface starts on the coarsest level and is refined on each finer one.
+   * Number of pyramid levels above the volume itself, at most {@link DeformableModel.maxLevels}. With 0 (the default)
+   * the surface is fitted to the volume itself from the first iteration. The voxels of each level are √3 times larger
+   * than those of the next finer one; the surface starts on the coarsest level and is refined on each finer one.
    */
   levels?: number;
   /** Level of a {@link LargeVolume} at which the run ends; default 0. */
@@ -229,6 +229,15 @@ export class DeformableModel implements Stepper {
     const start = options.start instanceof Mesh ? options.start.warnings : [];
     this.#warnings = new ModelWarnings(source ? [] : (options.volume as Volume).warnings, start);
     this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of());
+  }
+
+  /**
+   * Returns the largest number of pyramid `levels` above a volume: each has at least two voxels along every axis.
+   *
+   * @throws {@link VesicleError} `invalid-argument` for anything but a {@link Volume}.
+   */
+  static maxLevels(volume: Volume): number {
+    return volumeHandle('volume', volume).use((raw) => RawDeformable.maxLevels(raw));
   }
 
   /**

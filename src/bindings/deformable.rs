@@ -83,6 +83,12 @@ impl RawDeformable {
         Ok(RawDeformable(shared(DeformableModel::new(&volume.0, options))?))
     }
 
+    /// Returns the largest number of pyramid levels above a volume.
+    #[wasm_bindgen(js_name = maxLevels)]
+    pub fn max_levels(volume: &RawVolume) -> usize {
+        DeformableModel::max_levels(&volume.0)
+    }
+
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
         RawMesh::live(&self.0)

@@ -294,9 +294,14 @@ impl Volume {
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, VolumeError> {
+        self.intensities_above(0.0, frame)
+    }
+
+    /// Returns all intensities of one frame less `base`, which is subtracted in `f64`.
+    fn intensities_above(&self, base: f64, frame: usize) -> Result<Vec<f32>, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
-        converted(&self.voxels, start..end, |v| self.finite(v * self.slope + self.intercept))
+        converted(&self.voxels, start..end, |v| self.finite(v * self.slope + self.intercept) - base)
     }
 
     /// Returns one frame as a grid of `f32` intensities in index coordinates.

@@ -17,11 +17,16 @@ use std::ops::Range;
 /// The five weights of the Gaussian-like kernel by which each pyramid level is reduced to the next.
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
+/// The ratio of the largest absolute intensity to the span of all above which levels store differences. Those
+/// of `f32` between neighbouring numbers are then 1/65536 of the span at most.
+const COARSEST_SPAN: f64 = 256.0;
+
 impl Volume {
     /// Returns a pyramid of `levels` volumes: the first is this one, each of the others has ⌊n/ρ⌋ voxels along every
     /// axis, where the one before has n and ρ is `factor`.
     ///
-    /// All frames are kept; levels after the first store `f32` intensities.
+    /// All frames are kept; levels after the first store `f32` intensities, or differences from the least one where
+    /// these are more exact.
     ///
     /// # Errors
     /// `factor` not in (1, 2]; `levels` is 0, or so large that an axis would have fewer than 2 voxels (the message
@@ -31,7 +36,9 @@ impl Volume {
         self.check_levels(levels, factor)?;
         let spacing = self.spacing();
         let mut unit = smallest(spacing);
-        let mut here = (0..self.frames()).map(|t| self.grid(t)).collect::<Result<Vec<_>, _>>()?;
+        let shift = self.pyramid_shift();
+        let frame = |t| Ok(Grid { dims: self.dims(), values: self.intensities_above(shift, t)? });
+        let mut here = (0..self.frames()).map(frame).collect::<Result<Vec<_>, VolumeError>>()?;
         let mut here_spacing = spacing;
         let mut out = vec![self.clone()];
         while out.len() < levels {
@@ -42,7 +49,7 @@ impl Volume {
                 next.push(coarse);
                 next_spacing = coarse_spacing;
             }
-            out.push(self.level(&next)?);
+            out.push(self.level(&next, shift)?);
             (here, here_spacing, unit) = (next, next_spacing, unit * factor);
         }
         Ok(out)
@@ -76,8 +83,16 @@ impl Volume {
         Err(VolumeError::invalid("levels", problem))
     }
 
-    /// Builds the volume of one pyramid level from its frames, filling the same world box as this volume.
-    fn level(&self, frames: &[Grid]) -> Result<Volume, VolumeError> {
+    /// Returns what the intensities stored by levels are less than those of this volume, so that `f32` shows them as
+    /// finely as integers of 16 bits: its least intensity if they differ little, else 0.
+    fn pyramid_shift(&self) -> f64 {
+        let [low, high] = self.range;
+        if self.span() < low.abs().max(high.abs()) / COARSEST_SPAN { low } else { 0.0 }
+    }
+
+    /// Builds the volume of one pyramid level from its frames, whose intensities are less by `shift`, filling the same
+    /// world box as this volume.
+    fn level(&self, frames: &[Grid], shift: f64) -> Result<Volume, VolumeError> {
         let dims = frames[0].dims;
         let ratio = DVec3::from([0, 1, 2].map(|axis| self.dims[axis] as f64 / dims[axis] as f64));
         let index_map =
@@ -90,6 +105,7 @@ impl Volume {
             affine: self.affine * index_map,
             frame_seconds: self.frame_seconds,
             space: self.space,
+            intercept: shift,
             ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], frames.len()])
         })?;
         Ok(volume.derived(self, Derivation::Averaged))

@@ -187,6 +187,31 @@ describe('files', () => {
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 1, chi: 0, closed: true });
   });
 
+  test('a volume too small for coarser levels opens with none', async () => {
+    const field = app.page.locator('.start').getByLabel('Pyramid levels');
+    const before = await field.inputValue();
+    expect(before).not.toBe('0');
+    const dims = [12, 12, 2];
+    const voxels = Uint8Array.from({ length: 288 }, (_, i) => {
+      const [x, y] = [i % 12, Math.floor(i / 12) % 12];
+      return Math.max(0, Math.min(255, 128 + 60 * (4 - Math.hypot(x - 5.5, y - 5.5))));
+    });
+    await app.page.setInputFiles('input[type=file]', [
+      { name: 'disc.raw', mimeType: 'application/octet-stream', buffer: Buffer.from(voxels) },
+      { name: 'disc.mhd', mimeType: 'text/plain', buffer: Buffer.from(metaImageHeader('disc.raw', dims)) },
+    ]);
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('disc.mhd'));
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
+    expect(await field.inputValue()).toBe('0');
+    await app.page.setInputFiles('input[type=file]', [
+      { name: 'ring.raw', mimeType: 'application/octet-stream', buffer: Buffer.from(ring()) },
+      { name: 'ring.mhd', mimeType: 'text/plain', buffer: Buffer.from(metaImageHeader('ring.raw')) },
+    ]);
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('ring.mhd'));
+    await reach(app.page, 'done');
+  });
+
   test('bubbles give the same ring', async () => {
     const states = await recordStates(app.page);
     await app.page.selectOption('.start select', 'bubbles');

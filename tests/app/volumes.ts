@@ -22,12 +22,12 @@ export function ring(): Uint8Array {
   return sampled((x, y, z) => 128 + 40 * (4 - Math.hypot(Math.hypot(x - 15.5, y - 15.5) - 9, z - 15.5)));
 }
 
-/** Returns a MetaImage header for a grid of 32³ bytes with 1 mm voxels whose data are in another file. */
-export function metaImageHeader(dataFile: string): Uint8Array {
+/** Returns a MetaImage header for bytes in another file, a grid of 32³ if not said, with 1 mm voxels. */
+export function metaImageHeader(dataFile: string, dims = [SIZE, SIZE, SIZE]): Uint8Array {
   const lines = [
     'ObjectType = Image',
     'NDims = 3',
-    `DimSize = ${SIZE} ${SIZE} ${SIZE}`,
+    `DimSize = ${dims.join(' ')}`,
     'ElementSpacing = 1 1 1',
     'Offset = 0 0 0',
     'TransformMatrix = 1 0 0 0 1 0 0 0 1',

@@ -204,6 +204,19 @@ fn small_differences_of_large_intensities_count() {
     }
 }
 
+#[test]
+fn coarse_levels_keep_small_differences_of_large_intensities() {
+    let inside = ball(24, 7.2);
+    let above = |base: f64| doubles(24, |p| base + inside(p).clamp(-3.0, 3.0));
+    let [near, far] = [0.0, 4e9].map(|base| above(base).pyramid(3, 1.5).unwrap());
+    for (near, far) in near.iter().zip(&far).skip(1) {
+        let [a, b] = [(near, 0.0), (far, 4e9)]
+            .map(|(level, iso)| volume_of(&marching_cubes_world(level, iso, 0).unwrap()));
+        assert_near(b, a, 1e-5, "level");
+        assert_near(far.range()[1] - 4e9, near.range()[1], 1e-5, "largest");
+    }
+}
+
 /// Objects that the border cuts end half a voxel beyond the outermost voxel centres, also in a single slice.
 #[test]
 fn the_model_closes_objects_at_the_border_as_marching_cubes_does() {

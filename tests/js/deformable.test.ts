@@ -1,6 +1,14 @@
 import { afterEach, expect, test } from 'vitest';
 import * as vesicle from '../../pkg/index.js';
-import { DeformableModel, type DeformableParams, Mesh, paramSpecs, type StepReport } from '../../pkg/index.js';
+import {
+  DeformableModel,
+  type DeformableParams,
+  Mesh,
+  paramSpecs,
+  type StepReport,
+  VesicleError,
+  Volume,
+} from '../../pkg/index.js';
 import { ball, ballWithHollowAndPlate, failure, PAPER, rejection, wrong } from './helpers.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
@@ -48,6 +56,25 @@ test('coarse to fine it ends on the full volume, with the requested edge length'
   expect(report.done).toBe(true);
   expect(fitted.level).toBe(0);
   expect(fitted.delta).toBeLessThan(coarse);
+});
+
+test('the largest number of levels is told by dimensions and spacing', () => {
+  for (const { dims, spacing, most } of [
+    { dims: [4, 3, 2], spacing: [1, 1, 1], most: 0 },
+    { dims: [8, 8, 1], spacing: [1, 1, 1], most: 0 },
+    { dims: [12, 14, 18], spacing: [1, 1, 1], most: 2 },
+    // The long voxels are divided until the others are as long.
+    { dims: [40, 40, 4], spacing: [1, 1, 10], most: 4 },
+  ]) {
+    const data = new Uint8Array(dims.reduce((product, side) => product * side));
+    data[data.length >> 1] = 1;
+    const volume = new Volume({ data, dims, spacing });
+    expect(DeformableModel.maxLevels(volume)).toBe(most);
+    const made = (levels: number) => new DeformableModel({ volume, levels, params: { iso: 0.5 } });
+    expect(made(most).level).toBe(most);
+    expect(() => made(most + 1)).toThrow('levels');
+  }
+  expect(() => DeformableModel.maxLevels(wrong({}))).toThrow(VesicleError);
 });
 
 test('speeds are given for each vertex, inwards while an enclosing surface shrinks', () => {

@@ -199,6 +199,8 @@ export interface ExtractionRun {
 
 export interface Loaded extends Ready {
   volume: VolumeView;
+  /** Number of pyramid levels of the model: those asked for, or as many as the volume allows. */
+  levels: number;
 }
 
 export interface CodeRequest {

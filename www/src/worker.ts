@@ -30,7 +30,7 @@ import { toCode } from './worker/code';
 import { compare } from './worker/compare';
 import { programOf, type RunData } from './worker/extract-code';
 import type { LargeVolume } from './worker/large';
-import { buildModel, restoredModel, valuesFor } from './worker/models';
+import { buildModel, fittingSetup, restoredModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
 import { logged, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
@@ -126,15 +126,16 @@ class Session {
     const { volume, frames, unit } = await openFrame(source, frame);
     try {
       const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
-      const model = saved ? restoredModel(volume, saved) : buildModel(volume, setup);
+      const fitting = fittingSetup(setup, volume);
+      const model = saved ? restoredModel(volume, saved) : buildModel(volume, fitting);
       // No checks of a new model: the page starts the run at once, and would not show their result.
-      const ready = this.#replaceModel(model, setup, saved ? 'checked' : 'measured');
+      const ready = this.#replaceModel(model, fitting, saved ? 'checked' : 'measured');
       if (saved) this.#continue(saved);
       this.#keep({ volume });
       const files = 'files' in source ? source.files.map(({ name }) => ({ name })) : [];
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
-      return withTransfer({ ...ready, volume: view }, [view.voxels]);
+      return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
     } catch (error) {
       volume.free();
       throw error;
@@ -146,12 +147,11 @@ class Session {
     const large = await LargeVolume.open(source, signal);
     try {
       const view = large.view(name);
-      const levels = Math.min(setup.levels, large.coarserLevels);
-      const fitting = { ...setup, levels };
+      const fitting = { ...setup, levels: Math.min(setup.levels, large.coarserLevels) };
       const ready = this.#replaceModel(large.model(fitting), fitting, 'measured');
       this.#keep({ large });
       this.#origin = { source, name, coarserLevels: large.coarserLevels };
-      return withTransfer({ ...ready, volume: view }, [view.voxels]);
+      return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
     } catch (error) {
       large.free();
       throw error;

@@ -378,7 +378,7 @@ impl Pyramid {
         params: &DeformableParams,
     ) -> Result<Self, MethodError> {
         let parts = parts_of_whole(volume.spacing(), volume.dims());
-        let possible = most_levels_above(volume, parts)?;
+        let possible = max_levels(volume);
         if above > possible {
             let [nx, ny, nz] = volume.dims();
             let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
@@ -710,12 +710,10 @@ fn parts_of_coarse_voxels(finest: [usize; 3], sides: [f64; 3]) -> [usize; 3] {
     if finest == [1; 3] { finest } else { parts_of(sides) }
 }
 
-/// Returns the largest number of levels above a volume with voxels divided into `parts`: each must have at least two
-/// voxels along every axis. Axes along which voxels are divided keep their voxels until the others are as long.
-fn most_levels_above(volume: &Volume, parts: [usize; 3]) -> Result<usize, MethodError> {
-    if parts == [1; 3] {
-        return Ok(volume.max_pyramid_levels(REDUCTION)? - 1);
-    }
+/// Returns the largest number of levels above a volume: each must have at least two voxels along every axis. Axes along
+/// which voxels are divided keep their voxels until the others are as long.
+pub(super) fn max_levels(volume: &Volume) -> usize {
+    let parts = parts_of_whole(volume.spacing(), volume.dims());
     let (mut dims, mut spacing, mut level_parts) = (volume.dims(), volume.spacing(), parts);
     let mut above = 0;
     while dims.iter().all(|&n| n >= 2) {
@@ -727,7 +725,7 @@ fn most_levels_above(volume: &Volume, parts: [usize; 3]) -> Result<usize, Method
         level_parts = parts_on_coarse_level(parts, spacing, dims);
         above += 1;
     }
-    Ok(usize::max(above, 1) - 1)
+    usize::max(above, 1) - 1
 }
 
 /// Returns the map from the indices of parts of voxels to world space, given that from voxel indices.

@@ -271,6 +271,12 @@ impl DeformableModel {
         Self::from_pyramid(pyramid, volume.affine(), origin)
     }
 
+    /// Returns the largest [`DeformableOptions::levels`] for a volume: each level has at least two voxels along every
+    /// axis.
+    pub fn max_levels(volume: &Volume) -> usize {
+        image::max_levels(volume)
+    }
+
     fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
         let to_world = pyramid.to_world(&affine);

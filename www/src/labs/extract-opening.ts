@@ -124,9 +124,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved };
     const loaded = await this.#client.request('load', body, transferable(volume));
-    const { large } = loaded.volume;
-    const levels = large ? Math.min(choice.levels, large.levels.length - 1) : choice.levels;
-    return { ...loaded, choice: { ...choice, levels }, setup, moments };
+    return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
   }
 
   protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {

@@ -50,6 +50,11 @@ export function withAttractors(setup: Setup, make: () => DeformableModel): Defor
   return model;
 }
 
+/** Returns a set-up with no more pyramid levels than a volume allows: those of another volume may be more. */
+export function fittingSetup(setup: Setup, volume: Volume): Setup {
+  return { ...setup, levels: Math.min(setup.levels, DeformableModel.maxLevels(volume)) };
+}
+
 export function buildModel(volume: Volume, setup: Setup): DeformableModel {
   return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup), volume }));
 }
