@@ -22,6 +22,8 @@ export {
 } from './cornerstone-add-on.js';
 export type { LabelClasses } from './label-map.js';
 
+const REMEDY = 'Cornerstone3D cannot draw it there; move the volume to the origin';
+
 /** The properties of a volume in Cornerstone's cache, `cache.getVolume(volumeId)`, that the adapter reads. */
 export interface CornerstoneVolume {
   dimensions: ArrayLike<number>;
@@ -153,7 +155,7 @@ export class CornerstoneSurfaces {
 
   /** Returns whether the surface has changed. */
   #readOne(segment: number): boolean {
-    const reader = this.#shown.get(segment)?.reader ?? new MeshReader(undefined, undefined);
+    const reader = this.#shown.get(segment)?.reader ?? new MeshReader(undefined, undefined, REMEDY);
     const frame = reader.read(this.mesh(segment));
     if (!frame) return false;
     this.#shown.set(segment, { reader, geometry: { points: frame.positions.slice(), polys: polygons(frame) } });

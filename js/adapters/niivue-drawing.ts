@@ -15,6 +15,12 @@ export interface DrawingOptions extends LabelClasses, LabelParams {
   outline?: number;
   /** Called each time that the surfaces have changed, with the pen values that have one. */
   onChange?: (labels: readonly number[]) => void;
+  /**
+   * Called with the error of an update that nobody called, such as after a stroke; by default it is reported to the
+   * page, as an error that nobody caught. A drawing so far from the origin that NiiVue cannot show its surfaces has one
+   * with the code `precision`.
+   */
+  onError?: (error: unknown) => void;
 }
 
 /** Surfaces of NiiVue's drawing layer, which follow it. */
@@ -28,7 +34,8 @@ export interface FollowedDrawing {
    * Follows the drawing now. Not needed after strokes, undo and whatever else calls NiiVue's `refreshDrawing`; needed
    * after another colormap. Resolves when NiiVue has the surfaces.
    *
-   * @throws `VesicleError` `invalid-argument`: a drawing that does not fit to the first volume.
+   * @throws `VesicleError` `invalid-argument`: a drawing that does not fit to the first volume; `precision`: one so far
+   *   from the origin that NiiVue cannot show its surfaces.
    */
   update(): Promise<void>;
   /** Stops following for good, and removes the surfaces from NiiVue. */
@@ -118,7 +125,10 @@ class DrawingFollower implements FollowedDrawing {
   readonly #schedule = (): void => {
     this.#frame ??= requestAnimationFrame(() => {
       this.#frame = undefined;
-      void this.update();
+      this.update().catch((error: unknown) => {
+        if (!this.#options.onError) throw error;
+        this.#options.onError(error);
+      });
     });
   };
 

@@ -1,6 +1,7 @@
 // Shows a surface in NiiVue that follows a mesh.
 import { boolean, invalid, number } from '../check.js';
 import type { Space, Vec3 } from '../data.js';
+import { VesicleError } from '../error.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Warning } from '../warning.js';
 import { Outline, type Outlines, outlinesOf } from './niivue-outline.js';
@@ -42,10 +43,16 @@ export interface NiivueSurfaceOptions {
   outline?: number;
   /**
    * Whether a mesh that is far from the origin for its size is shown at the origin, with a warning. NiiVue draws positions
-   * in world space in single precision, in which such a mesh would jitter. Default false: `update` throws `precision`.
+   * in world space in single precision, in which such a mesh would jitter. Not beside a volume that is as far away, since
+   * NiiVue's view of both would be empty. Default false: `update` throws `precision`.
    */
   recentre?: boolean;
 }
+
+const REMEDY = 'NiiVue cannot draw it there; the option `recentre` shows it at the origin';
+
+/** A volume that is this many times its size away from the origin is far from it. */
+const FAR = 16;
 
 /**
  * A mesh in NiiVue that follows a mesh of this library, through all changes of connectivity.
@@ -56,6 +63,7 @@ export interface NiivueSurfaceOptions {
  * ```
  */
 export class NiivueSurface {
+  readonly #nv: Niivue;
   readonly #reader: MeshReader;
   readonly #adapter: MeshAdapter;
   readonly #outline: Outline | undefined;
@@ -73,7 +81,8 @@ export class NiivueSurface {
     if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'must be a Niivue');
     const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View10 };
     if (!gl && !view) throw invalid('nv', 'has no canvas yet; attach one first');
-    this.#reader = new MeshReader(space, 'RAS', boolean('recentre', options.recentre ?? false));
+    this.#nv = nv;
+    this.#reader = new MeshReader(space, 'RAS', boolean('recentre', options.recentre ?? false) ? undefined : REMEDY);
     if (number('outline', outline, { min: 0 }) > 0) {
       this.#outlines = outlinesOf(nv);
       this.#outline = new Outline(color, outline);
@@ -96,7 +105,9 @@ export class NiivueSurface {
   get warnings(): Warning[] {
     const { warnings } = this.#reader;
     if (this.#origin.every((coordinate) => coordinate === 0)) return warnings;
-    const text = `The surface is shown at the origin, and is at ${this.#origin.join(', ')}: too far for NiiVue to draw it.`;
+    const text =
+      `NiiVue cannot draw the surface where it is, too far from the origin: ` +
+      `the point ${this.#origin.join(', ')} is shown at the origin.`;
     return [...warnings, { code: 'recentred', text, where: { point: this.#origin } }];
   }
 
@@ -108,12 +119,12 @@ export class NiivueSurface {
    * possibly on each: there NiiVue uploads its volumes again, too.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
-   *   is too coarse there, unless it may be recentred.
+   *   is too coarse there, unless it may be recentred and NiiVue has no volume as far away. What was shown stays.
    */
   async update(mesh: MeshSource): Promise<boolean> {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
-    this.#origin = frame.origin;
+    await this.#moveTo(frame.origin);
     // NiiVue keeps the arrays for later use, so they are copied.
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
     this.#outline?.set(positions, indices);
@@ -123,12 +134,49 @@ export class NiivueSurface {
     return true;
   }
 
-  /** Removes the mesh from NiiVue. */
-  async dispose(): Promise<void> {
-    this.#reader.clear();
+  /** Sets the point that is shown at the origin. */
+  async #moveTo(origin: Vec3): Promise<void> {
+    const [was, is] = [this.#origin, origin].map(isZero);
+    if (!is && volumesOf(this.#nv).some(isFar)) {
+      this.#reader.clear();
+      const text = 'NiiVue has a volume far from the origin, and draws nothing if a surface is shown there';
+      throw new VesicleError('precision', `${text}: remove the volume, or move it and the mesh to the origin`);
+    }
+    // NiiVue 1.0 centres its view on a mesh when that is added.
+    if (was !== is) await this.#remove();
+    this.#origin = origin;
+  }
+
+  async #remove(): Promise<void> {
     if (this.mesh) this.#outlines?.remove(this.mesh);
     await this.#adapter.remove();
   }
+
+  /** Removes the mesh from NiiVue. */
+  async dispose(): Promise<void> {
+    this.#reader.clear();
+    this.#origin = [0, 0, 0];
+    await this.#remove();
+  }
+}
+
+const isZero = (point: Vec3): boolean => point.every((coordinate) => coordinate === 0);
+
+/** The properties of a NiiVue volume that tell where it is. */
+interface PlacedVolume {
+  hdr?: { dims: ArrayLike<number>; affine: ArrayLike<number>[] } | null;
+}
+
+const volumesOf = (nv: Niivue): PlacedVolume[] => (nv as { volumes?: PlacedVolume[] }).volumes ?? [];
+
+/** Returns whether a volume is so much further from the origin than it is large as a mesh that gets an origin. */
+function isFar({ hdr }: PlacedVolume): boolean {
+  if (!hdr?.affine) return false;
+  const rows = [0, 1, 2].map((row) => Array.from({ length: 4 }, (_, k) => Number(hdr.affine[row]?.[k])));
+  const sides = [1, 2, 3].map((axis) => Number(hdr.dims[axis]));
+  const center = rows.map((row) => sides.reduce((sum, n, k) => sum + (row[k] ?? 0) * (n / 2), row[3] ?? 0));
+  const size = rows.map((row) => sides.reduce((sum, n, k) => sum + Math.abs(row[k] ?? 0) * n, 0));
+  return Math.hypot(...center) > FAR * Math.hypot(...size);
 }
 
 /** A surface whose arrays NiiVue may keep. */

@@ -1,6 +1,7 @@
 // Shared by the adapters: reads a mesh when it has changed, and validates the host's volumes.
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
+import { VesicleError } from '../error.js';
 import type { MeshArrays, PositionOptions } from '../mesh.js';
 import type { Warning } from '../warning.js';
 
@@ -44,7 +45,7 @@ export interface SurfaceArrays extends MeshArrays {
  */
 export class MeshReader {
   readonly #rotated: boolean;
-  readonly #relative: boolean;
+  readonly #remedy: string | undefined;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
   #mesh: MeshSource | undefined;
   #warnings: readonly Warning[] = [];
@@ -53,11 +54,12 @@ export class MeshReader {
 
   /**
    * Sets the space of the mesh and that of the host. If both are given and differ, each surface read is rotated by 180°
-   * about z, which maps RAS to LPS and back and preserves orientation. Positions are `relative` to an origin if the host
-   * can put the surface there; else they are in world space, in single precision, where that suffices.
+   * about z, which maps RAS to LPS and back and preserves orientation. Positions are relative to an origin if the host
+   * can put the surface there; else they are in world space, in single precision, and `remedy` says in an error what
+   * to do where that does not suffice.
    */
-  constructor(space: Space | undefined, host: Space | undefined, relative = false) {
-    this.#relative = relative;
+  constructor(space: Space | undefined, host: Space | undefined, remedy?: string) {
+    this.#remedy = remedy;
     const spaces = [space, host].filter((one) => one !== undefined);
     for (const one of spaces) choice('space', one, ['RAS', 'LPS']);
     this.#rotated = spaces[0] !== spaces.at(-1);
@@ -65,14 +67,14 @@ export class MeshReader {
 
   /**
    * Returns the surface in the host's space, or undefined if it has not changed since the last read; throws `precision`
-   * if single precision in world space does not suffice.
+   * with the remedy if single precision in world space does not suffice.
    */
   read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
     this.#warnings = mesh.warnings ?? [];
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
-    const frame = this.#take(mesh);
+    const frame = this.#takeOrAdvise(mesh);
     [this.#mesh, this.#topology, this.#geometry] = [mesh, mesh.topologyVersion, mesh.geometryVersion];
     const origin: Vec3 = [...(frame.origin ?? ([0, 0, 0] as const))];
     if (this.#rotated) for (const values of [frame.positions, frame.normals, origin]) rotate180(values);
@@ -84,8 +86,18 @@ export class MeshReader {
     return [...this.#warnings];
   }
 
+  #takeOrAdvise(mesh: MeshSource): MeshArrays {
+    try {
+      return this.#take(mesh);
+    } catch (error) {
+      const { code, message } = Object(error) as Partial<VesicleError>;
+      if (code !== 'precision' || !this.#remedy) throw error;
+      throw new VesicleError('precision', `${message?.split(': ')[0]}: ${this.#remedy}`);
+    }
+  }
+
   #take(mesh: MeshSource): MeshArrays {
-    const options = { relative: this.#relative };
+    const options = { relative: this.#remedy === undefined };
     if (!mesh.copyTo) return copied(mesh.arrays(options));
     const { vertices, triangles } = mesh.copyTo(this.#arrays, options);
     return usedPart(this.#arrays, vertices, triangles);

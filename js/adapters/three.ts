@@ -121,6 +121,8 @@ interface Vector {
   set(x: number, y: number, z: number): unknown;
 }
 
+const REMEDY = 'the object needs a `position`, which is then set to the origin of the mesh';
+
 /** The classes of three.js that {@link ThreeSurface} needs; the whole module, `THREE`, can be passed. */
 export interface ThreeClasses {
   BufferGeometry: new () => Geometry;
@@ -158,8 +160,12 @@ const CAPACITY_FACTOR = 1.5;
  *
  * The object's `geometry` is replaced by the first update, and whenever its buffers have to grow or the mesh gains or
  * loses colours or texture coordinates; material and transform in the scene are the caller's. Positions are those of
- * the mesh, in its volume's world space unless `worldSpace` is another one. Of a mesh that is far from the origin for its
- * size, they are relative to `mesh.origin`, which becomes the `position` of the object: so it is drawn without jitter.
+ * the mesh, in its volume's world space unless `worldSpace` is another one.
+ *
+ * Of a mesh that is far from the origin for its size, they are relative to `mesh.origin`, which becomes the `position`
+ * of the object: transform a parent of it instead, and add what belongs to the surface, such as its edges, as its
+ * children. `WebGLRenderer` then draws it without jitter, `WebGPURenderer` with `highPrecision = true`. Shadows need a
+ * parent whose position is −`mesh.origin`, and camera and lights relative to that.
  */
 export class ThreeSurface {
   readonly #three: ThreeClasses;
@@ -184,7 +190,8 @@ export class ThreeSurface {
     if (!Object(object).geometry) throw invalid('object', 'must be an object with a geometry, such as a THREE.Mesh');
     this.#three = three;
     this.#object = object;
-    this.#reader = new MeshReader(options.space, options.worldSpace, typeof object.position?.set === 'function');
+    const remedy = typeof object.position?.set === 'function' ? undefined : REMEDY;
+    this.#reader = new MeshReader(options.space, options.worldSpace, remedy);
   }
 
   /** Warnings of the mesh of the last update; empty if there are none. */

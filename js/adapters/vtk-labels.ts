@@ -8,12 +8,17 @@ import type { Warning } from '../warning.js';
 import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { type VtkImage, volumeFromVtk } from './vtk-image.js';
-import { type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
+import { type VtkActor, type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';
 
 /** Options of {@link VtkLabelSurfaces}. */
 export interface VtkLabelSurfacesOptions extends LabelParams {
   /** Labels that get a surface; all others count as background. Default all, including those that are added later. */
   labels?: number[];
+  /**
+   * Returns the `vtkActor` that shows the surface of a label; called once for each. Needed for an image that is far from
+   * the origin for its size: the actors are moved to the origins of the surfaces.
+   */
+  actorOf?: (label: number) => VtkActor;
 }
 
 /**
@@ -31,6 +36,7 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
   readonly #map: LabelMap;
   readonly #image: VtkImage;
   readonly #vtk: VtkClasses<P>;
+  readonly #actorOf: ((label: number) => VtkActor) | undefined;
   readonly #made = new Map<number, VtkSurface<P>>();
 
   /**
@@ -39,16 +45,27 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
    * @param classes - Those of vtk.js and of this library.
    * @param image - A label map: integers, 0 for the background, one number a voxel.
    * @throws `VesicleError` `invalid-argument`: classes that are missing, no such image, one that is no label map, labels
-   *   that it does not have; `too-large`.
+   *   that it does not have; `precision`: an image so far from the origin that single precision is too coarse there,
+   *   without `actorOf`; `too-large`.
    */
-  constructor(classes: VtkClasses<P> & LabelClasses, image: VtkImage, options: VtkLabelSurfacesOptions = {}) {
+  constructor(
+    classes: VtkClasses<P> & LabelClasses,
+    image: VtkImage,
+    { actorOf, ...options }: VtkLabelSurfacesOptions = {},
+  ) {
     // Checks the classes of vtk.js.
     new VtkSurface(classes).dispose();
     this.#vtk = classes;
+    this.#actorOf = actorOf;
     this.#image = image;
     this.#map = new LabelMap(classes, volumeFromVtk(image), options);
     this.#map.settle();
-    this.#show();
+    try {
+      this.#show();
+    } catch (error) {
+      this.dispose();
+      throw error;
+    }
   }
 
   /** The labels that have voxels, in ascending order. */
@@ -101,7 +118,8 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
     const known = this.#made.get(label);
     if (known) return known;
     const mesh = this.mesh(label);
-    const surface = new VtkSurface(this.#vtk);
+    const actor = this.#actorOf?.(label);
+    const surface = new VtkSurface(this.#vtk, actor ? { actor } : {});
     this.#made.set(label, surface);
     surface.update(mesh);
     return surface;

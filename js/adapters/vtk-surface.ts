@@ -62,7 +62,8 @@ export class VtkSurface<P extends VtkPolyData> {
       if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
     }
     this.#actor = options.actor;
-    this.#reader = new MeshReader(options.space, options.worldSpace, this.#actor !== undefined);
+    const remedy = this.#actor ? undefined : 'give the `actor` that shows it, which is then moved there';
+    this.#reader = new MeshReader(options.space, options.worldSpace, remedy);
     this.polyData = vtk.vtkPolyData.newInstance();
     this.#normals = vtk.vtkDataArray.newInstance({
       name: 'Normals',

@@ -362,6 +362,22 @@ test('NiiVue: what cannot be followed is refused', async () => {
   vi.unstubAllGlobals();
 });
 
+test('NiiVue: the page is told of a drawing too far away to be shown, also after strokes', async () => {
+  const run = frames();
+  const matRAS = Float32Array.of(...[1, 0, 0, 5e5, 0, 1, 0, 5e6], ...[0, 0, 1, 100, 0, 0, 0, 1]);
+  const nv = new Drawer({ dimsRAS: [3, 6, 6, 6], matRAS });
+  const errors: unknown[] = [];
+  const onError = (error: unknown) => errors.push(error);
+  const drawing = followDrawing(wrong(nv), { ...classes, NVMesh: wrong(NVMesh), outline: 0, onError });
+  nv.drawBitmap = Uint8Array.from({ length: 216 }, (_, i) => Number(i % 6 > 1 && i % 6 < 4 && i > 80 && i < 140));
+  expect((await rejection(drawing.update())).code).toBe('precision');
+  nv.refreshDrawing();
+  run();
+  await vi.waitFor(() => expect(errors).toMatchObject([{ code: 'precision' }]));
+  await drawing.stop();
+  vi.unstubAllGlobals();
+});
+
 test('NiiVue: outlines are closed, also through vertices', () => {
   const { positions, indices } = Mesh.icosphere([0, 0, 0], 2, 0.4).arrays();
   const outline = new Outline([1, 0, 0], 1);

@@ -75,7 +75,9 @@ test('adapters import neither hosts nor the module', async () => {
     const imports = [...code.matchAll(/^(?:import|export) [^;]*?from '(.*)';$/gm)].map(([, from = '']) => from);
     expect(code.match(/^import|import\(/gm)?.length ?? 0, file).toBeLessThanOrEqual(imports.length);
     for (const from of imports)
-      expect(['../check.js', '../warnings.js', ...files.map((name) => `./${name}`)], file).toContain(from);
+      expect(['../check.js', '../error.js', '../warnings.js', ...files.map((name) => `./${name}`)], file).toContain(
+        from,
+      );
   }
 });
 

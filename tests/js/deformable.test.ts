@@ -6,6 +6,7 @@ import {
   Mesh,
   paramSpecs,
   type StepReport,
+  type Vec3,
   VesicleError,
   Volume,
 } from '../../pkg/index.js';
@@ -59,13 +60,14 @@ test('coarse to fine it ends on the full volume, with the requested edge length'
 });
 
 test('the largest number of levels is told by dimensions and spacing', () => {
-  for (const { dims, spacing, most } of [
+  const cases: { dims: Vec3; spacing: Vec3; most: number }[] = [
     { dims: [4, 3, 2], spacing: [1, 1, 1], most: 0 },
     { dims: [8, 8, 1], spacing: [1, 1, 1], most: 0 },
     { dims: [12, 14, 18], spacing: [1, 1, 1], most: 2 },
     // The long voxels are divided until the others are as long.
     { dims: [40, 40, 4], spacing: [1, 1, 10], most: 4 },
-  ]) {
+  ];
+  for (const { dims, spacing, most } of cases) {
     const data = new Uint8Array(dims.reduce((product, side) => product * side));
     data[data.length >> 1] = 1;
     const volume = new Volume({ data, dims, spacing });

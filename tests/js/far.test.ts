@@ -1,12 +1,13 @@
 // Data far from the origin of world space, such as surveyed coordinates: nothing is rounded without a word.
 import vtkDataArray from '@kitware/vtk.js/Common/Core/DataArray.js';
+import vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData.js';
 import vtkPolyData from '@kitware/vtk.js/Common/DataModel/PolyData.js';
 import vtkActor from '@kitware/vtk.js/Rendering/Core/Actor.js';
 import * as THREE from 'three';
 import { describe, expect, test } from 'vitest';
 import { NiivueSurface } from '../../pkg/adapters/niivue.js';
 import { ThreeSurface } from '../../pkg/adapters/three.js';
-import { VtkSurface } from '../../pkg/adapters/vtk.js';
+import { VtkLabelSurfaces, VtkSurface } from '../../pkg/adapters/vtk.js';
 import {
   animationGlb,
   DeformableModel,
@@ -202,6 +203,9 @@ test('a lamp far away keeps its volume', () => {
   expect(distance(away.baseMesh.info().centroid, [1e6, -1e6, 0])).toBeLessThan(0.01);
 });
 
+const newActor = (): { setPosition(x: number, y: number, z: number): void; getPosition(): Vec3 } =>
+  wrong(vtkActor.newInstance());
+
 describe('in other software', () => {
   test('three.js gets the origin as the position of the object', () => {
     const object = new THREE.Mesh();
@@ -219,23 +223,73 @@ describe('in other software', () => {
   test('vtk.js gets it as the position of an actor, without which it is refused', () => {
     // The declarations of vtk.js lack some of its own members.
     const classes = { vtkPolyData: wrong(vtkPolyData), vtkDataArray: wrong(vtkDataArray) };
-    expect(failure(() => new VtkSurface(classes).update(far())).code).toBe('precision');
-    const actor: { setPosition(x: number, y: number, z: number): void; getPosition(): Vec3 } = wrong(
-      vtkActor.newInstance(),
-    );
+    const refusal = failure(() => new VtkSurface(classes).update(far()));
+    expect(refusal).toMatchObject({ code: 'precision', message: expect.stringMatching(/give the `actor`/) });
+    const actor = newActor();
     new VtkSurface(classes, { actor }).update(far());
     expect(actor.getPosition()).toEqual(far().origin);
+  });
+
+  test('vtk.js gets actors for the surfaces of a label map, without which it is refused', () => {
+    const classes = {
+      ...{ Volume, LabelSurfaces },
+      vtkPolyData: wrong(vtkPolyData),
+      vtkDataArray: wrong(vtkDataArray),
+    };
+    const image = wrong(vtkImageData.newInstance({ spacing: [0.1, 0.1, 0.1], origin: [...UTM] }));
+    image.setDimensions(8, 8, 8);
+    const values = Uint8Array.from({ length: 512 }, (_, i) => ([2, 3, 4].includes(i % 8) && i > 99 && i < 400 ? 1 : 0));
+    image.getPointData().setScalars(vtkDataArray.newInstance({ values }));
+    expect(failure(() => new VtkLabelSurfaces(classes, image)).code).toBe('precision');
+    const actors = new Map<number, ReturnType<typeof newActor>>();
+    const actorOf = (label: number) => actors.set(label, newActor()).get(label) as ReturnType<typeof newActor>;
+    const surfaces = new VtkLabelSurfaces(classes, image, { actorOf });
+    expect([...actors.keys()]).toEqual([1]);
+    expect(actors.get(1)?.getPosition()).toEqual(surfaces.mesh(1).origin);
+    expect(distance(surfaces.mesh(1).info().centroid, UTM)).toBeLessThan(1);
+    surfaces.dispose();
   });
 
   test('NiiVue, which draws in world space, refuses it or shows it recentred, with a warning', async () => {
     const meshes: { positions: Float32Array }[] = [];
     const nv = { addMesh: (mesh: never) => meshes.push(mesh), removeMesh: () => {}, meshes, view: {} };
     const error = await rejection(new NiivueSurface(nv, { outline: 0 }).update(far()));
-    expect(error.code).toBe('precision');
+    expect(error).toMatchObject({ code: 'precision', message: expect.stringMatching(/the option `recentre`/) });
     const surface = new NiivueSurface(nv, { outline: 0, recentre: true });
     await surface.update(far());
     expect(Math.max(...(meshes[0]?.positions ?? []))).toBeLessThan(50);
     expect(surface.warnings).toMatchObject([{ code: 'recentred', where: { point: far().origin } }]);
+    await surface.dispose();
+    expect(surface.warnings).toEqual([]);
+  });
+
+  test('NiiVue 1.0 gets a mesh anew when it is recentred or no longer, since its view keeps its centre', async () => {
+    const meshes: object[] = [];
+    const removeMesh = (index: number) => meshes.splice(index, 1);
+    const nv = wrong({ addMesh: (mesh: object) => meshes.push(mesh), removeMesh, meshes, view: {} });
+    const surface = new NiivueSurface(nv, { outline: 0, recentre: true });
+    const shown = [];
+    for (const mesh of [far(), far(), far(3), Mesh.icosphere([0, 0, 0], 5, 1)]) {
+      await surface.update(mesh);
+      expect(meshes.length).toBe(1);
+      shown.push(meshes[0]);
+    }
+    expect(shown[1]).toBe(shown[0]);
+    expect(shown[3]).not.toBe(shown[2]);
+  });
+
+  test('NiiVue shows no recentred mesh beside a volume that is far away, since its view would be empty', async () => {
+    const nv = (offset: Vec3) => {
+      const affine = [0, 1, 2].map((row) =>
+        [0, 1, 2, 3].map((k) => (k === 3 ? (offset[row] ?? 0) : Number(k === row))),
+      );
+      const volumes = [{ hdr: { dims: [3, 20, 20, 20], affine } }];
+      return { addMesh: () => {}, removeMesh: () => {}, meshes: [], view: {}, volumes };
+    };
+    const beside = new NiivueSurface(nv(UTM), { outline: 0, recentre: true });
+    for (let i = 0; i < 2; i++) expect((await rejection(beside.update(far()))).message).toMatch(/has a volume far/);
+    expect(beside.warnings).toEqual([]);
+    expect(await new NiivueSurface(nv([100, -80, 40]), { outline: 0, recentre: true }).update(far())).toBe(true);
   });
 
   test('a worker gives the same', async () => {
