@@ -8,7 +8,7 @@ use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{
-    coordinates, corner_coordinates, flat, located, packed, point, points, to_js, triangles,
+    coordinates, corner_coordinates, flat, packed, point, points, to_js, triangles, world_points,
 };
 use super::error::Failure;
 use super::texture::RawTexture;
@@ -16,7 +16,8 @@ use super::volume::RawVolume;
 use vesicle::io::{MeshFormat, write_noted_mesh};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{
-    Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic_distances, measure, report, world_origin,
+    Measures, Mesh, MeshReport, TriangleMesh, WorldPositions, curvature, geodesic_distances, measure, report,
+    world_origin,
 };
 use vesicle::methods::LiveSurface;
 use vesicle::remesh::{
@@ -97,8 +98,10 @@ impl RawMesh {
         indices: &Uint32Array,
         extra: RawExtra,
     ) -> Result<RawMesh, JsValue> {
-        let (positions, origin) = located(positions)?;
-        let mesh = TriangleMesh { positions, origin, triangles: triangles(indices)?, ..extra.0 };
+        let triangles = triangles(indices)?;
+        let world = world_points(positions)?.into_iter().collect::<WorldPositions>();
+        let (positions, origin) = world.relative_in(&triangles).map_err(Failure::from)?;
+        let mesh = TriangleMesh { positions, origin, triangles, ..extra.0 };
         Ok(RawMesh(triangle_list(mesh)))
     }
 

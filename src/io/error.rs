@@ -1,5 +1,7 @@
 //! The error of all readers and writers of files, worded so that the owner of the file can act on it.
 
+use crate::mesh::MeshError;
+
 /// Reason why a file could not be read or written; every variant names the format and the field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FormatError {
@@ -50,6 +52,11 @@ pub enum FormatError {
 }
 
 impl FormatError {
+    /// Returns an [`Invalid`](Self::Invalid) error about positions that single precision cannot show.
+    pub(crate) fn positions(format: &'static str, error: &MeshError) -> Self {
+        Self::invalid(format, "positions", error.to_string())
+    }
+
     /// Returns an [`Invalid`](Self::Invalid) error about `field`.
     pub(crate) fn invalid(
         format: &'static str,

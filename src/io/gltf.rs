@@ -52,7 +52,8 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     }
     let mut mesh =
         mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
-    (mesh.positions, mesh.origin) = positions.relative();
+    let relative = positions.relative_in(&mesh.triangles);
+    (mesh.positions, mesh.origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
     let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
     if let Some(base_color) = base_color.filter(|_| mesh.has_uvs()) {
         mesh.texture = base_color.texture(&document)?.map(Arc::new);

@@ -24,14 +24,14 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Reads a mesh from an OBJ file. Texture coordinates and normals are kept if every corner of every face has them,
 /// colours if every vertex has one; the normals at the corners are averaged per vertex.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    Ok(read(bytes)?.into_mesh())
+    read(bytes)?.into_mesh()
 }
 
 /// Reads the vertices of an OBJ file as points; the file needs no faces. If every face corner refers to a normal,
 /// normals are read and averaged per vertex. If no corner does and there are as many normals as vertices, the normals
 /// belong to the vertices in order.
 pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
-    Ok(read(bytes)?.into_points())
+    read(bytes)?.into_points()
 }
 
 /// Reads all lines of an OBJ file; a backslash at the end of a line joins the next one to it.
@@ -128,7 +128,7 @@ impl Reader {
         Ok(Corner { position: position.ok_or_else(problem)?, uv, normal })
     }
 
-    fn into_mesh(self) -> TriangleMesh {
+    fn into_mesh(self) -> Result<TriangleMesh, FormatError> {
         let triangles: Vec<[u32; 3]> = self.corners.iter().map(|c| c.map(|corner| corner.position)).collect();
         let corner_uvs = self.per_corner(|corner| corner.uv.map(|i| self.uvs[i as usize]));
         let corner_normals = self.per_corner(|corner| corner.normal.map(|i| self.normals[i as usize]));
@@ -139,21 +139,22 @@ impl Reader {
             sums.into_iter().map(|n| n.normalize_or_zero()).collect()
         });
         let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
-        let (positions, origin) = self.positions.relative();
-        TriangleMesh { positions, origin, triangles, normals, corner_uvs, colors, ..Default::default() }
+        let relative = self.positions.relative_in(&triangles);
+        let (positions, origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
+        Ok(TriangleMesh { positions, origin, triangles, normals, corner_uvs, colors, ..Default::default() })
     }
 
-    fn into_points(mut self) -> PointCloud {
+    fn into_points(mut self) -> Result<PointCloud, FormatError> {
         let named = self.corners.as_flattened().iter().any(|corner| corner.normal.is_some());
         let in_order = !named && self.normals.len() == self.positions.len();
         let own = in_order.then(|| mem::take(&mut self.normals));
-        let mesh = self.into_mesh();
-        PointCloud {
+        let mesh = self.into_mesh()?;
+        Ok(PointCloud {
             points: mesh.positions,
             origin: mesh.origin,
             normals: own.or(mesh.normals.filter(|_| named)),
             colors: mesh.colors,
-        }
+        })
     }
 
     /// Returns the value of `read` at each corner of all triangles; `None` if it is missing at any corner.

@@ -414,7 +414,8 @@ impl Reader {
     /// Returns the mesh that was read; texture coordinates per corner are kept if every face has them.
     fn finish(self) -> Result<TriangleMesh, FormatError> {
         let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
-        let (positions, origin) = self.positions.relative();
+        let relative = self.positions.relative_in(&self.mesh.triangles);
+        let (positions, origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
         let corner_uvs = per_corner.then_some(self.corner_uvs);
         Ok(TriangleMesh { positions, origin, corner_uvs, ..self.mesh })
     }

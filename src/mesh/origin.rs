@@ -5,6 +5,7 @@
 //! for its shape. So a mesh or cloud that is far away for its size has an origin of its own.
 
 use super::{Mesh, MeshError, TriangleMesh};
+use crate::math::order::{rank_f32, sort_by_rank};
 use crate::math::{DAffine3, DVec3, Vec3};
 
 /// The largest coordinate, in sizes of the box, up to which positions are relative to the origin of world space: a
@@ -18,6 +19,12 @@ const LOSS: f64 = 1e-3;
 /// The length of the shortest edges that [`LOSS`] is asked of, as a part of the mean edge: shorter ones, which marching
 /// cubes leaves anywhere, count as that long.
 const SHORT: f64 = 0.1;
+
+/// As [`LOSS`], for meshes that are read or given: more is refused. A thousandth would refuse large terrains.
+const LARGEST_LOSS: f64 = 1.0 / 64.0;
+
+/// The number of positions from which it is seen where most of them are.
+const SAMPLE: usize = 4096;
 
 /// Returns the origin for positions in a box of world space, given by its corners: 0 unless the box is farther away than
 /// 16 times its longest side, else a point near its centre, with so few bits that differences from it are exact.
@@ -80,11 +87,16 @@ impl WorldPositions {
     }
 
     /// Returns positions and the origin that they are relative to: 0 if it need not be another, or if a position is not
-    /// finite in single precision, which callers refuse.
+    /// finite in single precision, which callers refuse. If a few are so far from the others that single precision cannot
+    /// show all, the origin is among the others.
     pub fn relative(self) -> (Vec<Vec3>, DVec3) {
         let Self { mut nearest, left } = self;
-        // One point has no size for which it could be far away.
-        let origin = if nearest.len() == 1 && left.is_empty() { DVec3::ZERO } else { origin_of(&nearest) };
+        let origin = match origin_of(&nearest) {
+            // One point has no size for which it could be far away.
+            _ if nearest.len() == 1 && left.is_empty() => DVec3::ZERO,
+            DVec3::ZERO if !left.is_empty() => origin_of_most(&nearest),
+            origin => origin,
+        };
         if origin != DVec3::ZERO {
             for (k, p) in nearest.iter_mut().enumerate() {
                 let rest = left.get(k).copied().unwrap_or_default();
@@ -92,6 +104,33 @@ impl WorldPositions {
             }
         }
         (nearest, origin)
+    }
+}
+
+impl WorldPositions {
+    /// Returns the positions of a mesh of `triangles` as [`Self::relative`].
+    ///
+    /// # Errors
+    /// [`MeshError::Precision`] if single precision changes an edge by more than 1/64: parts of the mesh are too far from
+    /// each other. Edges of less than a tenth of the mean count as that long.
+    pub fn relative_in(self, triangles: &[[u32; 3]]) -> Result<(Vec<Vec3>, DVec3), MeshError> {
+        if self.left.is_empty() {
+            return Ok(self.relative());
+        }
+        let given = self.clone();
+        let (positions, origin) = self.relative();
+        // Indices are validated later.
+        let at = |all: &[Vec3], v: usize| all.get(v).copied().unwrap_or_default().as_dvec3();
+        let edges = Edges { triangles, position: |v: usize| at(&given.nearest, v) + at(&given.left, v) };
+        let mean = edges.mean_length();
+        if edges.any_loses(LARGEST_LOSS, mean, |v| at(&positions, v) + origin) {
+            let problem = format!(
+                "single precision is too coarse for edges of {mean:.3e} on average so far from each other: give the \
+                 parts of the mesh one by one"
+            );
+            return Err(MeshError::Precision { problem });
+        }
+        Ok((positions, origin))
     }
 }
 
@@ -107,6 +146,20 @@ impl Extend<DVec3> for WorldPositions {
     fn extend<I: IntoIterator<Item = DVec3>>(&mut self, positions: I) {
         positions.into_iter().for_each(|p| self.push(p));
     }
+}
+
+/// Returns the origin, see [`world_origin`], for the box of most positions: half of them, and half their size around
+/// those.
+fn origin_of_most(positions: &[Vec3]) -> DVec3 {
+    let step = positions.len() / SAMPLE + 1;
+    let mut ends = [DVec3::ZERO; 2];
+    for axis in 0..3 {
+        let mut sample: Vec<f32> = positions.iter().step_by(step).map(|p| p[axis]).collect();
+        sort_by_rank(&mut sample, |&x| rank_f32(x).into());
+        let [low, high] = [1, 3].map(|k| f64::from(sample[sample.len() * k / 4]));
+        (ends[0][axis], ends[1][axis]) = (1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low);
+    }
+    if positions.iter().all(|p| p.is_finite()) { world_origin(ends[0], ends[1]) } else { DVec3::ZERO }
 }
 
 /// Returns the origin, see [`world_origin`], for positions in world space; 0 if one is not finite.
@@ -169,17 +222,12 @@ impl TriangleMesh {
         if self.origin == DVec3::ZERO {
             return Ok(rounded);
         }
-        let edges = || {
-            let ends = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-            self.triangles.iter().flat_map(ends).map(|edge| edge.map(|v| v as usize))
+        let edges = Edges {
+            triangles: &self.triangles,
+            position: |v: usize| self.positions[v].as_dvec3() + self.origin,
         };
-        let length = |[a, b]: [usize; 2]| self.positions[a].as_dvec3().distance(self.positions[b].as_dvec3());
-        let mean = edges().map(length).sum::<f64>() / (3 * self.triangles.len()).max(1) as f64;
-        let loses = |edge: [usize; 2]| {
-            let [a, b] = edge.map(|v| rounded[v].as_dvec3() - self.positions[v].as_dvec3() - self.origin);
-            (a - b).length() > LOSS * length(edge).max(SHORT * mean)
-        };
-        if rounded.iter().all(|p| p.is_finite()) && !edges().any(loses) {
+        let mean = edges.mean_length();
+        if rounded.iter().all(|p| p.is_finite()) && !edges.any_loses(LOSS, mean, |v| rounded[v].as_dvec3()) {
             return Ok(rounded);
         }
         let problem = format!(
@@ -188,6 +236,36 @@ impl TriangleMesh {
             self.origin
         );
         Err(MeshError::Precision { problem })
+    }
+}
+
+/// The edges of triangles whose vertices have positions.
+struct Edges<'a, P> {
+    triangles: &'a [[u32; 3]],
+    position: P,
+}
+
+impl<P: Fn(usize) -> DVec3> Edges<'_, P> {
+    fn ends(&self) -> impl Iterator<Item = [usize; 2]> {
+        let ends = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+        self.triangles.iter().flat_map(ends).map(|edge| edge.map(|v| v as usize))
+    }
+
+    fn length(&self, [a, b]: [usize; 2]) -> f64 {
+        (self.position)(a).distance((self.position)(b))
+    }
+
+    fn mean_length(&self) -> f64 {
+        self.ends().map(|edge| self.length(edge)).sum::<f64>() / (3 * self.triangles.len()).max(1) as f64
+    }
+
+    /// Returns whether an edge differs between its ends as they are and as they are `rounded` by more than a part `loss` of
+    /// its length; the shortest edges count as long as a part of the `mean`.
+    fn any_loses(&self, loss: f64, mean: f64, rounded: impl Fn(usize) -> DVec3) -> bool {
+        self.ends().any(|edge| {
+            let [a, b] = edge.map(|v| rounded(v) - (self.position)(v));
+            (a - b).length() > loss * self.length(edge).max(SHORT * mean)
+        })
     }
 }
 
@@ -232,6 +310,39 @@ mod tests {
             for (p, q) in positions.iter().zip(&all) {
                 assert!((p.as_dvec3() + origin - q).length() < 2e-6, "{offset}");
             }
+        }
+    }
+
+    #[test]
+    fn a_stray_position_does_not_take_the_precision_of_the_others() {
+        let ball = torus(2.0, 0.7, 12, 9);
+        let far = DVec3::new(512_345.5, 5_401_234.25, 230.0);
+        let mut all: Vec<DVec3> = ball.positions.iter().map(|p| p.as_dvec3() + far).collect();
+        all.push(DVec3::ZERO);
+        let given = || all.iter().copied().collect::<WorldPositions>();
+        let (positions, origin) = given().relative_in(&ball.triangles).unwrap();
+        for (p, q) in positions.iter().zip(&all).take(ball.positions.len()) {
+            assert!((p.as_dvec3() + origin - q).length() < 1e-6, "{origin}");
+        }
+        // A triangle that reaches from the one to the other does not mind.
+        let long = [ball.triangles.clone(), vec![[0, 1, ball.positions.len() as u32]]].concat();
+        assert_eq!(given().relative_in(&long).unwrap().1, origin);
+    }
+
+    #[test]
+    fn parts_too_far_from_each_other_are_refused() {
+        let ball = torus(1.0, 0.4, 24, 12);
+        let count = ball.positions.len() as u32;
+        let two =
+            [ball.triangles.clone(), ball.triangles.iter().map(|t| t.map(|v| v + count)).collect()].concat();
+        let apart = |by: f64| {
+            let at =
+                |shift: f64| ball.positions.iter().map(move |p| p.as_dvec3() + DVec3::splat(shift / 3.0));
+            at(0.0).chain(at(by)).collect::<WorldPositions>().relative_in(&two)
+        };
+        assert_eq!(apart(1e3).unwrap().1, DVec3::ZERO);
+        for by in [1e7, -1e9] {
+            assert!(matches!(apart(by), Err(MeshError::Precision { .. })));
         }
     }
 

@@ -93,7 +93,7 @@ fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
 }
 
 /// Hash of the surfaces of all frames, natively and in wasm.
-const BITS: &str = "15c379ebb7a8e0c5";
+const BITS: &str = "0b2236f415065d25";
 
 #[test]
 fn bits_are_the_same_on_every_platform() {

@@ -173,15 +173,16 @@ impl FrameTracker {
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
     /// points along it, R²/8 for points weighted by θ = exp(−4r²/R²) with the radius R of the parameters, times the
-    /// mean curvature. Vertices move along their normals by as much, outwards where the surface is convex, but at most
-    /// by [`MAX_CURVATURE_CORRECTION`].
+    /// mean curvature; and that of the triangles between vertices on the surface, which lie on its inner side by e²/8 times
+    /// the mean curvature on average, with their edge length e. Vertices move along their normals by as much, outwards
+    /// where the surface is convex, but at most by [`MAX_CURVATURE_CORRECTION`].
     fn correct_curvature_bias(
         &mut self,
         mesh: &mut Mesh,
         context: &FrameContext,
         statistics: &mut FrameStatistics,
     ) {
-        let spread = (context.params.radius * context.params.radius / 8.0) as f32;
+        let spread = ((context.params.radius * context.params.radius + self.edge * self.edge) / 8.0) as f32;
         let limit = (MAX_CURVATURE_CORRECTION * context.region.spacing.min_element()) as f32;
         let bends = curvature(&mesh.to_triangles()).mean;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];

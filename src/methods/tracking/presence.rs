@@ -126,7 +126,10 @@ impl SurfaceTracker {
             return Ok(None);
         };
         let mesh = self.remeshed(&part)?;
-        let tracker = FrameTracker::new(measure(&mesh.to_triangles()).edge_mean);
+        let tracker = match &self.frame_tracker {
+            Some(tracker) => FrameTracker::new(tracker.edge),
+            None => FrameTracker::new(measure(&mesh.to_triangles()).edge_mean),
+        };
         let found = self.tracked(mesh, tracker, None, frame, voting);
         // In the first frame there is nothing to compare with, and what was extracted is given.
         Ok((found.is_present || frame == 0).then_some(found))

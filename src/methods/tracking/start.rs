@@ -5,19 +5,13 @@ use super::first::extract_bright_surface;
 use super::region::Region;
 use super::{Component, SurfaceTracker};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{Mesh, TriangleMesh, curvature, measure};
+use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{EdgeBounds, remesh};
 
-/// Target edge length of an extracted mesh, in units of the shortest side of a voxel, and the shortest one, of small
-/// objects.
+/// Target edge length of the mesh extracted from the first frame, in units of the shortest side of a voxel.
 const EDGE: f64 = 1.2;
-const SMALL_EDGE: f64 = 0.5;
-
-/// The largest share of an object's volume between the triangles of an extracted mesh and the surface on which their
-/// corners are. Objects with radii of about twelve voxels and more are below it at the target edge length.
-const VOLUME_LOSS: f64 = 0.007;
 
 /// Ratio of the longest accepted edge of the mesh extracted from the first frame to the target edge length, and of that
 /// to the shortest.
@@ -104,33 +98,16 @@ impl SurfaceTracker {
         scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
     }
 
-    /// Returns an extracted surface as a mesh with edges of even lengths, in the working space; they are shorter if the
-    /// object is so small that triangles would cut off much of it.
+    /// Returns an extracted surface as a mesh with edges of even lengths, in the working space.
     ///
     /// # Errors
     /// [`MethodError::Mesh`] if memory does not suffice.
     pub(super) fn remeshed(&self, part: &TriangleMesh) -> Result<Mesh, MethodError> {
-        let [longest, least] = [EDGE, SMALL_EDGE].map(|edge| edge * self.region.spacing.min_element());
-        let mesh = with_edges(part, longest)?;
-        let edge = edge_for_volume(&mesh.to_triangles()).max(least);
-        if edge < longest { with_edges(part, edge) } else { Ok(mesh) }
+        let mut mesh = Mesh::from_triangles(part)?;
+        let edge = (EDGE * self.region.spacing.min_element()) as f32;
+        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
+        Ok(mesh)
     }
-}
-
-/// Returns a mesh with edges of even lengths near `edge`.
-fn with_edges(part: &TriangleMesh, edge: f64) -> Result<Mesh, MethodError> {
-    let (mut mesh, edge) = (Mesh::from_triangles(part)?, edge as f32);
-    remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
-    Ok(mesh)
-}
-
-/// Returns the edge length with which triangles cut off [`VOLUME_LOSS`] of the volume within a smooth surface with the
-/// shape of `mesh`; infinite if they cut off nothing. A triangle with edges e is e²H/8 below a surface of mean
-/// curvature H.
-fn edge_for_volume(mesh: &TriangleMesh) -> f64 {
-    let curvature = curvature(mesh);
-    let cut: f64 = curvature.mean.iter().zip(&curvature.areas).map(|(mean, area)| mean * area / 8.0).sum();
-    if cut > 0.0 { (VOLUME_LOSS * measure(mesh).volume / cut).sqrt() } else { f64::INFINITY }
 }
 
 /// Returns the distance of a point from the nearest vertex of a closed surface; 0 if the point is
