@@ -521,3 +521,35 @@ fn a_sequence_far_from_the_origin_is_tracked_relative_to_it() {
     let [x, y, z, ..] = far.boundary(0)[0];
     assert!(DVec3::new(x.into(), y.into(), z.into()).distance(offset + 0.95 - far.origin()) < 1.0);
 }
+
+/// Windows reach five voxels. Beyond, a ball dragged a tail behind it, or crumpled to ever more triangles: a frame took
+/// minutes.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn what_moves_further_than_windows_reach_is_found_again_and_told() {
+    for (step, is_told) in [(3, false), (5, true), (8, true)] {
+        let at = |t: usize| Ball { center: DVec3::new(12.0 + (step * t) as f64, 13.5, 13.5), radius: 8.0 };
+        let value = |t: usize, p: DVec3| 200.0 * brightness(&[at(t)], p);
+        let volume = sequence([26 + 3 * step, 28, 28], 4, DAffine3::IDENTITY, value);
+        assert_sizes(volume, &[size(at(0)); 4], is_told);
+    }
+    for (change, is_told) in [(-4.0, true), (-3.0, false), (4.0, true)] {
+        let radius =
+            |t: usize| if change > 0.0 { 6.0 + change * t as f64 } else { 6.0 - change * (3 - t) as f64 };
+        let ball = |t: usize| Ball { center: DVec3::splat(22.5), radius: radius(t) };
+        let value = |t: usize, p: DVec3| 200.0 * brightness(&[ball(t)], p);
+        let volume = sequence([46; 3], 4, DAffine3::IDENTITY, value);
+        assert_sizes(volume, &[0, 1, 2, 3].map(|t| size(ball(t))), is_told);
+    }
+}
+
+/// Asserts that a sequence has an object of the `expected` sizes, and that warnings tell of it in each frame after the
+/// first, or in none.
+fn assert_sizes(volume: Volume, expected: &[f64], is_told: bool) {
+    let tracker = tracked(options(volume)).unwrap();
+    let ratios: Vec<f64> = tracker.volumes().iter().zip(expected).map(|(found, size)| found / size).collect();
+    println!("{ratios:.3?} {:?}", told(&tracker));
+    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.025), "{ratios:?}");
+    let all = (1..expected.len() as u32).flat_map(|t| [(EndsInFrame, t), (BeginsInFrame, t)]);
+    assert_eq!(told(&tracker), if is_told { all.collect() } else { vec![] });
+}

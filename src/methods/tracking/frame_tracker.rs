@@ -23,7 +23,7 @@ const UNFOLDINGS: usize = 3;
 
 /// Number of times that the mesh is projected onto the boundary in the first frame: it comes from a grid, not from a
 /// tracked frame.
-const FIRST_FRAME_PASSES: usize = 3;
+pub(super) const FIRST_FRAME_PASSES: usize = 3;
 
 /// A vertex is on a boundary of the image if intensity falls by at least this share of the edge threshold τ from one
 /// voxel inside to one voxel outside.

@@ -402,28 +402,36 @@ impl SurfaceTracker {
             let tracker =
                 tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
             let (edge, from) = (tracker.edge, self.samples.take());
-            if let Some(found) = self.follow(&last, tracker, from.as_ref(), frame) {
-                return Ok(self.set_frame(found));
-            }
+            let found = self.follow(&last, tracker, from.as_ref(), frame);
             (self.frame_tracker, self.samples) = (Some(FrameTracker::new(edge)), from);
+            if let Some(found) = found {
+                return match self.extracted_instead(&found, frame)? {
+                    Some(instead) => Ok(self.set_begun_frame(instead)),
+                    None => Ok(self.set_frame(found)),
+                };
+            }
         }
         // Nothing else begins where a caller's start ends.
         let may_begin = frame > 0 || !has_surface;
         match if may_begin { self.begin(&last, frame)? } else { None } {
-            Some(found) => {
-                if has_surface {
-                    self.lost.push(frame as u32);
-                }
-                let replaced = std::mem::take(&mut self.mesh);
-                let changes = self.set_frame(found);
-                self.mesh.advance_versions_past(&replaced);
-                Ok(changes)
-            }
+            Some(found) => Ok(self.set_begun_frame(found)),
             None => {
                 self.set_empty_frame();
                 Ok(Changes::default())
             }
         }
+    }
+
+    /// Adds the next frame with the surface that begins there, in place of the one before, if there is one; returns the edits
+    /// of the mesh.
+    fn set_begun_frame(&mut self, found: Tracked) -> Changes {
+        let replaced = std::mem::take(&mut self.mesh);
+        if replaced.vertex_count() > 0 {
+            self.lost.push(self.meshes.len() as u32);
+        }
+        let changes = self.set_frame(found);
+        self.mesh.advance_versions_past(&replaced);
+        changes
     }
 
     /// Adds the next frame with the surface tracked into it; returns the edits of the mesh.

@@ -9,7 +9,7 @@
 //! Where no vertices are on a boundary, the windows may have extended over frames so much brighter that the object's
 //! own step does not count. So the frame is tried again with windows of its own, before the surface ends.
 
-use super::frame_tracker::{FrameContext, FrameTracker, Support};
+use super::frame_tracker::{FIRST_FRAME_PASSES, FrameContext, FrameTracker, Support};
 use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::project::SpaceTimeSamples;
 use super::region::Region;
@@ -35,6 +35,10 @@ const UNCERTAIN: f64 = 0.5;
 /// counts as another object that was there before, not as one that begins. Objects that touch overlap by less, and those
 /// that move by half of their size by more.
 const KNOWN: f64 = 0.25;
+
+/// Increase of the share of unsupported vertices since the surface began from which it is compared with one extracted
+/// anew. Where windows reach, balls have none; the surface of a chest has half, and 0.07 more some frames later.
+const MORE_UNSUPPORTED: f64 = 0.1;
 
 /// The result of tracking a surface into a frame.
 pub(super) struct Tracked {
@@ -93,6 +97,43 @@ impl SurfaceTracker {
         .unwrap_or(None)
     }
 
+    /// Returns the surface extracted from a frame where one was tracked into it, if the image shows the boundary of that one
+    /// in part only, since it moved further than the windows reach, and that of the extracted one much better.
+    ///
+    /// # Errors
+    /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
+    pub(super) fn extracted_instead(
+        &self,
+        tracked: &Tracked,
+        frame: usize,
+    ) -> Result<Option<Tracked>, MethodError> {
+        let Some(began) = self.frame_of_begin(frame) else { return Ok(None) };
+        let passes = FIRST_FRAME_PASSES as f64;
+        let usual = unsupported(&self.statistics[began], passes);
+        let now = unsupported(&tracked.statistics, 1.0);
+        if now < usual + MORE_UNSUPPORTED {
+            return Ok(None);
+        }
+        let inside = inside_voxels(&self.region, &tracked.mesh.to_triangles());
+        let shared = |part: &TriangleMesh| inside_voxels(&self.region, part).intersection(&inside).count();
+        let parts = self.surfaces_in(frame)?.into_iter().map(|part| (shared(&part), part));
+        let Some((_, part)) = parts.filter(|(shared, _)| *shared > 0).max_by_key(|(shared, _)| *shared)
+        else {
+            return Ok(None);
+        };
+        let found = self.begun_at(&part, frame, &self.voting)?;
+        let is_better = found.is_present && unsupported(&found.statistics, passes) < 0.5 * now;
+        Ok(is_better.then_some(found))
+    }
+
+    /// Returns the frame before `frame` in which the surface began that was tracked up to `frame`; `None` if there is none.
+    fn frame_of_begin(&self, frame: usize) -> Option<usize> {
+        (0..frame)
+            .rev()
+            .take_while(|&t| !self.meshes[t].triangles.is_empty())
+            .find(|&t| t == 0 || self.lost.contains(&(t as u32)) || self.meshes[t - 1].triangles.is_empty())
+    }
+
     /// Finds an object that begins in a frame, and extracts and tracks its surface; `None` if no object begins there.
     /// `last` is the surface of the frame before, in the working space, which has ended; empty if there was none.
     ///
@@ -125,14 +166,24 @@ impl SurfaceTracker {
         else {
             return Ok(None);
         };
-        let mesh = self.remeshed(&part)?;
-        let tracker = match &self.frame_tracker {
-            Some(tracker) => FrameTracker::new(tracker.edge),
-            None => FrameTracker::new(measure(&mesh.to_triangles()).edge_mean),
-        };
-        let found = self.tracked(mesh, tracker, None, frame, voting);
+        let found = self.begun_at(&part, frame, voting)?;
         // In the first frame there is nothing to compare with, and what was extracted is given.
         Ok((found.is_present || frame == 0).then_some(found))
+    }
+
+    /// Tracks an extracted surface into its frame.
+    fn begun_at(
+        &self,
+        part: &TriangleMesh,
+        frame: usize,
+        voting: &BoundaryVoting,
+    ) -> Result<Tracked, MethodError> {
+        let mesh = self.remeshed(part)?;
+        let edge = match &self.frame_tracker {
+            Some(tracker) => tracker.edge,
+            None => measure(&mesh.to_triangles()).edge_mean,
+        };
+        Ok(self.tracked(mesh, FrameTracker::new(edge), None, frame, voting))
     }
 
     /// Calls `attempt` with the votes of a frame replaced by those of windows within it, and keeps these if it finds
@@ -186,6 +237,14 @@ impl SurfaceTracker {
         let overlap = inside.intersection(known).count();
         overlap as f64 >= KNOWN * (inside.count_ones(..).max(1)) as f64
     }
+}
+
+/// Returns the share of vertices whose projections failed, or that are on no boundary of the image; the former are counted
+/// in each of `passes`.
+fn unsupported(statistics: &FrameStatistics, passes: f64) -> f64 {
+    let count = (statistics.without_boundary as f64).max(statistics.rejected as f64 / passes);
+    // Closed meshes have about twice as many triangles as vertices.
+    2.0 * count / statistics.triangles.max(1) as f64
 }
 
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.

@@ -30,7 +30,7 @@ impl SurfaceTracker {
                 warnings.push(ends(frame));
             }
             if is_there && frame > 0 && (!before || is_lost) {
-                warnings.push(begins(frame));
+                warnings.push(if is_lost { begins_anew(frame) } else { begins(frame) });
             }
             if is_there {
                 // Steps at the surface of a small object are not those of its boundary.
@@ -117,6 +117,12 @@ fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<
 fn ends(frame: usize) -> Warning {
     let text = "the surface ends: the image has no boundary of the object here; it is gone, too small, or has moved too far";
     Warning::at(WarningCode::EndsInFrame, Place::Frame(frame as u32), text)
+}
+
+fn begins_anew(frame: usize) -> Warning {
+    let text = "a surface begins in place of the one before: the object has moved further than the windows reach, or it is \
+                another; vertices do not correspond to those in the frames before";
+    Warning::at(WarningCode::BeginsInFrame, Place::Frame(frame as u32), text)
 }
 
 fn begins(frame: usize) -> Warning {
