@@ -169,7 +169,7 @@ interface PlacedVolume {
 
 const volumesOf = (nv: Niivue): PlacedVolume[] => (nv as { volumes?: PlacedVolume[] }).volumes ?? [];
 
-/** Returns whether a volume is so much further from the origin than it is large as a mesh that gets an origin. */
+/** Returns whether a volume is as far from the origin, for its size, as a mesh that gets an origin of its own. */
 function isFar({ hdr }: PlacedVolume): boolean {
   if (!hdr?.affine) return false;
   const rows = [0, 1, 2].map((row) => Array.from({ length: 4 }, (_, k) => Number(hdr.affine[row]?.[k])));

@@ -36,9 +36,9 @@ const UNCERTAIN: f64 = 0.5;
 /// that move by half of their size by more.
 const KNOWN: f64 = 0.25;
 
-/// Increase of the share of unsupported vertices since the surface began from which it is compared with one extracted
-/// anew. Where windows reach, balls have none; the surface of a chest has half, and 0.07 more some frames later.
-const MORE_UNSUPPORTED: f64 = 0.1;
+/// Increase, since the surface began, of the share of vertices whose projections fail, from which it is compared with one
+/// extracted from the frame. Where windows reach, hardly any fail; of those of a chest, a third fail in all frames.
+const MORE_REJECTED: f64 = 0.1;
 
 /// The result of tracking a surface into a frame.
 pub(super) struct Tracked {
@@ -97,8 +97,8 @@ impl SurfaceTracker {
         .unwrap_or(None)
     }
 
-    /// Returns the surface extracted from a frame where one was tracked into it, if the image shows the boundary of that one
-    /// in part only, since it moved further than the windows reach, and that of the extracted one much better.
+    /// Returns the surface extracted from a frame where one was tracked into it, if many of the projections of that one fail,
+    /// since it moved further than the windows reach, and far fewer of those of the extracted one.
     ///
     /// # Errors
     /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
@@ -109,9 +109,9 @@ impl SurfaceTracker {
     ) -> Result<Option<Tracked>, MethodError> {
         let Some(began) = self.frame_of_begin(frame) else { return Ok(None) };
         let passes = FIRST_FRAME_PASSES as f64;
-        let usual = unsupported(&self.statistics[began], passes);
-        let now = unsupported(&tracked.statistics, 1.0);
-        if now < usual + MORE_UNSUPPORTED {
+        let usual = rejected_share(&self.statistics[began], passes);
+        let now = rejected_share(&tracked.statistics, 1.0);
+        if now < usual + MORE_REJECTED {
             return Ok(None);
         }
         let inside = inside_voxels(&self.region, &tracked.mesh.to_triangles());
@@ -122,7 +122,7 @@ impl SurfaceTracker {
             return Ok(None);
         };
         let found = self.begun_at(&part, frame, &self.voting)?;
-        let is_better = found.is_present && unsupported(&found.statistics, passes) < 0.5 * now;
+        let is_better = found.is_present && rejected_share(&found.statistics, passes) < 0.5 * now;
         Ok(is_better.then_some(found))
     }
 
@@ -239,12 +239,10 @@ impl SurfaceTracker {
     }
 }
 
-/// Returns the share of vertices whose projections failed, or that are on no boundary of the image; the former are counted
-/// in each of `passes`.
-fn unsupported(statistics: &FrameStatistics, passes: f64) -> f64 {
-    let count = (statistics.without_boundary as f64).max(statistics.rejected as f64 / passes);
+/// Returns the share of vertices whose projections failed, which are counted in each of `passes`.
+fn rejected_share(statistics: &FrameStatistics, passes: f64) -> f64 {
     // Closed meshes have about twice as many triangles as vertices.
-    2.0 * count / statistics.triangles.max(1) as f64
+    2.0 * statistics.rejected as f64 / (passes * statistics.triangles.max(1) as f64)
 }
 
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.
