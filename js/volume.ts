@@ -108,8 +108,9 @@ export class Volume {
   }
 
   /**
-   * Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767, or slope, intercept or time
-   * between frames would change when rounded to single precision, as NIfTI-1 stores them.
+   * Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767, or slope, intercept, time between
+   * frames or the position of the volume, by more than a thousandth of a voxel, would change when rounded to single
+   * precision, as NIfTI-1 stores them.
    */
   toNifti(): Uint8Array {
     return this.#handle.use((raw) => raw.toNifti());
