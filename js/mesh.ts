@@ -571,8 +571,8 @@ export class Mesh {
    * winding number, the number of times the surface encloses a point, is not 0, whether triangles face outwards or
    * inwards. The mesh must be closed, but may intersect itself.
    *
-   * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of
-   * two meshes that share a wall exactly one contains it.
+   * Exact, for points in single or double precision. A point on the surface counts as if it were moved by an
+   * infinitesimal amount along x, y and z, so that of two meshes that share a wall exactly one contains it.
    *
    * Entry points with one method lack it.
    *
