@@ -104,6 +104,15 @@ describe('a mesh', () => {
     const recentred = Mesh.parse(mesh.toBytes('stl', { recentre: true }));
     expect(Math.hypot(...recentred.info().centroid)).toBeLessThan(20);
     expect(recentred.info().volume).toBeCloseTo(mesh.info().volume, 3);
+    const point = `(point ${mesh.origin.join(' ')})`;
+    for (const format of ['stl', 'ply', 'obj', 'vtp', 'glb'] as const) {
+      const text = new TextDecoder().decode(mesh.toBytes(format, { recentre: true }));
+      expect(text).toContain(format === 'stl' ? `warnings: recentred ${point} ` : point);
+      if (format !== 'stl')
+        expect(text).toContain(`The surface was moved by ${mesh.origin.map((x) => -x).join(', ')}.`);
+      const plain = format === 'stl' ? far().toBytes('ply') : mesh.toBytes(format);
+      expect(new TextDecoder().decode(plain)).not.toContain('recentred');
+    }
     expect(new TextDecoder().decode(mesh.toBytes('vtp'))).toContain('type="Float64" Name="Points"');
   });
 
