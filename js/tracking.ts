@@ -63,7 +63,7 @@ export interface TrackingOptions {
   voxels?: { min: Vec3; max: Vec3 };
   /**
    * Connected component of the surface to track: the largest in the first frame (the default), or the one that encloses
-   * a point in world space, or has the vertex nearest to it.
+   * a point in world space, the outermost if there are several, or has the vertex nearest to it.
    */
   component?: 'largest' | Vec3;
   /**
@@ -117,7 +117,8 @@ const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
 const FRAME_SECONDS = 0.1;
 
 /**
- * Tracks a surface through the frames of a 4D image.
+ * Tracks a surface through the frames of a 4D image. Slices far apart should have others inserted between them before, by
+ * {@link Volume.enrichSlices}: the tracker does not do that.
  *
  * After "Dynamic surfaces from 4D cardiac MRI": local clustering in windows votes for the faces between bright and dark
  * voxels, the votes are weighted points in space-time, and the surface is projected onto the surface they define, frame
