@@ -169,7 +169,8 @@ export interface DeformableOptions {
   box?: { min: Vec3; max: Vec3; outside?: number };
   /**
    * Target edge length at the finest level, world units; default from the voxel size. If voxels are more than twice as
-   * long as wide, the shorter sides count.
+   * long as wide, the shorter sides count. At most 0.28 times the longest side of the volume, or twice the default if
+   * that is more, and shorter than the object.
    */
   edge?: number;
   /** Initial parameters: any subset; the others have their defaults. */

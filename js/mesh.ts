@@ -20,7 +20,7 @@ import { checkTexture, rawTexture, textureOf } from './texture.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
-import { checkedWarnings, mergedWarnings, notesOf } from './warnings.js';
+import { checkedWarnings, mergedWarnings, notesOf, recentred } from './warnings.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -571,8 +571,8 @@ export class Mesh {
    * winding number, the number of times the surface encloses a point, is not 0, whether triangles face outwards or
    * inwards. The mesh must be closed, but may intersect itself.
    *
-   * Exact. A point on the surface counts as if it were moved by an infinitesimal amount along x, y and z, so that of
-   * two meshes that share a wall exactly one contains it.
+   * Exact, for points in single or double precision. A point on the surface counts as if it were moved by an
+   * infinitesimal amount along x, y and z, so that of two meshes that share a wall exactly one contains it.
    *
    * Entry points with one method lack it.
    *
@@ -695,9 +695,9 @@ export class Mesh {
    * Where the mesh has an {@link Mesh.origin} of its own, ply and vtp have positions in double precision, and a glb a
    * node at the origin. stl and mz3 have single precision only.
    *
-   * Its {@link Mesh.warnings} are written as comments, which readers ignore: lines of the header of ply, of obj and of
-   * vtp, `extras.warnings` of a glb's `asset`, and their codes, as far as there is room, in the header of stl. Without
-   * any, the bytes are the same as ever.
+   * Its {@link Mesh.warnings}, and `recentred` if it is moved, are written as comments, which readers ignore: lines of
+   * the header of ply, of obj and of vtp, `extras.warnings` of a glb's `asset`, and their codes, as far as there is room,
+   * in the header of stl. mz3 has no room for them. Without any, the bytes are the same as ever.
    *
    * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
    *   `warnings`: further ones to write.
@@ -708,7 +708,8 @@ export class Mesh {
     choice('format', format, FORMATS);
     const { recentre = false, warnings } = checkProperties('options', options, ['recentre', 'warnings']);
     boolean('recentre', recentre);
-    const notes = notesOf(mergedWarnings(this.#warnings(), checkedWarnings('warnings', warnings)));
+    const moved = recentre ? recentred(this.origin) : [];
+    const notes = notesOf(mergedWarnings(moved, this.#warnings(), checkedWarnings('warnings', warnings)));
     return this.#handle.use((raw) => raw.toBytes(format, recentre, notes));
   }
 

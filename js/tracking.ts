@@ -22,7 +22,8 @@ export interface TrackingParams {
   windowFrames?: number;
   /**
    * Radius around a position beyond which boundary points have no weight θ in the plane fitted there, world units: 2h;
-   * by default, or if 0, derived from the voxel size.
+   * by default, or if 0, derived from the voxel size: 2.4 times the shortest side, or 1.2 times the longest if that is
+   * more. From 1 to 15 times the shortest side.
    */
   radius?: number;
   /** Time scale c: the distance that one frame counts as, world units; by default, or if 0, derived from the radius. */
@@ -62,7 +63,7 @@ export interface TrackingOptions {
   voxels?: { min: Vec3; max: Vec3 };
   /**
    * Connected component of the surface to track: the largest in the first frame (the default), or the one that encloses
-   * a point in world space, or has the vertex nearest to it.
+   * a point in world space, the outermost if there are several, or has the vertex nearest to it.
    */
   component?: 'largest' | Vec3;
   /**
@@ -116,7 +117,8 @@ const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
 const FRAME_SECONDS = 0.1;
 
 /**
- * Tracks a surface through the frames of a 4D image.
+ * Tracks a surface through the frames of a 4D image. Slices far apart should have others inserted between them before, by
+ * {@link Volume.enrichSlices}: the tracker does not do that.
  *
  * After "Dynamic surfaces from 4D cardiac MRI": local clustering in windows votes for the faces between bright and dark
  * voxels, the votes are weighted points in space-time, and the surface is projected onto the surface they define, frame
@@ -143,8 +145,9 @@ export class SurfaceTracker implements Stepper {
    *
    * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, without
    *   contrast or with slanted axes, one or a box with fewer than 5 voxels along two axes, or along the third fewer than
-   *   2 or less than three times the shortest side of a voxel, such as a single slice, a box outside of it, a start that is empty, inside out, outside
-   *   the box or with a mean edge below a tenth of a voxel; `not-closed`, `self-intersecting` for a start that is;
+   *   2 or less than three times the shortest side of a voxel, such as a single slice, slices more than 12.5 pixels apart
+   *   without a given `radius`, a box outside of it, a start that is empty, inside out, outside the box or with a mean edge
+   *   below a tenth of a voxel; `not-closed`, `self-intersecting` for a start that is;
    *   `too-large`.
    */
   constructor(given: TrackingOptions) {

@@ -108,8 +108,9 @@ export class Volume {
   }
 
   /**
-   * Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767, or slope, intercept or time
-   * between frames would change when rounded to single precision, as NIfTI-1 stores them.
+   * Encodes the volume as a NIfTI-1 file, or as NIfTI-2 if a dimension exceeds 32,767, or slope, intercept, time between
+   * frames or the position of the volume, by more than a thousandth of a voxel, would change when rounded to single
+   * precision, as NIfTI-1 stores them.
    */
   toNifti(): Uint8Array {
     return this.#handle.use((raw) => raw.toNifti());
@@ -206,7 +207,7 @@ export class Volume {
 
   /**
    * Returns the intensities of the slice at `index` along `axis`, row-major: for axis 0 (sagittal) rows of y, for 1 and
-   * 2 rows of x.
+   * 2 rows of x. In single precision, see {@link Volume.intensities}.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such axis, slice or frame.
    */
@@ -218,7 +219,9 @@ export class Volume {
   }
 
   /**
-   * Returns all intensities of one frame, x fastest, for upload as a 3D texture.
+   * Returns all intensities of one frame, x fastest, for upload as a 3D texture. In single precision, with 24 bits:
+   * integers are exact up to 16,777,216, and intensities near 4·10⁹ are multiples of 256, so that smaller differences are
+   * lost. Methods do not use these, and keep them.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */

@@ -1,5 +1,6 @@
 // Checks, merges and writes warnings.
 import { checkProperties, denseCopy, integer, invalid, number, vec3 } from './check.js';
+import type { Vec3 } from './data.js';
 import type { StepReport } from './stepper.js';
 import type { Warning, WarningCode } from './warning.js';
 
@@ -60,6 +61,14 @@ export function mergedWarnings(...lists: readonly (readonly Warning[])[]): Warni
     if (!found.has(key)) found.set(key, warning);
   }
   return [...found.values()];
+}
+
+/** Returns the warning about a surface in a file that was moved by -`origin`; none if that is 0. */
+export function recentred(origin: Vec3): Warning[] {
+  if (origin.every((coordinate) => coordinate === 0)) return [];
+  const [x, y, z] = origin;
+  const text = `The surface was moved by ${-x}, ${-y}, ${-z}. Add the point to all positions to move it back.`;
+  return [{ code: 'recentred', text, where: { point: [x, y, z] } }];
 }
 
 /** Returns warnings as notes in files, lines `code: text` with the place in parentheses. */

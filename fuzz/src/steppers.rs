@@ -438,7 +438,7 @@ fn ring(bytes: &mut Choices) -> TriangleMesh {
 /// Returns a fixed deformable model of few vertices, for the target of its saved states.
 pub fn small_deformable() -> DeformableModel {
     let volume = volume(&mut Choices::new(&[0; 24]), [6, 6, 6, 1]);
-    let options = DeformableOptions { edge: Some(3.0), levels: 1, ..DeformableOptions::default() };
+    let options = DeformableOptions { edge: Some(1.5), levels: 1, ..DeformableOptions::default() };
     DeformableModel::new(&volume, options).unwrap()
 }
 

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::relative;
+use super::convert::world_points;
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
 use super::volume::RawVolume;
@@ -31,7 +31,8 @@ impl RawMesh {
     /// Returns 1 for each point inside the mesh, and 0 for each outside; the points are x, y and z in turn.
     pub fn contains(&self, at: &JsValue) -> Result<Vec<u8>, JsValue> {
         let mesh = self.triangles();
-        let inside = contains(&mesh, &relative(at, mesh.origin)?).map_err(Failure::from)?;
+        let points = world_points(at)?.into_iter().map(|p| p - mesh.origin);
+        let inside = contains(&mesh, points).map_err(Failure::from)?;
         Ok(inside.into_iter().map(u8::from).collect())
     }
 

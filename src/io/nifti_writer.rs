@@ -3,6 +3,7 @@
 use super::FormatError;
 use super::nifti::{FORMAT, SIZE_1, SIZE_2};
 use super::raw::{append_voxels, number_size};
+use crate::math::DVec3;
 use crate::volume::{LengthUnit, Space, Volume, Voxels};
 
 /// Size of a NIfTI-1 header in bytes with the extension flag after it, where the voxels start.
@@ -12,14 +13,18 @@ const OFFSET_2: usize = SIZE_2 + 4;
 /// Largest error of an intensity, as a fraction of the step between the intensities of integer voxels, by which a file is
 /// written as NIfTI-1: invisible where intensities are measured, and far below the difference of two labels.
 const STEP_TOLERANCE: f64 = 0.01;
+/// Largest displacement of a corner of the volume, as a fraction of the shortest side of a voxel, by which a file is
+/// written as NIfTI-1: less than measurements resolve, and more than rounding does to a scan near the origin.
+const SHIFT_TOLERANCE: f64 = 1e-3;
 
 /// Returns the volume as an uncompressed little-endian NIfTI file: voxels as stored, world space converted to RAS, and
 /// the affine as sform.
 ///
 /// The file is NIfTI-1, which stores the affine, slope, intercept and time between frames in `f32`. It is NIfTI-2, which
 /// stores them in `f64`, if a dimension or the number of frames exceeds 32,767, if the time between frames is beyond the
-/// range of `f32`, or if rounding slope and intercept to `f32` would change intensities: those of integers by more than a
-/// hundredth of a step, those of floats at all.
+/// range of `f32`, if rounding the affine to `f32` would move a corner of the volume by more than a thousandth of the
+/// shortest side of a voxel, or if rounding slope and intercept would change intensities: those of integers by more than
+/// a hundredth of a step, those of floats at all.
 ///
 /// # Errors
 /// [`FormatError::TooLarge`] if there is not enough memory for the file.
@@ -42,6 +47,7 @@ fn fits_version_1(volume: &Volume) -> bool {
     volume.dims().into_iter().all(fits)
         && fits(volume.frames())
         && is_normal_f32(volume.frame_seconds())
+        && affine_fits_f32(volume)
         && scaling_fits_f32(volume)
 }
 
@@ -49,6 +55,20 @@ fn fits_version_1(volume: &Volume) -> bool {
 /// the range of `f32`.
 fn is_normal_f32(value: f64) -> bool {
     value == 0.0 || (value as f32).is_normal()
+}
+
+/// Returns whether the corners of the volume stay where they are, within the tolerance, if the affine is rounded to
+/// `f32`.
+fn affine_fits_f32(volume: &Volume) -> bool {
+    let errors = rows_in_ras(volume).map(|v| f64::from(v as f32) - v);
+    let [x, y, z] = volume.spacing();
+    let limit = SHIFT_TOLERANCE * x.min(y).min(z);
+    (0..8).all(|k| {
+        let at = |axis: usize| if k >> axis & 1 == 0 { -0.5 } else { volume.dims()[axis] as f64 - 0.5 };
+        let shift =
+            |row: usize| (0..3).map(|i| errors[4 * row + i] * at(i)).sum::<f64>() + errors[4 * row + 3];
+        DVec3::new(shift(0), shift(1), shift(2)).length() <= limit
+    })
 }
 
 /// Returns whether the intensities stay the same, within the tolerance, if slope and intercept are rounded to `f32`.
@@ -210,6 +230,47 @@ mod tests {
             let again = parse_volume(&file, None).unwrap();
             let near = |a: f64, b: f64| (a - b).abs() <= 1e-7 * b.abs();
             assert!(near(again.slope(), slope) && near(again.intercept(), intercept), "{slope}, {intercept}");
+        }
+    }
+
+    /// Bytes of 8³ voxels with sides of `spacing`, the first of them at `origin`.
+    fn placed(origin: DVec3, spacing: DVec3) -> Volume {
+        let affine =
+            DAffine3::from_scale_rotation_translation(spacing, glam::DQuat::from_rotation_z(0.3), origin);
+        Volume::new(VolumeInit {
+            voxels: Voxels::U8((0..=255).cycle().take(512).collect()),
+            dims: [8, 8, 8, 1],
+            affine,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: Space::Lps,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn an_affine_that_f32_does_not_hold_is_written_as_nifti_2() {
+        let utm = DVec3::new(512_345.678, 5_401_234.567, 123.456);
+        for (origin, spacing, expected) in [
+            (utm, DVec3::splat(0.01), 2),
+            (utm, DVec3::ONE, 2),
+            (DVec3::new(1e7 + 0.25, 0.0, 0.0), DVec3::splat(0.1), 2),
+            (DVec3::splat(-100.3), DVec3::new(1e-3, 1.0, 1.0), 2),
+            (DVec3::splat(5.1), DVec3::splat(1e-11), 2),
+            (DVec3::ZERO, DVec3::splat(1e-11), 1),
+            (DVec3::splat(1e-40), DVec3::splat(0.7), 1),
+            (DVec3::splat(-250.3), DVec3::new(0.35, 0.35, 1.1), 1),
+            (DVec3::splat(5e6), DVec3::splat(1e3 / 3.0), 1),
+        ] {
+            let volume = placed(origin, spacing);
+            let file = write_nifti(&volume).unwrap();
+            assert_eq!(version(&file), expected, "{origin}, {spacing}");
+            let (again, affine) = (parse_volume(&file, None).unwrap(), volume.affine_in(Space::Ras));
+            let apart = |p: DVec3| (again.affine().transform_point3(p) - affine.transform_point3(p)).length();
+            let moved = apart(DVec3::ZERO).max(apart(DVec3::splat(7.0)));
+            assert!(moved <= SHIFT_TOLERANCE * spacing.min_element(), "{origin}, {spacing}: {moved}");
+            assert!(expected == 1 || again.affine() == affine, "{origin}, {spacing}");
         }
     }
 

@@ -28,21 +28,26 @@ pub(super) fn comments(notes: &str, start: &str, end: &str) -> String {
     out
 }
 
-/// Returns the codes of the notes for a header of `length` bytes, as many as fit; empty without notes.
+/// Returns the codes of the notes for a header of `length` bytes, as many as fit, that of a surface that was moved with
+/// its numbers in parentheses; empty without notes.
 pub(super) fn short(notes: &str, length: usize) -> String {
     let mut out = String::new();
-    let mut code = String::from(", warnings: ");
+    let mut part = String::from(", warnings: ");
     let mut is_code = true;
     for c in notes.chars() {
-        if c == ':' && is_code && out.len() + code.len() <= length {
-            out.push_str(&code);
+        if c == ':' && is_code && out.len() + part.len() <= length {
+            out.push_str(&part);
         }
         is_code = c == '\n' || is_code && c != ':';
-        if c == '\n' {
-            code.clear();
+        if c == '\n' || c == '(' {
+            part.clear();
         }
-        if is_code {
-            code.push(ascii(c));
+        if c == '(' {
+            part.push(' ');
+        }
+        part.push(ascii(c));
+        if c == ')' && out.ends_with("recentred") && out.len() + part.len() <= length {
+            out.push_str(&part);
         }
     }
     out
@@ -133,6 +138,15 @@ mod tests {
         let header = "binary STL, warnings: anisotropic ends-in-frame anisotropic ends-in-frame ";
         assert!(stl.starts_with(header.as_bytes()), "{:?}", String::from_utf8_lossy(&stl[..80]));
         assert_eq!(stl[header.len()..80], b"      "[..80 - header.len()]);
+    }
+
+    #[test]
+    fn the_header_of_an_stl_says_by_what_a_surface_was_moved() {
+        let point = "(point 512345.625 5401234.5 123.5)";
+        let notes = format!("recentred: Moved towards the origin. {point}\n{NOTES} (frame 3)");
+        let stl = write_noted_mesh(&ball(), MeshFormat::Stl, &notes).unwrap();
+        let header = format!("binary STL, warnings: recentred {point} anisotropic ");
+        assert!(stl.starts_with(header.as_bytes()), "{:?}", String::from_utf8_lossy(&stl[..80]));
     }
 
     #[test]

@@ -24,8 +24,8 @@ pub fn outer_components(mesh: &TriangleMesh) -> Result<Vec<u32>, MeshError> {
         if candidates.is_empty() {
             continue;
         }
-        let points: Vec<_> = candidates.iter().map(|&i| components[i].positions[0]).collect();
-        for (i, is_inside) in candidates.into_iter().zip(contains(outer, &points)?) {
+        let points: Vec<_> = candidates.iter().map(|&i| components[i].positions[0].as_dvec3()).collect();
+        for (i, is_inside) in candidates.into_iter().zip(contains(outer, points)?) {
             is_enclosed[i] |= is_inside;
         }
     }

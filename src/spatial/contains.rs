@@ -2,11 +2,11 @@
 
 use super::TriangleTree;
 use crate::math::crossing::{crossing, is_beyond};
-use crate::math::{Bounds, DVec2, Vec3};
+use crate::math::{Bounds, DVec2, DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Returns for each point whether it is inside a closed mesh: whether its winding number, the number of times the
-/// surface encloses it, is not 0. False for points that are not finite.
+/// Returns for each point, relative to the origin of the mesh, whether it is inside a closed mesh: whether its winding
+/// number, the number of times the surface encloses it, is not 0. False for points that are not finite.
 ///
 /// Exact. A point on the surface counts as moved by an infinitesimal amount along x, y and z; see
 /// [`crossing`](crate::math::crossing). A mesh is closed if its edges have equally many triangles in both directions;
@@ -14,21 +14,28 @@ use crate::mesh::{MeshError, TriangleMesh};
 ///
 /// # Errors
 /// As [`TriangleMesh::check_closed`].
-pub fn contains(mesh: &TriangleMesh, points: &[Vec3]) -> Result<Vec<bool>, MeshError> {
+pub fn contains(
+    mesh: &TriangleMesh,
+    points: impl IntoIterator<Item = DVec3>,
+) -> Result<Vec<bool>, MeshError> {
     mesh.check_closed()?;
     let tree = TriangleTree::new(mesh)?;
-    Ok(points.iter().map(|&p| p.is_finite() && winding_number(mesh, &tree, p) != 0).collect())
+    // Beyond the range of single precision there is no mesh.
+    let is_inside = |p: DVec3| p.as_vec3().is_finite() && winding_number(mesh, &tree, p) != 0;
+    Ok(points.into_iter().map(is_inside).collect())
 }
 
 /// Returns the winding number of a point, from the triangles between it and infinity at low x.
-fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: Vec3) -> i32 {
-    let line = Bounds { min: Vec3::new(f32::NEG_INFINITY, p.y, p.z), max: p };
-    let at = DVec2::new(p.y.into(), p.z.into());
+fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: DVec3) -> i32 {
+    // Rounding is monotonic, so a line that meets a box of single precision still does when it is rounded.
+    let end = p.as_vec3();
+    let line = Bounds { min: Vec3::new(f32::NEG_INFINITY, end.y, end.z), max: end };
+    let at = DVec2::new(p.y, p.z);
     let mut winding = 0;
     tree.for_each_overlapping(&line, |t| {
         let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize].as_dvec3());
         let crossing = crossing(corners, at);
-        if crossing != 0 && is_beyond(corners, crossing, p.as_dvec3()) {
+        if crossing != 0 && is_beyond(corners, crossing, p) {
             winding += crossing;
         }
     });
@@ -44,6 +51,25 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
+    fn doubles(points: &[Vec3]) -> impl Iterator<Item = DVec3> {
+        points.iter().map(|p| p.as_dvec3())
+    }
+
+    #[test]
+    fn points_are_not_rounded() {
+        for size in [1.0, 1e6, 1e7, 1e20] {
+            let mut mesh = cuboid(Vec3::splat(size));
+            mesh.origin = DVec3::splat(1e9);
+            for axis in DVec3::AXES {
+                let middle = DVec3::new(1.0 / 3.0, 0.2, 0.7) * (DVec3::ONE - axis);
+                let at = [-1e-12, 1e-12, 1.0 - 1e-12, 1.0 + 1e-12];
+                let points = at.map(|x| (middle + x * axis) * f64::from(size));
+                let found = contains(&mesh, points).unwrap();
+                assert_eq!(found, [false, true, true, false], "size {size}, {axis}");
+            }
+        }
+    }
+
     #[test]
     fn points_are_inside_if_their_winding_number_is_not_0() {
         let mut inside = 0;
@@ -54,7 +80,7 @@ mod tests {
             let mut mesh = joined(&[ball, torus(3.0, 1.0, 12, 7)]);
             mesh.positions.iter_mut().for_each(|p| *p += vector(0.1 * seed as f32));
             let points: Vec<Vec3> = (0..200).map(|_| vector(9.0)).collect();
-            for (p, found) in points.iter().zip(contains(&mesh, &points).unwrap()) {
+            for (p, found) in points.iter().zip(contains(&mesh, doubles(&points)).unwrap()) {
                 let angle: f64 = mesh.corners().map(|corners| triangle::solid_angle(corners, *p)).sum();
                 assert_eq!(found, angle.abs() > std::f64::consts::TAU, "seed {seed}, {p}");
                 inside += usize::from(found);
@@ -72,7 +98,7 @@ mod tests {
         for at in points.iter().filter(|p| p.max_element() < 3.0) {
             let mut mesh = cube.clone();
             mesh.positions.iter_mut().for_each(|p| *p += *at);
-            contains(&mesh, &points)
+            contains(&mesh, doubles(&points))
                 .unwrap()
                 .iter()
                 .zip(&mut found)
@@ -87,9 +113,9 @@ mod tests {
     fn what_has_no_inside() {
         let mut open = cuboid(Vec3::ONE);
         open.triangles.pop();
-        assert!(matches!(contains(&open, &[]), Err(MeshError::NotClosed { .. })));
-        assert_eq!(contains(&TriangleMesh::default(), &[Vec3::ZERO]), Ok(vec![false]));
-        let points = [Vec3::NAN, Vec3::INFINITY, Vec3::splat(0.5)];
-        assert_eq!(contains(&cuboid(Vec3::ONE), &points), Ok(vec![false, false, true]));
+        assert!(matches!(contains(&open, []), Err(MeshError::NotClosed { .. })));
+        assert_eq!(contains(&TriangleMesh::default(), [DVec3::ZERO]), Ok(vec![false]));
+        let points = [DVec3::NAN, DVec3::INFINITY, DVec3::splat(0.5), DVec3::new(1e300, 0.5, 0.5)];
+        assert_eq!(contains(&cuboid(Vec3::ONE), points), Ok(vec![false, false, true, false]));
     }
 }

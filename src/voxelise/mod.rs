@@ -204,12 +204,11 @@ mod tests {
             [16, 15, 14],
             DAffine3 { matrix3: DMat3::from_diagonal(DVec3::splat(0.5)), translation: DVec3::splat(-3.5) },
         );
-        let points: Vec<Vec3> = centres(&like).into_iter().map(|p| p.as_vec3()).collect();
         let mut cubes = cuboid(Vec3::new(2.0, 3.0, 1.5));
         cubes.append(&cuboid(Vec3::splat(-2.5)));
         for mesh in [cubes, random_mesh(1), random_mesh(2), random_mesh(5), random_mesh(8)] {
             let mask = voxelise(&mesh, &like, VoxelKind::Mask { value: 1 }).unwrap().intensities(0).unwrap();
-            let found = contains(&mesh, &points).unwrap();
+            let found = contains(&mesh, centres(&like)).unwrap();
             assert!(mask.iter().zip(&found).all(|(a, b)| (*a == 1.0) == *b));
             assert!(found.iter().filter(|inside| **inside).count() > 100);
         }
@@ -237,8 +236,7 @@ mod tests {
         for seed in seeds(9) {
             let (mesh, like) = (random_mesh(seed), grid([9, 8, 7], oblique(&mut Random::new(seed))));
             let found = voxelise(&mesh, &like, VoxelKind::Distance).unwrap().intensities(0).unwrap();
-            let points: Vec<Vec3> = centres(&like).into_iter().map(|p| p.as_vec3()).collect();
-            let inside = contains(&mesh, &points).unwrap();
+            let inside = contains(&mesh, centres(&like)).unwrap();
             for ((p, inside), found) in centres(&like).into_iter().zip(inside).zip(found) {
                 let all = mesh.corners().map(|corners| triangle::distance_squared(corners, p));
                 let distance = all.fold(f64::INFINITY, f64::min).sqrt();

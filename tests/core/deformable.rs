@@ -414,12 +414,38 @@ fn errors_name_the_option_and_what_is_accepted() {
     assert!(matches!(error, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
 }
 
+/// Regression: the error was that of too many vertices, with the advice to use longer edges, or the surface had half of
+/// its volume without a word.
+#[test]
+fn edges_too_long_for_the_image_or_the_object_are_refused() {
+    for (n, edge) in [(24, 6.0), (24, 7.0), (24, 10.0), (24, 30.0), (48, 10.0), (48, 12.0), (48, 20.0)] {
+        let radius = n as f32 / 3.0;
+        let volume = ball([n, n, n], radius);
+        let options = DeformableOptions { edge: Some(edge), ..Default::default() };
+        let result = DeformableModel::new(&volume, options).and_then(|mut model| {
+            while !model.step()?.done {}
+            Ok(measure(&model.surface()).volume / (4.189 * f64::from(radius * radius * radius)))
+        });
+        match result {
+            Ok(part) => assert!(edge < 0.28 * n as f64 && part > 0.75, "{n}, {edge}: {part}"),
+            Err(MethodError::InvalidArgument { parameter, problem }) => {
+                assert!(parameter == "edge" && edge > 0.24 * n as f64, "{n}, {edge}: {problem}");
+                let expected =
+                    if edge > 0.28 * n as f64 { "must be from 0.340 to" } else { "must be < 12.000" };
+                assert!(problem.starts_with(expected), "{problem}");
+            }
+            Err(error) => panic!("{n}, {edge}: {error}"),
+        }
+    }
+}
+
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn flat_and_tiny_volumes_have_an_enclosing_start() {
     for dims in [[64, 64, 6], [5, 5, 5], [2, 2, 2], [1, 1, 1], [100, 3, 3], [90, 40, 1], [3, 30, 70]] {
         let volume = scenes::volume(dims, |p| p.x);
-        for edge in [0.5, 0.8, 1.1, 1.5, 2.2, 3.0, 5.0] {
+        let longest = 0.279 * (1 + dims.into_iter().max().unwrap_or(0)) as f64;
+        for edge in [0.5, 0.8, 1.1, 1.5, 2.2, 3.0, 5.0].into_iter().filter(|&edge| edge < longest.max(3.06)) {
             let options =
                 DeformableOptions { start: Start::Enclosing, edge: Some(edge), ..Default::default() };
             let model = DeformableModel::new(&volume, options).unwrap();
@@ -607,7 +633,7 @@ fn a_state_with_another_edge_length_continues() {
         |edge| DeformableOptions { start: Start::Enclosing, edge: Some(edge), ..Default::default() };
     let mut fine = DeformableModel::new(&volume, options(0.8)).unwrap();
     fine.step().unwrap();
-    let mut coarse = DeformableModel::new(&volume, options(10.0)).unwrap();
+    let mut coarse = DeformableModel::new(&volume, options(9.0)).unwrap();
     coarse.restore(&fine.save()).unwrap();
     assert!(fine.step().unwrap() == coarse.step().unwrap() && fine.save() == coarse.save());
 }

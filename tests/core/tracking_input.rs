@@ -100,6 +100,23 @@ fn size(ball: Ball) -> f64 {
     4.0 / 3.0 * PI * ball.radius * ball.radius * ball.radius
 }
 
+/// Regression: in slices more than 12.5 pixels apart the error was about a radius that nobody had given.
+#[test]
+fn slices_too_far_apart_are_refused_with_the_advice_to_insert_some() {
+    for (apart, is_fine) in [(12.0, true), (13.0, false), (18.0, false)] {
+        let affine = DAffine3::from_scale(DVec3::new(1.0, 1.0, apart));
+        let ball = Ball { center: DVec3::new(9.5, 9.5, 3.5), radius: 3.0 };
+        let volume = sequence([SIDE, SIDE, 8], 2, affine, |_, p| 200.0 * brightness(&[ball], p));
+        match SurfaceTracker::new(options(volume)).err() {
+            None => assert!(is_fine, "{apart}"),
+            Some(MethodError::InvalidArgument { parameter, problem }) => {
+                assert!(!is_fine && parameter == "volume" && problem.contains("enrichSlices"), "{problem}");
+            }
+            Some(error) => panic!("{apart}: {error}"),
+        }
+    }
+}
+
 #[test]
 fn the_volume_of_a_small_ball_is_within_one_percent() {
     for radius in [6.0, 8.0, 11.0] {

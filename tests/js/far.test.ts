@@ -104,6 +104,15 @@ describe('a mesh', () => {
     const recentred = Mesh.parse(mesh.toBytes('stl', { recentre: true }));
     expect(Math.hypot(...recentred.info().centroid)).toBeLessThan(20);
     expect(recentred.info().volume).toBeCloseTo(mesh.info().volume, 3);
+    const point = `(point ${mesh.origin.join(' ')})`;
+    for (const format of ['stl', 'ply', 'obj', 'vtp', 'glb'] as const) {
+      const text = new TextDecoder().decode(mesh.toBytes(format, { recentre: true }));
+      expect(text).toContain(format === 'stl' ? `warnings: recentred ${point} ` : point);
+      if (format !== 'stl')
+        expect(text).toContain(`The surface was moved by ${mesh.origin.map((x) => -x).join(', ')}.`);
+      const plain = format === 'stl' ? far().toBytes('ply') : mesh.toBytes(format);
+      expect(new TextDecoder().decode(plain)).not.toContain('recentred');
+    }
     expect(new TextDecoder().decode(mesh.toBytes('vtp'))).toContain('type="Float64" Name="Points"');
   });
 
@@ -114,6 +123,36 @@ describe('a mesh', () => {
     const node = new TextDecoder().decode(animationGlb([near, far(4)])).match(/"translation":\[[^\]]*\]/g);
     expect(node).toHaveLength(2);
   });
+});
+
+describe('a volume', () => {
+  test('keeps its place in NIfTI to double precision, in a file of version 2 if that is needed', () => {
+    for (const [origin, side, version] of [
+      [[512345.678, 5401234.567, 123.456], 0.01, 540],
+      [[1e7 + 0.25, 0, 0], 0.1, 540],
+      [[100.3, -80.2, 40], 1, 348],
+    ] as [Vec3, number, number][]) {
+      const volume = new Volume({ data: new Uint8Array(512), dims: [8, 8, 8], origin, spacing: [side, side, side] });
+      const bytes = volume.toNifti();
+      expect(new DataView(bytes.buffer).getInt32(0, true)).toBe(version);
+      const { affine } = Volume.parse(bytes);
+      const limit = version === 540 ? 0 : side / 1000;
+      expect(affine.every((x, k) => Math.abs(x - (volume.affine[k] ?? 0)) <= limit)).toBe(true);
+    }
+  });
+});
+
+test('points in double precision are not rounded to find whether they are inside', () => {
+  const faces = [
+    0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5,
+  ];
+  for (const size of [1, 1e6, 1e7]) {
+    const corners = Array.from({ length: 24 }, (_, i) => (((i / 3) >> (i % 3)) & 1) * size);
+    const cube = Mesh.fromArrays(new Float64Array(corners), new Uint32Array(faces));
+    const above = [-0.25, -0.02, 0.02, 0.25].map((d) => (d * size) / 1e7);
+    const points = above.flatMap((d) => [size / 3, size / 5, size + d]);
+    expect([...cube.contains(new Float64Array(points))], `${size}`).toEqual([1, 1, 0, 0]);
+  }
 });
 
 describe('points', () => {

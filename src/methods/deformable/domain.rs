@@ -30,19 +30,33 @@ pub(super) struct Domain {
     pub(super) bounds: Bounds,
 }
 
+/// The least half axis of a rounded box, in δ, the lower edge bound: a smaller one is not round with these edges.
+const LEAST_AXIS: f32 = 4.0;
+
 /// Returns the half axes of a rounded box that encloses an image or object: those in `around`, lengthened where they
 /// are too short for a mesh with the lower edge bound `delta`, or below the longest divided by [`MAX_ELONGATION`].
 pub(super) fn rounded_axes(around: Vec3, delta: f32) -> Vec3 {
-    let least = (4.0 * delta).max(around.max_element() / MAX_ELONGATION);
+    let least = (LEAST_AXIS * delta).max(around.max_element() / MAX_ELONGATION);
     around.max(Vec3::splat(least))
 }
 
+/// Returns the half axes of the rounded box around an image of `dims` voxels and their border.
+fn axes_around(dims: [usize; 3]) -> Vec3 {
+    Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)))
+}
+
 impl Domain {
+    /// Returns the largest δ, the lower edge bound, in voxels, for objects in an image of `dims` voxels: with longer
+    /// edges the surface of a ball that fills a third of the image along each axis had half of its volume or less.
+    pub(super) fn longest_delta(dims: [usize; 3]) -> f64 {
+        f64::from(axes_around(dims).max_element() / LEAST_AXIS)
+    }
+
     /// Makes the domain of an image of `dims` voxels, for a surface that starts with δ, the lower edge bound, equal to
     /// `delta` voxels.
     pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
         let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
-        let axes = rounded_axes(Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))), delta);
+        let axes = rounded_axes(axes_around(dims), delta);
         Self {
             centre,
             axes,

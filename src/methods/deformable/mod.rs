@@ -111,7 +111,7 @@ pub struct DeformableOptions {
     /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
     /// default 1.53 times the side of a cube with the volume of a voxel, or 0.85 times in images of less than four voxels
     /// along an axis. Voxels more than twice as long as wide are divided into nearly cubic parts, whose volume counts
-    /// instead.
+    /// instead. At most 0.28 times the longest side of the image, or twice the default if that is more.
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -150,7 +150,8 @@ const FEW_SLICES: usize = 4;
 const DELTA_OF_THIN: f64 = 0.5;
 
 /// The accepted range of δ, the lower edge bound, on the finest level in voxels: with less, a mesh of the whole image
-/// does not fit into memory; with more, the mesh misses the object.
+/// does not fit into memory; with more, the mesh misses the object, as it does in small images with more than
+/// [`Domain::longest_delta`].
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
 /// The largest absolute strength of an attractor; beyond it, forces overflow.
@@ -364,8 +365,9 @@ impl DeformableModel {
     ///
     /// # Errors
     /// [`MethodError::NeedsData`] if bricks of a sparse volume are missing; nothing has changed then, so that the results
-    /// do not depend on when bricks arrive. [`MethodError::TooManyVertices`] if the surface grows without bound. It remains valid, but some edges are too
-    /// long; other parameters may reduce it again. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
+    /// do not depend on when bricks arrive. [`MethodError::TooManyVertices`] if the surface grows without bound. It remains
+    /// valid, but some edges are too long; other parameters may reduce it again. [`MethodError::InvalidArgument`] if the
+    /// option `edge` is too long for the object. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None) }
@@ -703,12 +705,13 @@ fn finest_delta(edge: Option<f64>, voxel: f64, dims: [usize; 3]) -> Result<f64, 
         return Ok(if is_thin { DELTA_OF_THIN } else { DEFAULT_DELTA });
     };
     let delta = edge / voxel / MEAN_EDGE;
-    if DELTA_RANGE.contains(&delta) {
+    let most = Domain::longest_delta(dims).max(2.0 * DEFAULT_DELTA).min(*DELTA_RANGE.end());
+    if (*DELTA_RANGE.start()..=most).contains(&delta) {
         return Ok(delta);
     }
-    let [low, high] = [DELTA_RANGE.start(), DELTA_RANGE.end()].map(|d| d * MEAN_EDGE * voxel);
+    let [low, high] = [*DELTA_RANGE.start(), most].map(|d| d * MEAN_EDGE * voxel);
     Err(MethodError::invalid(
         "edge",
-        format!("must be from {low:.3} to {high:.3} for these voxels, got {edge}"),
+        format!("must be from {low:.3} to {high:.3} for a volume of this size, got {edge}"),
     ))
 }

@@ -8,7 +8,7 @@
 use super::contour::{ObjectIs, contour, placed};
 use super::coverage::Missing;
 use super::image::LevelImage;
-use super::{DeformableModel, Topology};
+use super::{DeformableModel, MEAN_EDGE, Topology};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
@@ -36,8 +36,8 @@ impl DeformableModel {
     /// added if the topology is fixed or the image force is zero.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] on a sparse volume; [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and
-    /// [`MethodError::Volume`] if memory does not suffice.
+    /// [`MethodError::InvalidArgument`] on a sparse volume, or for edges too long for the object;
+    /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
         self.check_is_whole()?;
         let mut times = Times::default();
@@ -78,7 +78,7 @@ impl DeformableModel {
     /// number of components added, as `seeds`, and their vertices.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`]; nothing is added then.
+    /// As [`Self::check_vertex_limit`]; nothing is added then.
     pub(super) fn add_components(&mut self, parts: &Mesh) -> Result<(Changes, Vec<VertexId>), MethodError> {
         self.check_vertex_limit(parts)?;
         let sampling = self.sampling();
@@ -101,11 +101,20 @@ impl DeformableModel {
     /// Checks that the components `parts` can be added to the mesh without exceeding the largest number of vertices.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`].
+    /// [`MethodError::TooManyVertices`]; [`MethodError::InvalidArgument`] if only edges much longer than a voxel make that
+    /// number so small: a mesh with them misses most of the object.
     pub(super) fn check_vertex_limit(&self, parts: &Mesh) -> Result<(), MethodError> {
         let most = self.resolver.max_vertices();
-        let fits = self.mesh.vertex_count() + parts.vertex_count() <= most;
-        if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
+        let count = self.mesh.vertex_count() + parts.vertex_count();
+        if count <= most {
+            return Ok(());
+        }
+        if count > self.domain.most_vertices(1.0) {
+            return Err(MethodError::TooManyVertices { most });
+        }
+        let edge = self.finest_delta * MEAN_EDGE * self.voxel;
+        let problem = format!("must be < {edge:.3} for this object: the surface lacks large parts of it");
+        Err(MethodError::invalid("edge", problem))
     }
 
     /// Initialises the attributes of vertices added to the mesh: at rest, awake, checked for edge bounds and contacts

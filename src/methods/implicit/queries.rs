@@ -133,9 +133,9 @@ const GRID_MARGIN: f64 = 0.1;
 /// of nodes along x, given their positions in voxels. Fails with [`VolumeError::TooLarge`] if memory cannot be
 /// allocated.
 fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
-    let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
+    let bytes = dims.iter().fold(4, |product: u64, &n| product.saturating_mul(n as u64));
+    let count = usize::try_from(bytes / 4).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();
-    let bytes = (count as u64).saturating_mul(4);
     values.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
     let (mut points, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
     for at in 0..dims[1] * dims[2] {

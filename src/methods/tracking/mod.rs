@@ -218,9 +218,18 @@ impl SurfaceTracker {
     fn with_defaults(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
         params.validate()?;
         let shortest_side = self.image.shortest_side;
+        let is_given = params.radius != 0.0;
         let params = params.with_volume(&self.image);
         let most = samples::MAX_FACES / 2 - 1;
         let longest = shortest_side * most as f64;
+        // With the longest radius instead, surfaces had almost three times their volume.
+        if params.radius > longest && !is_given {
+            let ratio = self.image.longest_side / shortest_side;
+            let problem = format!(
+                "its slices are {ratio:.1} pixels apart, too far for a fit of planes: insert slices between them first (enrichSlices)"
+            );
+            return Err(MethodError::invalid("volume", problem));
+        }
         if params.radius < shortest_side || params.radius > longest {
             let problem = format!(
                 "must be from {shortest_side} to {longest} (1 to {most} voxels), got {}",
