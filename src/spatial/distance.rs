@@ -39,9 +39,12 @@ pub struct SurfaceDistance {
 pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
     not_empty("mesh", mesh)?;
     not_empty("other", other)?;
-    // Compared in coordinates of the first mesh.
-    let moved = (mesh.origin != other.origin).then(|| other.relative_to(mesh.origin));
-    let other = moved.as_ref().unwrap_or(other);
+    // Compared relative to the origin that is further away: only coarse positions are exact relative to the other.
+    let is_first = mesh.origin.length_squared() >= other.origin.length_squared();
+    let origin = if is_first { mesh.origin } else { other.origin };
+    let [moved, other_moved] =
+        [mesh, other].map(|one| (one.origin != origin).then(|| one.relative_to(origin)));
+    let (mesh, other) = (moved.as_ref().unwrap_or(mesh), other_moved.as_ref().unwrap_or(other));
     let per_vertex = one_way(mesh, &TriangleTree::new(other)?);
     let back = one_way(other, &TriangleTree::new(mesh)?);
     let [there, back] = [Summary::of(mesh, &per_vertex), Summary::of(other, &back)];
@@ -111,7 +114,7 @@ fn weights(mesh: &TriangleMesh) -> Vec<Option<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
+    use crate::math::{DVec3, Vec3};
     use crate::mesh::Mesh;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -149,6 +152,16 @@ mod tests {
         for d in there.per_vertex.iter().chain(&back.per_vertex).chain(&summaries(&there)) {
             assert!((d - 0.25).abs() < 0.1 * 0.1 / 7.0, "{d}");
         }
+    }
+
+    #[test]
+    fn coarse_positions_do_not_round_those_of_the_other_surface() {
+        let fine = TriangleMesh { origin: DVec3::new(5e5, 5.4e6, 200.0), ..sphere(2.0, 0.3) };
+        let coarse = fine.relative_to(DVec3::ZERO);
+        let there = surface_distance(&coarse, &fine).unwrap();
+        assert_eq!(summaries(&there), summaries(&surface_distance(&fine, &coarse).unwrap()));
+        // Single precision has steps of half a metre there.
+        assert!(there.mean > 0.02 && there.hausdorff > 0.1, "{there:?}");
     }
 
     #[test]
