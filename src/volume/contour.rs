@@ -155,12 +155,16 @@ impl<'a> MarchingCubes<'a> {
         let [width, height] = self.size;
         let pairs = &mut self.pairs[z % 2];
         pairs.fill(0);
-        let rows = self.slices[z % 2].chunks_exact(self.dims[0]);
-        for (y, values) in (1..height - 1).zip(rows) {
+        let (slice, nx, iso) = (&self.slices[z % 2][..], self.dims[0], self.iso);
+        if slice.is_empty() {
+            return;
+        }
+        for y in 1..height - 1 {
+            let values = &slice[(y - 1) * nx..y * nx];
             let (before, here) = pairs[(y - 1) * width..(y + 1) * width].split_at_mut(width);
             let nodes = before[1..].iter_mut().zip(&mut here[1..]);
             for ((before, here), &value) in nodes.zip(values) {
-                let inside = u8::from(value >= self.iso);
+                let inside = u8::from(value >= iso);
                 *before |= inside << 1;
                 *here = inside;
             }

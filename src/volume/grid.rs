@@ -168,17 +168,37 @@ impl Grid {
         cache: &mut CellCache,
     ) -> f32 {
         let share = share_of_values(dims, part);
+        if share < 1.0 {
+            return self.sample_at_border((dims, part), share, p, padding, cache);
+        }
+        padding.background + (self.cell_at(p, cache).blend(&cache.corners) - padding.background)
+    }
+
+    /// As [`Self::sample_padded_by`], where the values have a `share` below 1.
+    #[cold]
+    fn sample_at_border(
+        &self,
+        (dims, part): ([usize; 3], Vec3),
+        share: f32,
+        p: Vec3,
+        padding: Padding,
+        cache: &mut CellCache,
+    ) -> f32 {
         if share <= 0.0 && share_of_padded(dims, part) <= 0.0 {
             return padding.background;
         }
+        let cell = self.cell_at(p, cache);
+        padding.beyond(dims, part, share, &cache.corners, |values| cell.blend(values))
+    }
+
+    /// Returns the cell with a position, whose corners are in `cache` afterwards.
+    #[inline]
+    fn cell_at(&self, p: Vec3, cache: &mut CellCache) -> Cell {
         let cell = Cell::at(self.dims, p);
         if !cache.is_at(cell.base() as u64) {
             *cache = CellCache::new(cell.base() as u64, cell.corners(|index| self.values[index]));
         }
-        if share < 1.0 {
-            return padding.beyond(dims, part, share, &cache.corners, |values| cell.blend(values));
-        }
-        padding.background + share * (cell.blend(&cache.corners) - padding.background)
+        cell
     }
 
     /// Returns the Sobel gradient in intensity per voxel: central differences over two voxels, smoothed by [1 2 1] in

@@ -129,6 +129,9 @@ impl Volume {
     /// Returns the intensities of stored values less `shift`, in `f32`; a shift is subtracted in `f64`.
     fn shifted(&self, indices: Range<usize>, shift: f64) -> Result<Vec<f32>, VolumeError> {
         let intensity = |v: f64| v * self.slope + self.intercept;
+        if shift == 0.0 && self.slope == 1.0 && self.intercept == 0.0 && !self.may_lack_values() {
+            return self.voxels.as_f32(indices);
+        }
         if shift == 0.0 {
             return super::converted(&self.voxels, indices, intensity);
         }

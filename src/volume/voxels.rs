@@ -148,6 +148,16 @@ impl Voxels {
         }
     }
 
+    /// Returns stored values in single precision.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub(crate) fn as_f32(&self, indices: Range<usize>) -> Result<Vec<f32>, VolumeError> {
+        let mut out = reserve(indices.len())?;
+        each!(self, values => extend_by_f32(&mut out, &values[indices]));
+        Ok(out)
+    }
+
     /// Returns the smallest and largest finite stored value, or `None` if no value is finite.
     pub(crate) fn finite_range(&self) -> Option<[f64; 2]> {
         each!(self, values => finite_range(values))
@@ -267,6 +277,10 @@ fn converted_like<T: VoxelNumber>(_stored: &[T], values: &[f64]) -> Result<Vec<T
     let mut out = reserve(values.len())?;
     out.extend(values.iter().map(|&value| T::nearest(value)));
     Ok(out)
+}
+
+fn extend_by_f32<T: Copy + Into<f64>>(out: &mut Vec<f32>, values: &[T]) {
+    out.extend(values.iter().map(|&value| value.into() as f32));
 }
 
 fn finite_range<T: VoxelNumber>(values: &[T]) -> Option<[f64; 2]> {

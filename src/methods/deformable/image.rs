@@ -176,16 +176,21 @@ impl LevelImage {
     /// the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, outside: Padding, known: &mut CellCache) -> f32 {
-        let index = self.index(p);
-        if self.parts == [1; 3] {
-            return match self.bricks() {
-                None => self.grid.sample_padded(index, outside, known),
-                Some(bricks) => bricks.sample_padded(index, outside, known),
-            };
+        if self.parts != [1; 3] {
+            return self.intensity_by_parts(p, outside, known);
         }
+        match self.bricks() {
+            None => self.grid.sample_padded(self.index(p), outside, known),
+            Some(bricks) => bricks.sample_padded(self.index(p), outside, known),
+        }
+    }
+
+    /// As [`Self::intensity`], in divided voxels.
+    #[inline(never)]
+    fn intensity_by_parts(&self, p: Vec3, outside: Padding, known: &mut CellCache) -> f32 {
         // Padding by parts, as the contour has it, which ends half a voxel beyond the centres; padding by long voxels would
         // end more than that beyond the centres where the object is bright.
-        let parts = (self.part_grid().0.dims(), self.part_index(p));
+        let (index, parts) = (self.index(p), (self.part_grid().0.dims(), self.part_index(p)));
         match self.bricks() {
             None => self.grid.sample_padded_by(parts, index, outside, known),
             Some(bricks) => bricks.sample_padded_by(parts, index, outside, known),

@@ -58,6 +58,8 @@ const WARNED: f64 = 0.01;
 /// The relative error of a thin label's volume, as far as it is quickly seen, above which it is balanced by itself, and
 /// measured. With half of it, labels are changed that are right; with twice as much, errors of 1 % may be missed.
 const NOTED: f64 = 0.004;
+/// The number of times that a label may be as large as all thin ones beside it for it to be balanced and measured with them.
+const MOST_TIMES: usize = 32;
 /// Distance from a change, in cells, up to which surfaces are smoothed again.
 const HALO: u32 = 6;
 /// Largest distance of the volume from the origin of world space, in voxels: positions in single precision are then as
@@ -360,7 +362,10 @@ impl LabelSurfaces {
         let numbers = zone.numbers().into_iter().filter(is_off);
         let mut noted: BTreeSet<u16> = numbers.collect();
         if !noted.is_empty() {
+            let own: usize = noted.iter().map(|&number| self.nets.grid.voxels(number)).sum();
             zone.add_neighbours(&mut noted);
+            // A neighbour many times as large gives no noticeable part of its volume, and takes long to measure.
+            noted.retain(|&number| self.nets.grid.voxels(number) < MOST_TIMES * own);
         }
         noted.into_iter().collect()
     }
