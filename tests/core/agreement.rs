@@ -18,6 +18,10 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 /// The number of samples in the length of a unit, to which the image is upsampled along each axis.
 const UPSAMPLED: f32 = 3.0;
 
+/// The number of parts, along each axis, into which upsampled voxels at a surface are divided to measure volumes: counts of
+/// whole ones are 1 % off for the smallest objects.
+const PARTS: usize = 4;
+
 /// The largest relative difference of volumes that agree.
 const TOLERANCE: f64 = 0.01;
 
@@ -330,7 +334,21 @@ impl Field {
                 }));
             }
         }
-        counted(fine, upsampled, &is_object)
+        let interpolated = |at: [f64; 3]| {
+            let located = [0, 1, 2].map(|axis| {
+                let low = (at[axis].max(0.0) as usize).min(padded[axis] - 2);
+                (low, (at[axis] - low as f64).clamp(0.0, 1.0))
+            });
+            let corner = |k: usize| {
+                let [(x, a), (y, b), (z, c)] = located;
+                let weight = |bit: usize, share: f64| if k >> bit & 1 == 1 { share } else { 1.0 - share };
+                let value = depths[row(y + (k >> 1 & 1), z + (k >> 2)) + x + (k & 1)];
+                weight(0, a) * weight(1, b) * weight(2, c) * value
+            };
+            (0..8).map(corner).sum::<f64>()
+        };
+        let volume = volume_of(fine, upsampled, &is_object, &interpolated);
+        Figures { volume, ..counted(fine, upsampled, &is_object) }
     }
 
     fn volume(&self, sign: f64) -> Volume {
@@ -352,6 +370,36 @@ impl Field {
         let affine = DAffine3::from_scale(self.voxel.as_dvec3());
         Volume::new(VolumeInit { affine, ..VolumeInit::new(voxels, [nx, ny, nz, 1]) }).unwrap()
     }
+}
+
+/// Returns the volume where an interpolated image is not negative: that of upsampled voxels of the object, of those at its
+/// surface that of their parts.
+fn volume_of(
+    [nx, ny, nz]: [usize; 3],
+    upsampled: [usize; 3],
+    is_object: &[bool],
+    interpolated: &dyn Fn([f64; 3]) -> f64,
+) -> f64 {
+    let mut count = 0;
+    for (k, &own) in is_object.iter().enumerate() {
+        let at = [k % nx, k / nx % ny, k / nx / ny];
+        let is_same = |axis: usize, other: usize| {
+            let mut place = at;
+            place[axis] = other.min([nx, ny, nz][axis] - 1);
+            is_object[place[0] + nx * (place[1] + ny * place[2])] == own
+        };
+        if (0..3).all(|axis| is_same(axis, at[axis].saturating_sub(1)) && is_same(axis, at[axis] + 1)) {
+            count += if own { PARTS.pow(3) } else { 0 };
+            continue;
+        }
+        for part in 0..PARTS.pow(3) {
+            let offset = [part % PARTS, part / PARTS % PARTS, part / PARTS / PARTS]
+                .map(|i| (i as f64 + 0.5) / PARTS as f64 - 0.5);
+            let place = [0, 1, 2].map(|axis| (at[axis] as f64 + offset[axis]) / upsampled[axis] as f64);
+            count += usize::from(interpolated(place) >= 0.0);
+        }
+    }
+    count as f64 / (PARTS.pow(3) * upsampled.iter().product::<usize>()) as f64
 }
 
 /// Counts the voxels of an image, its parts, connected through faces, and its cavities, and the Euler characteristic of
