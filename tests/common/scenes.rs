@@ -58,8 +58,13 @@ pub fn chain_of(major: f32, tube: f32, margin: f32) -> Volume {
     volume(dims, |p| potential(to_linked_circles(p - centre, major), tube))
 }
 
-/// Figure 14: the Menger sponge of the given depth in 81³ voxels, 1 inside and 0 outside.
+/// Figure 14: the Menger sponge of the given depth in 81³ voxels, 1 inside and 0 outside; it fills the volume.
 pub fn menger(depth: u32) -> Volume {
+    menger_within(depth, 0)
+}
+
+/// Returns [`menger`] with a `margin` of voxels outside around it.
+pub fn menger_within(depth: u32, margin: u32) -> Volume {
     let solid = |mut x: u32, mut y: u32, mut z: u32| {
         // The largest holes are cut first.
         let mut cell = 27;
@@ -73,7 +78,10 @@ pub fn menger(depth: u32) -> Volume {
         }
         1.0
     };
-    volume([81, 81, 81], |p| solid(p.x as u32, p.y as u32, p.z as u32))
+    volume([81 + 2 * margin as usize; 3], |p| {
+        let [x, y, z] = [p.x, p.y, p.z].map(|c| (c as u32).wrapping_sub(margin));
+        if [x, y, z].iter().all(|&c| c < 81) { solid(x, y, z) } else { 0.0 }
+    })
 }
 
 /// Returns the distance from `p` to the skeleton of [`chain`].

@@ -108,11 +108,12 @@ fn the_chain_is_accurate() {
 }
 
 /// Figure 14, depth 3: holes three voxels wide. The holes of depth 4, one voxel wide, are narrower than the contact
-/// distance of two vertices.
+/// distance of two vertices. Around the sponge there is background: cut off by the border of the image, the coarsest level
+/// has hardly a voxel beyond it, and at this iso value, of six from 0.35 to 0.5, one handle too many was left.
 #[test]
 #[ignore = "long scene: npm run scenes"]
 fn menger_sponge_of_depth_three() {
-    let volume = scenes::menger(3);
+    let volume = scenes::menger_within(3, 1);
     let options = DeformableOptions {
         start: Start::Enclosing,
         levels: 3,
