@@ -3,7 +3,7 @@
 use super::FormatError;
 use super::nifti::{FORMAT, SIZE_1, SIZE_2};
 use super::raw::{append_voxels, number_size};
-use crate::math::DVec3;
+use crate::math::{DVec3, box_corners};
 use crate::volume::{LengthUnit, Space, Volume, Voxels};
 
 /// Size of a NIfTI-1 header in bytes with the extension flag after it, where the voxels start.
@@ -63,10 +63,9 @@ fn affine_fits_f32(volume: &Volume) -> bool {
     let errors = rows_in_ras(volume).map(|v| f64::from(v as f32) - v);
     let [x, y, z] = volume.spacing();
     let limit = SHIFT_TOLERANCE * x.min(y).min(z);
-    (0..8).all(|k| {
-        let at = |axis: usize| if k >> axis & 1 == 0 { -0.5 } else { volume.dims()[axis] as f64 - 0.5 };
-        let shift =
-            |row: usize| (0..3).map(|i| errors[4 * row + i] * at(i)).sum::<f64>() + errors[4 * row + 3];
+    let last = DVec3::from(volume.dims().map(|n| n as f64 - 0.5));
+    box_corners(DVec3::splat(-0.5), last).into_iter().all(|at| {
+        let shift = |row: usize| DVec3::from_slice(&errors[4 * row..]).dot(at) + errors[4 * row + 3];
         DVec3::new(shift(0), shift(1), shift(2)).length() <= limit
     })
 }

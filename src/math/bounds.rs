@@ -14,6 +14,13 @@ pub struct Bounds {
     pub max: Vec3,
 }
 
+/// Returns the corners of a box, given by the lowest and the highest; x alternates fastest.
+pub fn box_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|k| {
+        DVec3::from([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { low[axis] } else { high[axis] }))
+    })
+}
+
 impl Bounds {
     /// The empty box, which contains no point and overlaps no box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };

@@ -17,7 +17,7 @@ pub mod symmetric;
 pub mod triangle;
 pub mod vectors;
 
-pub use bounds::{Bounds, BoxTree, Ray};
+pub use bounds::{Bounds, BoxTree, Ray, box_corners};
 pub use conjugate_gradients::ConjugateGradients;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 pub use groups::Groups;

@@ -6,7 +6,7 @@
 
 use super::{Mesh, MeshError, TriangleMesh};
 use crate::math::order::{rank_f32, sort_by_rank};
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3, box_corners};
 
 /// The largest coordinate, in sizes of the box, up to which positions are relative to the origin of world space: a
 /// thousand edges across the box, each keeps its length to a thousandth. With more, short edges would be rounded; with
@@ -46,12 +46,10 @@ fn power_above(x: f64) -> f64 {
 
 /// Returns the origin, see [`world_origin`], for the voxels of a grid of `dims` voxels which `affine` maps to world space.
 pub fn grid_origin(affine: &DAffine3, dims: [usize; 3]) -> DVec3 {
-    let corner = |k: usize| {
-        let pick = |axis: usize| if k >> axis & 1 == 0 { -0.5 } else { dims[axis] as f64 - 0.5 };
-        affine.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-    };
-    let first = corner(0);
-    let (min, max) = (1..8).map(corner).fold((first, first), |(min, max), p| (min.min(p), max.max(p)));
+    let last = DVec3::from(dims.map(|n| n as f64 - 0.5));
+    let corners = box_corners(DVec3::splat(-0.5), last).map(|p| affine.transform_point3(p));
+    let (min, max) =
+        corners.into_iter().fold((corners[0], corners[0]), |(min, max), p| (min.min(p), max.max(p)));
     world_origin(min, max)
 }
 

@@ -75,7 +75,7 @@ pub(crate) use subdivided::Subdivided;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, box_corners};
 use crate::warning::Warning;
 use derived::Derivation;
 use error::reserve;
@@ -507,7 +507,7 @@ fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
 /// stored.
 fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> {
     let far = DVec3::new(dims[0] as f64, dims[1] as f64, dims[2] as f64);
-    let corners = (0..8).map(|i| far * DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1))));
+    let corners = box_corners(DVec3::ZERO, far).into_iter();
     let furthest = corners.map(|p| affine.transform_point3(p).abs().max_element()).fold(0.0, f64::max);
     if furthest <= f64::from(f32::MAX) {
         return Ok(());

@@ -28,7 +28,7 @@ mod zone;
 
 pub use params::LabelParams;
 
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, box_corners};
 use crate::mesh::{TriangleMesh, grid_origin};
 use crate::methods::method::method;
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
@@ -442,11 +442,9 @@ impl LabelSurfaces {
 /// Returns an error unless positions in single precision are much finer than the gaps between surfaces.
 fn check_precision(volume: &Volume) -> Result<(), MethodError> {
     let affine = DAffine3::from_translation(-grid_origin(&volume.affine(), volume.dims())) * volume.affine();
-    let far = volume.dims().map(|n| n as f64);
-    let ends = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
-    let corners =
-        ends.map(|end| affine.transform_point3(DVec3::from([0, 1, 2].map(|i| f64::from(end[i]) * far[i]))));
-    let farthest = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let corners = box_corners(DVec3::ZERO, DVec3::from(volume.dims().map(|n| n as f64)));
+    let farthest =
+        corners.into_iter().map(|p| affine.transform_point3(p).abs().max_element()).fold(0.0, f64::max);
     let axes = [affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis];
     let voxel = axes.iter().map(|axis| axis.length()).fold(f64::INFINITY, f64::min);
     if farthest < MOST_VOXELS_AWAY * voxel {
