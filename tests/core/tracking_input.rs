@@ -117,16 +117,33 @@ fn slices_too_far_apart_are_refused_with_the_advice_to_insert_some() {
     }
 }
 
+/// Where a ball is between voxels changes its volume by up to 2 %, also without triangles; these have to be right on average.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
-fn the_volume_of_a_small_ball_is_within_one_percent() {
+fn volumes_of_small_balls_are_right_on_average() {
+    let centers = [
+        [13.5; 3],
+        [13.0; 3],
+        [13.4, 13.7, 13.5],
+        [13.2, 13.9, 14.1],
+        [13.25, 13.5, 13.75],
+        [13.1, 13.45, 13.8],
+    ];
     for radius in [6.0, 8.0, 11.0] {
-        let ball = Ball { center: DVec3::new(13.4, 13.7, 13.5), radius };
-        let volume = sequence([28; 3], 2, DAffine3::IDENTITY, |_, p| 200.0 * brightness(&[ball], p));
-        let tracker = tracked(options(volume)).unwrap();
-        for found in tracker.volumes() {
-            println!("{radius}: {:.4}", found / size(ball));
-            assert!((found / size(ball) - 1.0).abs() < 0.01, "{radius}: {found} {}", size(ball));
+        let ratio = |center: [f64; 3]| {
+            let ball = Ball { center: DVec3::from(center), radius };
+            let volume = sequence([28; 3], 2, DAffine3::IDENTITY, |_, p| 200.0 * brightness(&[ball], p));
+            let tracker = tracked(options(volume)).unwrap();
+            [0, 1].map(|frame| tracker.volumes()[frame] / size(ball))
+        };
+        let found = centers.map(ratio);
+        println!("{radius}: {found:.4?}");
+        for frame in 0..2 {
+            let mean = found.iter().map(|ratios| ratios[frame]).sum::<f64>() / found.len() as f64;
+            assert!((mean - 1.0).abs() < 0.005, "{radius}: {mean}");
         }
+        assert!(found.as_flattened().iter().all(|ratio| (ratio - 1.0).abs() < 0.025), "{radius}: {found:?}");
+        assert!(found[2].iter().all(|ratio| (ratio - 1.0).abs() < 0.01), "{radius}: {:?}", found[2]);
     }
 }
 
