@@ -46,8 +46,12 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
-/** Packages that an entry point imports when it is used. */
-const OPTIONAL_PEERS = ['zarrita', '@zarrita/storage'];
+/** Packages that entry points import when they are used: of `vesicle/zarr`, then of `vesicle/dicom`. */
+const OPTIONAL_PEERS = [
+  ...['zarrita', '@zarrita/storage'],
+  ...['dicom-parser', '@cornerstonejs/codec-libjpeg-turbo-8bit', '@cornerstonejs/jpeg-lossless-decoder-js'],
+  ...['@cornerstonejs/codec-charls', '@cornerstonejs/codec-openjpeg', '@cornerstonejs/codec-openjph'],
+];
 
 /**
  * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same
@@ -149,6 +153,11 @@ async function assemble(modules) {
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
 
+/** Entry points that read formats by the packages of others. */
+const FORMATS = ['zarr', 'dicom'];
+
+const folderEntry = (name) => ({ types: `./${name}/index.d.ts`, default: `./${name}/index.js` });
+
 const file = (name) => [`./${name}.wasm`, `./${name}.wasm`];
 
 const entry = (part) => [
@@ -169,7 +178,6 @@ async function manifest(modules) {
     type: 'module',
     sideEffects: ['./worker-host.js', './element.js'],
     engines,
-    // For `vesicle/zarr` only.
     peerDependencies: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, `^${devDependencies[name]}`])),
     peerDependenciesMeta: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, { optional: true }])),
     main: './index.js',
@@ -181,7 +189,7 @@ async function manifest(modules) {
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
-      './zarr': { types: './zarr/index.d.ts', default: './zarr/index.js' },
+      ...Object.fromEntries(FORMATS.map((name) => [`./${name}`, folderEntry(name)])),
       './element': { types: './element/index.d.ts', default: './element.js' },
       ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(({ name }) => file(name))),
       './package.json': './package.json',

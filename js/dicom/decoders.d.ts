@@ -1,0 +1,5 @@
+// The decoders, which have no declarations of their own; see `codecs.ts` for what is used of them.
+declare module '@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs';
+declare module '@cornerstonejs/codec-charls/decodewasmjs';
+declare module '@cornerstonejs/codec-openjpeg/decodewasmjs';
+declare module '@cornerstonejs/codec-openjph/wasmjs';

@@ -1,0 +1,16 @@
+// Errors of DICOM files.
+import { VesicleError } from '../error.js';
+
+/** Returns the `bad-file` error whose message names the part of the data and its problem; the caller throws it. */
+export function badDicom(part: string, problem: string): VesicleError {
+  return new VesicleError('bad-file', `DICOM: ${part}: ${problem}`);
+}
+
+/** Returns what an error of another library says. */
+export function reasonOf(error: unknown): string {
+  const { exception } = Object(error) as { exception?: unknown };
+  if (exception !== undefined) return reasonOf(exception);
+  const text = error instanceof Error ? error.message : String(error);
+  // Messages of dicom-parser begin with the name of the function.
+  return text.replace(/^dicomParser\.\w+: /, '').slice(0, 200);
+}

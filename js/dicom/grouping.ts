@@ -1,0 +1,230 @@
+/**
+ * Which images belong together: rules for the images of a folder, each with its reason.
+ *
+ * 1. Images of one volume are of one series (PS3.3, C.7.3.1), have the same size, pixel spacing and type of voxels, and
+ *    are parallel (C.7.6.2). A localiser, which is often part of the series it was used to plan, is thereby a volume of
+ *    its own, or a single image.
+ * 2. A file that is there twice, with the same unique identifier (C.12.1), counts once.
+ * 3. Of several images at the same position, those that differ in what was measured (echo, b-value, magnitude and phase,
+ *    reconstruction) are different volumes; those that differ in time are frames of one volume.
+ * 4. Images at the same position that nothing tells apart are not read, since which one is right is unknown.
+ */
+import type { Vec3 } from '../data.js';
+import { cross, dot, evennessOf } from './geometry.js';
+import type { Frame } from './types.js';
+
+/** Largest angle between images that count as parallel, radians: 0.1 mm at the far side of a body. */
+const PARALLEL = 3e-4;
+/** Largest relative difference of pixel spacings that count as equal. */
+const SAME_SPACING = 1e-4;
+/** Part of a pixel by which images at the same position may differ: as much as rounding changes positions. */
+const SAME_POSITION = 0.01;
+
+/** Attributes by which images at the same position are of different volumes, in the order in which they are tried. */
+const KINDS = [
+  'stack',
+  'image type',
+  'frame type',
+  'complex part',
+  'echo time',
+  'echo',
+  'b-value',
+  'inversion time',
+  'kVp',
+  'kernel',
+];
+/** Attributes with one value for each frame of a volume with time. */
+const PHASES = ['temporal position', 'trigger time', 'frame reference time', 'acquisition'];
+/** Attributes that are larger for later images at the same position, but may differ from slice to slice. */
+const CLOCKS = ['trigger time', 'frame reference time', 'acquisition time', 'content time', 'instance'];
+
+/** The slices of a volume: of each of its frames, sorted along the normal. */
+export interface Stack {
+  frames: Frame[][];
+  /** What tells this volume from others of its series; empty if there are none. */
+  label: string;
+  /** What should be known before relying on it. */
+  notes: string[];
+  /** What else is known of it. */
+  remarks?: string[];
+}
+
+/** Images that cannot be put together, and why. */
+export interface Conflict {
+  images: Frame[];
+  reason: string;
+}
+
+/** Returns entries by a key, in the order in which each key is first found. */
+export function grouped<T, Key>(entries: readonly T[], keyOf: (entry: T) => Key): Map<Key, T[]> {
+  const groups = new Map<Key, T[]>();
+  for (const entry of entries) {
+    const key = keyOf(entry);
+    const group = groups.get(key) ?? [];
+    groups.set(key, group);
+    group.push(entry);
+  }
+  return groups;
+}
+
+/** Returns the normal of an image: along it, slices are sorted. */
+export const normalOf = ({ along, down }: Frame): Vec3 => cross(along, down);
+
+/** Sorts images into volumes. */
+export function stacksOf(images: readonly Frame[]): (Stack | Conflict)[] {
+  const groups: Frame[][] = [];
+  for (const image of images) {
+    // Images of a folder come series by series, mostly, so that the last group is the likely one.
+    const group = groups.findLast(([first]) => first && areAlike(first, image));
+    if (group) group.push(image);
+    else groups.push([image]);
+  }
+  return groups.flatMap((group) => {
+    const { kept, copies } = withoutCopies(group);
+    const parts = separated(kept, '');
+    const text = `${copies === 1 ? 'One file was' : `${copies} files were`} there twice and counted once.`;
+    if (copies > 0) for (const part of parts) if ('notes' in part) part.notes.push(text);
+    return parts;
+  });
+}
+
+/** Rule 1. */
+function areAlike(one: Frame, other: Frame): boolean {
+  const [a, b] = [one.format, other.format];
+  return (
+    one.series.uid === other.series.uid &&
+    one.series.sopClass === other.series.sopClass &&
+    one.series.frameOfReference === other.series.frameOfReference &&
+    one.series.inverted === other.series.inverted &&
+    a.rows === b.rows &&
+    a.columns === b.columns &&
+    a.bitsAllocated === b.bitsAllocated &&
+    a.signed === b.signed &&
+    a.float === b.float &&
+    one.spacing.every((size, k) => Math.abs(size - (other.spacing[k] ?? 0)) <= SAME_SPACING * size) &&
+    isParallel(one, other)
+  );
+}
+
+/** Whether two images have the same directions. */
+export const isParallel = (one: Frame, other: Frame) => isNear(one.along, other.along) && isNear(one.down, other.down);
+
+const isNear = (a: Vec3, b: Vec3) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) <= PARALLEL;
+
+/** Rule 2. Files that lost their identifiers all have the same; those at other positions are no copies. */
+function withoutCopies(group: Frame[]): { kept: Frame[]; copies: number } {
+  const seen = new Set<string>();
+  const kept = group.filter(({ uid, index, position, instance, marks }) => {
+    if (uid === '') return true;
+    const key = JSON.stringify([uid, index, position, instance, marks]);
+    return !seen.has(key) && seen.add(key);
+  });
+  return { kept, copies: group.length - kept.length };
+}
+
+/** Rules 3 and 4. */
+function separated(images: Frame[], label: string): (Stack | Conflict)[] {
+  const slots = slotsOf(images);
+  const most = largestSlot(slots);
+  if (most > 1) {
+    const parts = byKind(images, most) ?? undefined;
+    if (parts) return parts.flatMap(([name, part]) => separated(part, joined(label, name)));
+    const timed = inTime(images, slots, most, label);
+    return timed ?? [{ images, reason: 'several images at the same position, which nothing tells apart' }];
+  }
+  const slices = images.toSorted((a, b) => along(a) - along(b));
+  return apart(slices, label) ?? [{ frames: [slices], label, notes: [] }];
+}
+
+const along = (image: Frame) => dot(image.position, normalOf(image));
+
+const joined = (label: string, name: string) => (label === '' ? name : `${label}, ${name}`);
+
+/** Returns for each image the number of its position, counted along the normal. */
+function slotsOf(images: readonly Frame[]): number[] {
+  const [first] = images;
+  if (!first) return [];
+  const normal = normalOf(first);
+  const order = images.map((image, k) => [dot(image.position, normal), k] as const).toSorted((a, b) => a[0] - b[0]);
+  const tolerance = SAME_POSITION * Math.min(...first.spacing);
+  const slots = new Array<number>(images.length).fill(0);
+  let [slot, start] = [-1, -Infinity];
+  for (const [at, k] of order) {
+    if (at - start > tolerance) [slot, start] = [slot + 1, at];
+    slots[k] = slot;
+  }
+  return slots;
+}
+
+/** Returns the largest number of images at one position. */
+function largestSlot(slots: readonly number[]): number {
+  const counts = new Map<number, number>();
+  for (const slot of slots) counts.set(slot, (counts.get(slot) ?? 0) + 1);
+  return Math.max(0, ...counts.values());
+}
+
+/** Returns the images by the values of an attribute, in the order of these. */
+function byMark(images: readonly Frame[], mark: string): [string, Frame[]][] {
+  const groups = grouped(images, ({ marks }) => marks[mark] ?? '');
+  const sorted = [...groups].toSorted(([a], [b]) => (a < b ? -1 : 1));
+  return sorted.map(([value, group]) => [`${mark} ${value === '' ? 'not stated' : value}`, group]);
+}
+
+/** Returns the images by the first attribute of what was measured that leaves fewer at the same position. */
+function byKind(images: readonly Frame[], most: number): [string, Frame[]][] | undefined {
+  for (const mark of KINDS) {
+    const groups = byMark(images, mark);
+    if (groups.length < 2 || groups.length > most) continue;
+    if (groups.every(([, group]) => largestSlot(slotsOf(group)) < most)) return groups;
+  }
+  return undefined;
+}
+
+/** Returns the volume whose frames are the images at one position, or volumes if some frames lack slices. */
+function inTime(images: Frame[], slots: number[], most: number, label: string): Stack[] | undefined {
+  const places = Math.max(...slots) + 1;
+  for (const mark of PHASES) {
+    const groups = byMark(images, mark);
+    if (groups.length !== most || !groups.every(([, group]) => largestSlot(slotsOf(group)) === 1)) continue;
+    const frames = groups.map(([, group]) => group.toSorted((a, b) => along(a) - along(b)));
+    if (frames.every(({ length }) => length === places)) return [{ frames, label, notes: [] }];
+    // Frames that lack slices are no frames of one volume.
+    return groups.map(([name], k) => ({ frames: [frames[k] ?? []], label: joined(label, name), notes: [] }));
+  }
+  if (images.length !== most * places) return undefined;
+  for (const mark of CLOCKS) {
+    const frames = byClock(images, slots, mark, most);
+    const note = 'Frames were told apart by the numbers of the images only.';
+    if (frames) return [{ frames, label, notes: mark === 'instance' ? [note] : [] }];
+  }
+  return undefined;
+}
+
+/** Returns the k-th of the images at each position, by a clock, as frame k; undefined if two have the same time. */
+function byClock(images: Frame[], slots: number[], mark: string, most: number): Frame[][] | undefined {
+  const order = slots.map((slot, k) => [slot, images[k] as Frame] as const).toSorted((a, b) => a[0] - b[0]);
+  const places = [...grouped(order, ([slot]) => slot).values()].map((place) => place.map(([, image]) => image));
+  const times = ({ marks, index }: Frame) => (mark === 'instance' ? [marks[mark] ?? 0, index] : [marks[mark] ?? '']);
+  const compared = (a: Frame, b: Frame) => {
+    const [one, other] = [times(a), times(b)];
+    const k = one[0] === other[0] ? 1 : 0;
+    return one[k] === other[k] ? 0 : (one[k] ?? 0) < (other[k] ?? 0) ? -1 : 1;
+  };
+  const sorted = places.map((place) => place.toSorted(compared));
+  const isTold = sorted.every((place) =>
+    place.every((image, k) => k === 0 || compared(place[k - 1] as Frame, image) !== 0),
+  );
+  return isTold ? Array.from({ length: most }, (_, k) => sorted.map((place) => place[k] as Frame)) : undefined;
+}
+
+/** Returns the volumes of slices at uneven distances that are even by themselves: parts of what was measured twice. */
+function apart(slices: Frame[], label: string): Stack[] | undefined {
+  if (slices.length < 4 || evennessOf(slices).kind === 'even') return undefined;
+  for (const mark of [...KINDS, ...PHASES]) {
+    const groups = byMark(slices, mark);
+    const isEven = (part: Frame[]) => part.length > 1 && evennessOf(part).kind === 'even';
+    if (groups.length > 1 && groups.every(([, part]) => isEven(part)))
+      return groups.map(([name, part]) => ({ frames: [part], label: joined(label, name), notes: [] }));
+  }
+  return undefined;
+}

@@ -1,0 +1,201 @@
+/**
+ * Reads DICOM: sorts the images of a folder into volumes, says what is wrong with each, and reads their voxels. Series of
+ * slices, enhanced multi-frame images, doses, volumes with time, and segmentations; uncompressed, deflated, RLE, JPEG,
+ * JPEG-LS, JPEG 2000 and HTJ2K.
+ *
+ * Needs the package `dicom-parser`, which reads data sets; for compressed images also one of
+ * `@cornerstonejs/codec-libjpeg-turbo-8bit`, `@cornerstonejs/jpeg-lossless-decoder-js`, `@cornerstonejs/codec-charls`,
+ * `@cornerstonejs/codec-openjpeg` and `@cornerstonejs/codec-openjph`. Each is imported when it is needed.
+ *
+ * @example
+ * const { volumes } = await openDicom(files);
+ * const volume = new Volume(await volumes[0].read());
+ *
+ * @module vesicle/dicom
+ */
+import { checkProperties, invalid } from '../check.js';
+import type { VolumeInit } from '../data.js';
+import { VesicleError } from '../error.js';
+import { checkedFiles, type FileReaderAt, type InputFile } from '../input-file.js';
+import { checkListener, checkSignal } from '../stepper.js';
+import { badDicom } from './error.js';
+import { evennessOf } from './geometry.js';
+import { type Conflict, grouped, isParallel, type Stack, stacksOf } from './grouping.js';
+import { framesIn } from './header.js';
+import { importParser, type Parser, readHeader } from './parser.js';
+import { pausing } from './pause.js';
+import { SegmentationVolume } from './segmentation.js';
+import { LABEL_MAP, SEGMENTATION } from './segments.js';
+import type { Frame, Skipped } from './types.js';
+import { type DicomProgress, type DicomReadOptions, type DicomVolume, ImageVolume } from './volume.js';
+
+export type { InputFile } from '../input-file.js';
+export type { DecoderFiles } from './codecs.js';
+export type { Segment, Skipped } from './types.js';
+export { type DicomProgress, type DicomReadOptions, DicomVolume } from './volume.js';
+
+/** Options of {@link openDicom}. */
+export interface DicomOptions {
+  /** Aborts the opening, which then rejects with `signal.reason`. */
+  signal?: AbortSignal;
+  /** Called as files are looked at. */
+  onProgress?: (progress: DicomProgress) => void;
+}
+
+/** What a folder of DICOM files holds. */
+export interface DicomListing {
+  /** The volumes, of which those with most voxels come first, and localisers last. */
+  volumes: DicomVolume[];
+  /** Files that are part of no volume, each with the reason. */
+  skipped: Skipped[];
+}
+
+/**
+ * Looks at files, in any order and of any kind, and returns the volumes that the DICOM images among them make up. Of files
+ * that are given as `Blob` or `File` only the headers are read.
+ *
+ * Images are of one volume if they are of one series, have the same size, pixel spacing, orientation and type of voxels. Of
+ * several at the same position, those that differ in what was measured (echo, b-value, reconstruction…) are different
+ * volumes, those that differ in time are frames of one. Slices are sorted along their normal, and placed by their
+ * positions, also if the gantry was tilted. A file that is there twice counts once.
+ *
+ * A damaged file is skipped; since it may be part of any volume, all have a warning then.
+ *
+ * @throws `VesicleError` `invalid-argument`: `dicom-parser` is missing, or an argument is wrong. `signal.reason` when aborted.
+ */
+export async function openDicom(files: Iterable<InputFile>, given?: DicomOptions): Promise<DicomListing> {
+  const readers = checkedFiles('files', files);
+  const { signal, onProgress } = checkProperties<DicomOptions>('options', given, ['signal', 'onProgress']);
+  checkSignal(signal);
+  checkListener('onProgress', onProgress);
+  const parser = await importParser();
+  const images: Frame[] = [];
+  const skipped: Skipped[] = [];
+  await pausing(signal, async (pause) => {
+    for (const [k, file] of readers.entries()) {
+      const found = await imagesIn(parser, file);
+      if ('reason' in found) skipped.push(found);
+      else for (const image of found) images.push(image);
+      onProgress?.({ done: k + 1, total: readers.length });
+      await pause();
+    }
+  });
+  const volumes = volumesOf(parser, images, skipped);
+  return { volumes: volumes.toSorted((a, b) => rank(b) - rank(a)), skipped };
+}
+
+/**
+ * Reads the one volume that DICOM files make up.
+ *
+ * @throws As {@link openDicom} and {@link DicomVolume.read}; `bad-file` if there is no volume, with the reasons;
+ *   `invalid-argument` if there are several: choose one by {@link openDicom}.
+ */
+export async function readDicom(files: Iterable<InputFile>, options: DicomReadOptions = {}): Promise<VolumeInit> {
+  const { signal } = options;
+  const { volumes, skipped } = await openDicom(files, signal ? { signal } : {});
+  const [volume, second] = volumes;
+  if (!volume) throw badDicom('files', `no volume: ${reasonsOf(skipped)}`);
+  if (second) {
+    const names = volumes.map(({ name, dims }) => `${name} (${dims.join(' × ')})`).join('; ');
+    throw invalid(
+      'files',
+      `hold ${volumes.length} volumes, of which openDicom returns a list to choose from: ${names}`,
+    );
+  }
+  return volume.read(options);
+}
+
+/** Returns the images of a file; one that is damaged is skipped, and may be part of any volume. */
+async function imagesIn(parser: Parser, file: FileReaderAt): Promise<Frame[] | Skipped> {
+  try {
+    const header = await readHeader(parser, file);
+    if (header) return framesIn(file, header);
+    return { name: file.name, reason: 'no DICOM file', ...(isNamedDicom(file) && { damaged: true }) };
+  } catch (error) {
+    if (!(error instanceof VesicleError)) throw error;
+    return { name: file.name, reason: error.message, damaged: true };
+  }
+}
+
+const isNamedDicom = ({ name }: FileReaderAt) => /\.(dcm|dicom|ima)$/i.test(name);
+
+/** Returns the volumes of images; adds those that are part of none to `skipped`. */
+function volumesOf(parser: Parser, images: readonly Frame[], skipped: Skipped[]): DicomVolume[] {
+  const damaged = skipped.filter((one) => one.damaged);
+  const isSegment = ({ series }: Frame) => series.sopClass === SEGMENTATION || series.sopClass === LABEL_MAP;
+  const skip = (group: readonly Frame[], reason: string) => {
+    for (const name of new Set(group.map(({ file }) => file.name))) skipped.push({ name, reason });
+  };
+  const segmentations = [...grouped(images.filter(isSegment), ({ file }) => file).values()].flatMap((group) => {
+    const volume = SegmentationVolume.of(parser, group);
+    if (!volume) skip(group, 'a segmentation with frames at uneven distances');
+    return volume ?? [];
+  });
+  const stacks = stacksOf(images.filter((image) => !isSegment(image))).map(usable);
+  const left = stacks.filter((one) => 'reason' in one);
+  for (const { images, reason } of left) skip(images, reason);
+  const volumes = stacks
+    .filter((one) => 'frames' in one)
+    .map((stack) => new ImageVolume(parser, { ...stack, ...beside(stack, left, damaged) }));
+  return named([...volumes, ...segmentations]);
+}
+
+/** Returns a stack, or why it is no volume. */
+function usable(stack: Stack | Conflict): Stack | Conflict {
+  if ('reason' in stack) return stack;
+  const [slices = []] = stack.frames;
+  const images = stack.frames.flat();
+  if (slices.length === 1) return { images, reason: 'a single image, which is no volume' };
+  const evenness = evennessOf(slices);
+  return evenness.kind === 'shifted' ? { images, reason: evenness.reason } : stack;
+}
+
+/** Returns what should be known of images that are not part of a stack, but may be missing in it. */
+function beside(stack: Stack, left: Conflict[], damaged: Skipped[]): Pick<Stack, 'notes' | 'remarks'> {
+  const [first] = stack.frames.flat() as [Frame];
+  const notes = [...stack.notes];
+  const remarks: string[] = [];
+  for (const { images, reason } of left.filter(({ images }) => images[0]?.series.uid === first.series.uid)) {
+    const count = images.length === 1 ? 'One image' : `${images.length} images`;
+    const text = `${count} of the series ${images.length === 1 ? 'is' : 'are'} not part of the volume (${sizeOf(images)}): ${reason}.`;
+    const isLocaliser = images.every((image) => image.series.isLocaliser || !isParallel(image, first));
+    (isLocaliser ? remarks : notes).push(text);
+  }
+  const files = damaged.map(({ name }) => name);
+  if (files.length > 0)
+    notes.push(
+      `${files.slice(0, 3).join(', ')}${files.length > 3 ? ` and ${files.length - 3} more` : ''} could not be read, and may be missing in the volume.`,
+    );
+  return { notes, remarks };
+}
+
+const sizeOf = ([image]: Frame[]) => `${image?.format.columns} × ${image?.format.rows}`;
+
+/** Returns volumes with names of their own: with the size, and the number, where several have the same. */
+function named(volumes: DicomVolume[]): DicomVolume[] {
+  const marks: ((volume: DicomVolume, k: number) => string)[] = [
+    ({ dims }) => dims.join(' × '),
+    (_, k) => String(k + 1),
+  ];
+  for (const mark of marks)
+    for (const group of grouped(volumes, ({ name }) => name).values())
+      if (group.length > 1)
+        for (const [k, volume] of group.entries())
+          (volume as { name: string }).name = `${volume.name}, ${mark(volume, k)}`;
+  return volumes;
+}
+
+/** Returns a number that is the larger, the more likely a volume is the one that is wanted. */
+function rank({ dims, frames, kind }: DicomVolume): number {
+  return dims[0] * dims[1] * dims[2] * frames * (kind === 'image' ? 1 : 1e-6);
+}
+
+/** Returns why files are part of no volume, each reason once. */
+function reasonsOf(skipped: readonly Skipped[]): string {
+  const counts = grouped(skipped, ({ reason }) => reason);
+  const texts = Array.from(
+    counts,
+    ([reason, files]) => `${reason} (${files.length === 1 ? files[0]?.name : `${files.length} files`})`,
+  );
+  return texts.join('; ') || 'no files';
+}

@@ -1,0 +1,148 @@
+// The data sets of DICOM files, by dicom-parser.
+import type { DataSet } from 'dicom-parser';
+import { invalid } from '../check.js';
+import type { FileReaderAt } from '../input-file.js';
+import { badDicom, reasonOf } from './error.js';
+
+export type Parser = typeof import('dicom-parser');
+
+/** Imports dicom-parser; throws `invalid-argument` if it is missing. */
+export async function importParser(): Promise<Parser> {
+  const imported = await import('dicom-parser').catch(() => undefined);
+  // A module of CommonJS, whose exports some loaders put into `default` only.
+  const parser = (imported as { default?: Parser } | undefined)?.default ?? imported;
+  if (typeof parser?.parseDicom === 'function') return parser;
+  throw invalid('dicom-parser', 'this package, 1.8 or newer, is needed to read DICOM: npm install dicom-parser');
+}
+
+export const PIXEL_DATA = 'x7fe00010';
+/** Float and Double Float Pixel Data (PS3.3, C.7.6.24 and C.7.6.25). */
+export const FLOAT_PIXELS = ['x7fe00008', 'x7fe00009'] as const;
+
+/** Explicit little-endian, implicit little-endian, and explicit little-endian compressed as a whole (PS3.5, annex A). */
+export const EXPLICIT = '1.2.840.10008.1.2.1';
+export const IMPLICIT = '1.2.840.10008.1.2';
+const DEFLATED = '1.2.840.10008.1.2.1.99';
+
+/** Bytes at the start of a file that are read first, which are all before the pixels of most images. */
+const HEAD = 2 ** 16;
+/** Factor by which more is read while the pixels are not reached. */
+const MORE = 8;
+/** Most bytes that a compressed dataset may have. */
+const MOST_INFLATED = 2 ** 31 - 1;
+
+/** A data set up to its pixels, the bytes that offsets in it refer to, and its transfer syntax. */
+export interface Header {
+  data: DataSet;
+  transferSyntax: string;
+  deflated: boolean;
+}
+
+/** Returns whether a file begins as DICOM files do: with a preamble of 128 bytes, or, as some old ones, without. */
+export function looksLikeDicom(head: Uint8Array): boolean {
+  return hasPreamble(head) || syntaxWithout(head) !== undefined;
+}
+
+const hasPreamble = (head: Uint8Array) => [0x44, 0x49, 0x43, 0x4d].every((byte, k) => head[128 + k] === byte);
+
+/**
+ * Returns the transfer syntax of a file without preamble and meta header, told by its first element, which is one of the
+ * group that identifies the image; undefined if it is none.
+ */
+function syntaxWithout(head: Uint8Array): string | undefined {
+  const [group, element] = [(head[0] ?? 0) + 256 * (head[1] ?? 0), (head[2] ?? 0) + 256 * (head[3] ?? 0)];
+  if (group !== 8 || element > 0x20 || head.length < 132) return undefined;
+  const letters = String.fromCharCode(head[4] ?? 0, head[5] ?? 0);
+  if (/^(UI|UL|CS|DA|TM|DT)$/.test(letters)) return EXPLICIT;
+  const length = (head[4] ?? 0) + 256 * (head[5] ?? 0) + 65536 * ((head[6] ?? 0) + 256 * (head[7] ?? 0));
+  return length <= 64 ? IMPLICIT : undefined;
+}
+
+/** Reads the data set of a file up to its pixels; undefined if the file is no DICOM. */
+export async function readHeader(parser: Parser, file: FileReaderAt): Promise<Header | undefined> {
+  for (let size = HEAD; ; size *= MORE) {
+    const bytes = await file.read(0, size);
+    if (!looksLikeDicom(bytes)) return undefined;
+    const whole = bytes.length === file.size;
+    const header = await parsedHead(parser, file, bytes, whole);
+    if (header) return header;
+  }
+}
+
+/** Parses the first bytes of a file; undefined if its pixels are not among them. */
+async function parsedHead(
+  parser: Parser,
+  file: FileReaderAt,
+  bytes: Uint8Array,
+  whole: boolean,
+): Promise<Header | undefined> {
+  try {
+    const header = await parse(parser, file, bytes, { untilTag: PIXEL_DATA });
+    const found = [PIXEL_DATA, ...FLOAT_PIXELS].some((tag) => header.data.elements[tag] !== undefined);
+    return found || whole || header.deflated ? header : undefined;
+  } catch (error) {
+    if (whole) throw badDicom(file.name, `could not be read: ${reasonOf(error)}`);
+    return undefined;
+  }
+}
+
+/** Parses all of a file, with the places of its compressed frames. */
+export async function readWhole(parser: Parser, file: FileReaderAt): Promise<Header> {
+  try {
+    return await parse(parser, file, await file.read(), {});
+  } catch (error) {
+    throw badDicom(file.name, `could not be read: ${reasonOf(error)}`);
+  }
+}
+
+async function parse(
+  parser: Parser,
+  file: FileReaderAt,
+  bytes: Uint8Array,
+  options: { untilTag?: string },
+): Promise<Header> {
+  if (!hasPreamble(bytes)) return parseWithout(parser, bytes, options);
+  // With a tag that ends it, only the meta header is parsed.
+  const meta = parser.readPart10Header(bytes, options as { untilTag: string });
+  const transferSyntax = meta.string('x00020010') ?? IMPLICIT;
+  if (transferSyntax !== DEFLATED) {
+    const given = { ...options, TransferSyntaxUID: transferSyntax };
+    return { data: parser.parseDicom(bytes, given), transferSyntax, deflated: false };
+  }
+  const start = (meta as unknown as { position: number }).position;
+  const inflated = await inflate(await file.read(start));
+  return { ...parseWithout(parser, inflated, options, EXPLICIT), deflated: true };
+}
+
+function parseWithout(
+  parser: Parser,
+  bytes: Uint8Array,
+  options: { untilTag?: string },
+  transferSyntax = syntaxWithout(bytes) ?? IMPLICIT,
+): Header {
+  const data = parser.parseDicom(bytes, { ...options, TransferSyntaxUID: transferSyntax });
+  return { data, transferSyntax, deflated: false };
+}
+
+/** Returns the bytes of a raw deflate stream. */
+export async function inflate(bytes: Uint8Array): Promise<Uint8Array> {
+  const stream = new Blob([bytes as Uint8Array<ArrayBuffer>])
+    .stream()
+    .pipeThrough(new DecompressionStream('deflate-raw'));
+  const parts: Uint8Array[] = [];
+  let size = 0;
+  for (const reader = stream.getReader(); ; ) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    size += value.length;
+    if (size > MOST_INFLATED) throw new Error('the compressed data set has more than 2 GB');
+    parts.push(value);
+  }
+  const all = new Uint8Array(size);
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
