@@ -28,25 +28,30 @@ function relaxPolicyWhileDeveloping(): Plugin {
   };
 }
 
-/** Programs that read DICOM: series of slices, and segmentations, whose segments overlap or not. */
-const DICOM_READERS = ['read-image-dicom-file-series', 'read-segmentation', 'read-overlapping-segmentation'];
+/** Modules that decode compressed DICOM images, by package. */
+const DECODERS = [
+  ['codec-libjpeg-turbo-8bit', 'libjpegturbowasm_decode.wasm'],
+  ['codec-charls', 'charlswasm_decode.wasm'],
+  ['codec-openjpeg', 'openjpegwasm_decode.wasm'],
+  ['codec-openjph', 'openjphjs.wasm'],
+] as const;
 
-/** Lays the programs that read DICOM beside the page, under the names that their loader asks for. */
-function dicomBeside(): Plugin {
-  const folder = here('../node_modules/@itk-wasm/dicom/dist/pipelines/');
-  const names = DICOM_READERS.flatMap((name) => [`${name}.js`, `${name}.wasm.zst`]);
+/** Lays the modules that decode DICOM images beside the page, under the names that their loaders ask for. */
+function decodersBeside(): Plugin {
+  const read = (decoder: string, name: string) =>
+    readFileSync(here(`../node_modules/@cornerstonejs/${decoder}/dist/${name}`));
   return {
-    name: 'dicom-beside',
+    name: 'decoders-beside',
     generateBundle() {
-      for (const name of names)
-        this.emitFile({ type: 'asset', fileName: `dicom/${name}`, source: readFileSync(folder + name) });
+      for (const [decoder, name] of DECODERS)
+        this.emitFile({ type: 'asset', fileName: `dicom/${name}`, source: read(decoder, name) });
     },
     configureServer({ middlewares }) {
       middlewares.use('/dicom', (request, response, next) => {
-        const name = names.find((name) => request.url?.split('?')[0] === `/${name}`);
-        if (!name) return next();
-        response.setHeader('Content-Type', name.endsWith('.js') ? 'text/javascript' : 'application/octet-stream');
-        response.end(readFileSync(folder + name));
+        const [decoder, name] = DECODERS.find(([, name]) => request.url?.split('?')[0] === `/${name}`) ?? [];
+        if (!decoder || !name) return next();
+        response.setHeader('Content-Type', 'application/wasm');
+        response.end(read(decoder, name));
       });
     },
   };
@@ -156,7 +161,10 @@ function ownMethod(): Plugin {
 }
 
 /** For the notices beside the page. */
-const noted = noteBundled('app', ['@itk-wasm/dicom']);
+const noted = noteBundled(
+  'app',
+  DECODERS.map(([decoder]) => `@cornerstonejs/${decoder}`),
+);
 
 export default defineConfig({
   root: here('.'),
@@ -165,7 +173,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
-      { find: /^vesicle\/(import|zarr)$/, replacement: `${here('../pkg')}/$1/index.js` },
+      { find: /^vesicle\/(import|zarr|dicom|tiff)$/, replacement: `${here('../pkg')}/$1/index.js` },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
@@ -175,7 +183,7 @@ export default defineConfig({
     sameVtk(),
     withoutClipper(),
     newestFonts(),
-    dicomBeside(),
+    decodersBeside(),
     listFiles(),
     noted.page,
   ],

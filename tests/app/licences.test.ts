@@ -30,7 +30,16 @@ test('every crate in the module is listed', () => {
 
 test('packages of the page, of its workers and beside it are listed, and no tools', () => {
   // geotiff is in a worker only.
-  const parts = ['three', 'uplot', 'geotiff', 'itk-wasm', '@itk-wasm/dicom', '@niivue/niivue', '@kitware/vtk.js'];
+  const parts = [
+    'three',
+    'uplot',
+    'geotiff',
+    'itk-wasm',
+    'dicom-parser',
+    '@cornerstonejs/codec-openjpeg',
+    '@niivue/niivue',
+    '@kitware/vtk.js',
+  ];
   expect(named(notices)).toEqual(expect.arrayContaining(parts));
   const tools = ['vite', 'typescript', 'playwright-core', 'wasm-bindgen-cli', 'thiserror-impl', 'gltf', 'vesicle'];
   expect(named(notices).filter((name) => tools.includes(name))).toEqual([]);
@@ -39,7 +48,9 @@ test('packages of the page, of its workers and beside it are listed, and no tool
 test('all include the text of their licence, but for those whose packages have none', () => {
   const blocks = notices.split(/^─+$/m).slice(1);
   expect(blocks.length).toBeGreaterThan(20);
-  const cornerstone = ['core', 'metadata', 'tools', 'utils'].map((name) => `@cornerstonejs/${name}`);
+  const cornerstone = ['codec-libjpeg-turbo-8bit', 'codec-openjpeg', 'core', 'metadata', 'tools', 'utils'].map(
+    (name) => `@cornerstonejs/${name}`,
+  );
   const without = blocks.filter((block) => block.includes('without the text')).flatMap(named);
   expect(without).toEqual([...cornerstone, 'lerc']);
   // Where several licences apply together, none may be left out.

@@ -1,7 +1,7 @@
 /** Small DICOM files for the tests. */
 
 /** A value of an element: text, numbers of 16 bits or doubles, bytes, or the items of a sequence. */
-export type Value = string | number[] | Buffer | Elements[];
+export type Value = string | readonly number[] | Buffer | readonly Elements[];
 
 /** Elements of a data set, by tag `ggggeeee`, with their types. */
 export type Elements = Record<string, readonly [kind: string, value: Value]>;

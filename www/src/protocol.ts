@@ -40,9 +40,21 @@ export type {
 
 export type ParamValues = Record<string, unknown>;
 
+/** What is known of a file that its format cannot hold, since it was written from one of another program. */
+export interface FileNotes {
+  warnings: readonly Warning[];
+  /** What else the other file says, in words. */
+  remarks?: readonly string[];
+  /** Space that positions are to be in; the file's own by default. */
+  space?: 'LPS';
+  /** Whether small intensities are to be shown bright. */
+  inverted?: boolean;
+}
+
 export interface NamedBytes {
   name: string;
   bytes: Uint8Array;
+  notes?: FileNotes;
 }
 
 /** Initial surface of the deformable model. Lengths and positions are in world coordinates. */
@@ -91,6 +103,8 @@ export interface LevelView {
   voxels: Intensities;
   /** Intensities that are displayed as black and as white, until the user chooses others. */
   window: [number, number];
+  /** Whether small intensities are displayed bright instead. */
+  inverted?: boolean;
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
@@ -124,6 +138,8 @@ export interface VolumeView extends LevelView {
   histogram: Uint32Array;
   /** Warnings about the volume. */
   warnings: readonly Warning[];
+  /** What else its file says of it, in words. */
+  remarks?: readonly string[];
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,
    * and the bytes of all.

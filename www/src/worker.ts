@@ -35,7 +35,7 @@ import { Refusal, toFailure } from './worker/refusal';
 import { logged, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, sectionOf, transferOf } from './worker/surface-buffers';
-import { levelsOf, openFrame, viewOf } from './worker/volumes';
+import { displayOf, levelsOf, openFrame, viewOf } from './worker/volumes';
 
 /**
  * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit
@@ -70,6 +70,7 @@ class Session {
   #model: DeformableModel | undefined;
   /** Intensities of the volume that are displayed as black and as white. */
   #window: [number, number] = [0, 1];
+  #inverted = false;
   #planes: Plane[] = [];
   #quantity: VertexQuantity | undefined;
   #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyArrays);
@@ -125,7 +126,7 @@ class Session {
     if ('zarr' in source) return this.#loadLarge(name, source, setup, signal);
     const { volume, frames, unit } = await openFrame(source, frame);
     try {
-      const view: VolumeView = { ...viewOf(volume, name), frames, ...(unit && { unit }) };
+      const view: VolumeView = { ...viewOf(volume, name), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
       const model = saved ? restoredModel(volume, saved) : buildModel(volume, fitting);
       // No checks of a new model: the page starts the run at once, and would not show their result.
@@ -135,6 +136,7 @@ class Session {
       const files = 'files' in source ? source.files.map(({ name }) => ({ name })) : [];
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
+      this.#inverted = view.inverted === true;
       return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
     } catch (error) {
       volume.free();
@@ -296,7 +298,8 @@ class Session {
   }
 
   #pyramid(levels: number): LevelView[] {
-    const views = levelsOf(this.#image(), levels, this.#window);
+    const inverted = this.#inverted && { inverted: true };
+    const views = levelsOf(this.#image(), levels, this.#window).map((view) => ({ ...view, ...inverted }));
     return withTransfer(
       views,
       views.map(({ voxels }) => voxels),

@@ -1,6 +1,5 @@
 /** Worker that edits a surface after a run, and compares it with a reference. */
 import init, { Mesh, Volume } from 'vesicle';
-import { importVolume } from '../importers';
 import { relativeTo } from '../placing';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
@@ -114,7 +113,7 @@ function measure([from, to]: [SurfacePoint, SurfacePoint]): { straight: number; 
 async function readReference(files: NamedBytes[]): Promise<undefined> {
   const [file] = files;
   const isMesh = file && files.length === 1 && /\.(ply|stl|obj|glb)$/i.test(file.name);
-  const read = isMesh ? Mesh.parse(file.bytes) : new Volume((await importVolume(files)) ?? (await readFiles(files)));
+  const read = isMesh ? Mesh.parse(file.bytes) : new Volume(await readFiles(files));
   reference?.free();
   reference = read;
 }

@@ -1,73 +1,114 @@
 /**
- * Imports volume formats that other libraries read (DICOM, TIFF); each library is loaded when the first such file is
- * opened.
+ * Lets files in: those of formats that only other programs read, DICOM and TIFF, are written as files that all labs read,
+ * after the user has chosen the volume if there are several. Nothing of DICOM but voxels, geometry and the description of
+ * the series gets further than this.
  */
-import type { VolumeInit } from 'vesicle';
-import type { NamedBytes } from '../protocol';
+import type { FileNotes } from '../protocol';
 import { text } from '../texts';
-import { Refusal } from '../worker/refusal';
-import type { Segmentation } from './segmentation';
+import { nameOf, setName } from '../ui/folders';
+import { type Chosen, VolumeChoice } from '../ui/volume-choice';
+import { groupFiles } from '../worker/file-groups';
+import { ImportClient } from './client';
+import type { Candidate, Listing } from './protocol';
+import { HEAD, isDicom, isTiff } from './recognise';
 
-/** Number of bytes before the letters DICM at the start of a DICOM file. */
-const PREAMBLE = 128;
+/** Which files a lab opens together: one volume, one with its label map, the frames of one, or any. */
+export type Admission = 'volume' | 'labelled' | 'frames' | 'any';
 
-const hasBytes = (bytes: Uint8Array, at: number, expected: number[]) =>
-  expected.every((byte, k) => bytes[at + k] === byte);
+/** Notes on files that were written here, or came with a session. */
+const notes = new WeakMap<File, FileNotes>();
 
-export function isDicom({ bytes, name }: NamedBytes): boolean {
-  return hasBytes(bytes, PREAMBLE, [0x44, 0x49, 0x43, 0x4d]) || /\.(dcm|dicom)$/i.test(name);
-}
+/** Returns what is known of a file that it does not say itself. */
+export const notesOf = (file: File): FileNotes | undefined => notes.get(file);
 
-/** Whether a file is a TIFF of either byte order; includes BigTIFF with 64-bit offsets. */
-export function isTiff({ bytes }: NamedBytes): boolean {
-  return [42, 43].some(
-    (kind) => hasBytes(bytes, 0, [0x49, 0x49, kind, 0]) || hasBytes(bytes, 0, [0x4d, 0x4d, 0, kind]),
-  );
-}
-
-/** Number of bytes at the start of a DICOM file that contain the class of the object. */
-const META = 1024;
-/** Classes of segmentations by their number after the prefix of all. */
-const SEGMENTATIONS = /1\.2\.840\.10008\.5\.1\.4\.1\.1\.66\.([47])(?![\d.])/;
-
-/** Whether a file is a DICOM segmentation, with segments or with a label map. */
-export function isSegmentation(file: NamedBytes): boolean {
-  return isDicom(file) && SEGMENTATIONS.test(metaOf(file));
-}
-
-const metaOf = ({ bytes }: NamedBytes) => String.fromCharCode(...bytes.subarray(0, META));
-
-/**
- * Reads a DICOM segmentation. Throws a `Refusal` if it cannot be read, or is of the newer class with a label map, which
- * ITK does not read.
- */
-export async function importSegmentation(file: NamedBytes): Promise<Segmentation> {
-  if (SEGMENTATIONS.exec(metaOf(file))?.[1] === '7') throw new Refusal('bad-file', text('files.segmentationClass'));
-  return (await import('./segmentation')).readSegmentation(file);
+/** Returns a file with notes. */
+export function noted(file: File, known: FileNotes | undefined): File {
+  if (known) notes.set(file, known);
+  return file;
 }
 
 /**
- * Reads the volume from the DICOM files among `files`, or else from TIFF files with one slice each or all in one;
- * undefined if no file is DICOM and not all are TIFF. A DICOM segmentation is read if there is no series. Throws a
- * `Refusal` if the files cannot be read or hold a single slice.
+ * Returns the files to open for files of the user; undefined if the user cancels. Files that cannot be read are returned as
+ * they are: opening them says why.
  */
-export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
-  // DICOM folders contain other files as well, and DICOM files without that extension.
-  const dicom = files.filter(isDicom);
-  const series = dicom.filter((file) => !isSegmentation(file));
-  const [first, second] = dicom;
-  if (first && series.length === 0) {
-    if (second) throw new Refusal('bad-file', text('files.manySegmentations', { count: dicom.length }));
-    return (await importSegmentation(first)).init;
+export async function admitted(files: File[], admission: Admission): Promise<File[] | undefined> {
+  if (admission === 'any' || files.length === 0) return files;
+  const foreign = await foreignAmong(files).catch(() => []);
+  if (foreign.length > 0) return imported(files, foreign, admission);
+  return admission === 'volume' ? oneOf(files) : files;
+}
+
+/** Returns the files that are DICOM or, if none is, all if all are TIFF. */
+async function foreignAmong(files: File[]): Promise<File[]> {
+  const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, HEAD).arrayBuffer())));
+  const dicom = files.filter((file, k) => isDicom(heads[k] ?? new Uint8Array(), file.name));
+  return dicom.length > 0 || !heads.every(isTiff) ? dicom : files;
+}
+
+/** Endings of files with volumes, or with the headers of some. */
+const HEADERS = /\.(nii(\.gz)?|nrrd|nhdr|mha|mhd|hdr)$/i;
+
+/** Returns the files of one volume among several; asks which one. Files of other kinds beside it are left out. */
+async function oneOf(files: File[]): Promise<File[] | undefined> {
+  const byName = new Map(files.map((file) => [file.name, file]));
+  const all = groupFiles(files.map(({ name }) => ({ name, bytes: new Uint8Array() })));
+  const groups = all.filter(([first]) => HEADERS.test(first?.name ?? ''));
+  const [only] = groups;
+  if (!only) return files;
+  if (groups.length === 1) return all.length === 1 ? files : only.flatMap(({ name }) => byName.get(name) ?? []);
+  const candidates = groups.map(([first], id) => nativeCandidate(first?.name ?? '', id));
+  const chosen = await new VolumeChoice(text('importing.oneOfFiles')).choose({ candidates, skipped: [] });
+  return chosen && groups[chosen.ids[0] ?? 0]?.flatMap(({ name }) => byName.get(name) ?? []);
+}
+
+function nativeCandidate(name: string, id: number): Candidate {
+  const unknown = {
+    patient: '',
+    modality: '',
+    date: '',
+    unit: '',
+    images: 0,
+    warnings: [],
+    remarks: [],
+    uneven: undefined,
+  };
+  return { id, kind: 'image', name, dims: [0, 0, 0], spacing: [0, 0, 0], frames: 1, ...unknown };
+}
+
+async function imported(files: File[], foreign: File[], admission: Admission): Promise<File[] | undefined> {
+  const choice = new VolumeChoice(text('importing.severalVolumes'));
+  const client = new ImportClient((progress) => choice.progress(progress));
+  try {
+    // Files that are none of a series may be its damaged slices.
+    const listing = await choice.during(client.request('list', { files: foreign.length > 1 ? files : foreign }));
+    if (!listing) return undefined;
+    if (listing.candidates.length === 0) throw new Error(reasonsOf(listing));
+    const chosen = isPlain(listing, admission)
+      ? plain(listing)
+      : await choice.choose(listing, admission === 'labelled');
+    if (!chosen) return undefined;
+    const read = await choice.during(client.request('read', chosen));
+    if (!read) return undefined;
+    const opened = read.map(({ name, bytes, notes }) => noted(new File([bytes as BlobPart], name), notes));
+    setName(opened, nameOf(opened));
+    return opened;
+  } finally {
+    choice.close();
+    client.close();
   }
-  if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
-  if (files.length > 0 && files.every(isTiff))
-    return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
-  return undefined;
 }
 
-/** Returns the imported volume unchanged; throws a `Refusal` if it is a single slice, which has no surface. */
-function rejectSingleSlice(format: string, init: VolumeInit): VolumeInit {
-  if (init.dims[2] > 1) return init;
-  throw new Refusal('bad-file', text('files.singleSlice', { format }));
+/** Whether there is nothing to ask: one volume, and with it at most the labels that belong to it. */
+function isPlain({ candidates }: Listing, admission: Admission): boolean {
+  const images = candidates.filter(({ kind }) => kind === 'image');
+  const labels = candidates.length - images.length;
+  const isOne = candidates.length === 1 || (admission === 'labelled' && images.length === 1 && labels === 1);
+  return isOne && candidates.every(({ uneven }) => uneven === undefined);
+}
+
+const plain = ({ candidates }: Listing): Chosen => ({ ids: candidates.map(({ id }) => id), resample: false });
+
+function reasonsOf({ skipped }: Listing): string {
+  const reasons = [...new Set(skipped.map(({ reason }) => reason))];
+  return text('importing.nothing', { reasons: reasons.slice(0, 4).join('; ') });
 }

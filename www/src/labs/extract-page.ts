@@ -30,7 +30,7 @@ export function extractData(
 }
 
 /** Returns the facts about an open volume. */
-export function factsOf({ name, dims, spacing, range, large, frames }: VolumeView, unit: string): Fact[] {
+export function factsOf({ name, dims, spacing, range, large, frames, remarks = [] }: VolumeView, unit: string): Fact[] {
   const facts: Fact[] = [
     [text('labs.factFile'), name],
     [text('extract.factVoxels'), dims.join(' × ')],
@@ -39,7 +39,7 @@ export function factsOf({ name, dims, spacing, range, large, frames }: VolumeVie
   ];
   if (large) facts.push([text('extract.factLevels'), large.levels.map((level) => level.join(' × ')).join(', ')]);
   if (frames > 1) facts.push([text('labs.frames'), count(frames)]);
-  return facts;
+  return [...facts, ...remarks.map((remark): Fact => [text('labs.factNote'), remark])];
 }
 
 /** Returns the unit of lengths that a volume's file states, or else that of most such files. */

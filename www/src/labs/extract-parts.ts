@@ -74,6 +74,7 @@ export class ExtractParts extends RunParts<Example> {
     super(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
+      admission: 'volume',
       onFolder: (folder) => events.onLarge(folder.name, { zarr: folder }),
       data: extractData(chooser, [frames.element, large.element], events.onExample),
       ownControls: ['iso'],

@@ -2,6 +2,7 @@ import { toFailure } from '../channel';
 import type { Unit } from '../examples';
 import { Finish } from '../finish';
 import type { EditedView } from '../finish/edited-view';
+import type { Admission } from '../importers';
 import type { ExportRequest, ParamSpec, ParamValues } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
@@ -42,6 +43,8 @@ interface PartsOptions<Example extends Listed> {
   drop: string;
   /** Called when a folder is dropped; without it, folders are not accepted. */
   onFolder?: (folder: FileSystemDirectoryHandle) => void;
+  /** Which of the files that are dropped are opened together. */
+  admission: Admission;
   data: ExamplePanel<Example>;
   /** Names of parameters that have controls of their own. */
   ownControls?: string[];
@@ -106,7 +109,7 @@ export abstract class LabParts<Example extends Listed> {
     root: HTMLElement,
     signal: AbortSignal,
     events: LabEvents<Example>,
-    { viewLabel, drop, onFolder, data, ownControls = [], sessionHelp }: PartsOptions<Example>,
+    { viewLabel, drop, onFolder, admission, data, ownControls = [], sessionHelp }: PartsOptions<Example>,
   ) {
     this.root = root;
     this.#signal = signal;
@@ -123,7 +126,7 @@ export abstract class LabParts<Example extends Listed> {
       text('labs.cancel'),
     );
     this.#drop = h('div', { class: 'drop', hidden: true }, drop);
-    acceptDrops(this.#drop, events.onFiles, signal, onFolder);
+    acceptDrops(this.#drop, events.onFiles, signal, { admission, onFolder });
   }
 
   /** Unit of length of the data; empty if unknown. */

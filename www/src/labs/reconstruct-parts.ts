@@ -68,7 +68,8 @@ export class ReconstructParts extends RunParts<CloudExample> {
     super(root, signal, events, {
       viewLabel: text('reconstruct.viewLabel'),
       drop: text('reconstruct.drop'),
-      data: cloudData(fileChooser(events.onFiles, ACCEPT), events.onExample),
+      admission: 'any',
+      data: cloudData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
       history,
       fetchMesh: (request) => client.request('export', request),
       residual: 'residual',

@@ -53,7 +53,8 @@ export class SculptParts extends RunParts<SculptExample> {
     super(root, signal, events, {
       viewLabel: text('sculpt.viewLabel'),
       drop: text('sculpt.drop'),
-      data: sceneData(fileChooser(events.onFiles, ACCEPT), events.onExample),
+      admission: 'any',
+      data: sceneData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
       history,
       fetchMesh: (request) => client.request('export', request),
       residual: 'unrest',

@@ -39,5 +39,6 @@ export function factsOf(
     [text('extract.factVoxels'), volume.dims.join(' × ')],
     [text('labs.factVoxelSize'), lengths(sizes, example?.unit ?? 'mm')],
     [text('segment.factSurfaces'), milliseconds(duration)],
+    ...(volume.remarks ?? []).map((remark): Fact => [text('labs.factNote'), remark]),
   ];
 }

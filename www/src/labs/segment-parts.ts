@@ -51,12 +51,13 @@ export class SegmentParts extends LabParts<SegmentExample> {
 
   constructor(root: HTMLElement, signal: AbortSignal, events: PartEvents) {
     const choosers = [
-      fileChooser(events.onFiles, undefined, text('segment.openVolume')),
+      fileChooser(events.onFiles, undefined, text('segment.openVolume'), 'labelled'),
       fileChooser(events.onMapFiles, undefined, text('segment.openMap')),
     ];
     super(root, signal, events, {
       viewLabel: text('segment.viewLabel'),
       drop: text('segment.drop'),
+      admission: 'labelled',
       data: segmentData(choosers, events.onExample),
       sessionHelp: text('segment.sessionHelp'),
     });

@@ -1,4 +1,5 @@
 import type { Finish } from '../finish';
+import { noted } from '../importers';
 import type { Session, SourceFile } from '../session/file';
 import { isSession } from '../session/recognise';
 import { text } from '../texts';
@@ -131,9 +132,9 @@ export class Sessions {
     this.#waiting = undefined;
     await this.#restore(
       session,
-      found.map(({ name, bytes }) => new File([bytes as BlobPart], name)),
+      found.map(({ name, bytes, notes }) => noted(new File([bytes as BlobPart], name), notes)),
     );
   }
 }
 
-const fileOf = ({ name, content }: SourceFile) => new File([content as BlobPart], name);
+const fileOf = ({ name, content, notes }: SourceFile) => noted(new File([content as BlobPart], name), notes);

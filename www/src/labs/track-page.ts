@@ -43,5 +43,6 @@ export function factsOf({ dims, spacing, volume, openingMs }: OpenedImage, name:
     [text('labs.factVoxelSize'), sizes(spacing, unit)],
     [text('track.factPrepared'), sizes(volume.dims)],
     [text('track.factOpening'), milliseconds(openingMs)],
+    ...(volume.remarks ?? []).map((remark): Fact => [text('labs.factNote'), remark]),
   ];
 }

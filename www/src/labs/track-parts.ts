@@ -76,7 +76,8 @@ export class TrackParts extends RunParts<TrackExample> {
     super(root, signal, events, {
       viewLabel: text('track.viewLabel'),
       drop: text('track.drop'),
-      data: imageData(fileChooser(events.onFiles), events.onExample),
+      admission: 'frames',
+      data: imageData(fileChooser(events.onFiles, undefined, undefined, 'frames'), events.onExample),
       ownControls: ['threshold'],
       history,
       fetchMesh: (request) => client.request('export', { ...request, frame: this.frames.frame }),

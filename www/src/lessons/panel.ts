@@ -43,7 +43,12 @@ export class LessonPanel {
     this.#title.lang = LANGUAGE;
     this.#back.hidden = true;
     const list = h('ul', { class: 'lesson-list' });
-    const chooser = fileChooser((files) => void this.#openFiles(files), '.json,.md,.zip', text('lessons.openFile'));
+    const chooser = fileChooser(
+      (files) => void this.#openFiles(files),
+      '.json,.md,.zip',
+      text('lessons.openFile'),
+      'any',
+    );
     this.#body.replaceChildren(
       h('p', {}, text('lessons.intro')),
       list,

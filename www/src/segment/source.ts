@@ -1,8 +1,7 @@
 /** Opens volumes and label maps. Used by the worker only. */
 
 import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
-import { importSegmentation, importVolume, isDicom, isSegmentation, isTiff } from '../importers';
-import { count, text } from '../texts';
+import { text } from '../texts';
 import { invert, toWorld } from '../view/anatomy';
 import { merged, type Warning } from '../warnings';
 import { groupFiles } from '../worker/file-groups';
@@ -81,39 +80,20 @@ interface NamedVolume {
   isCropped: boolean;
 }
 
-/** Reads the volume and, if the files contain two, the label map. */
+/** Reads the volume and, if the files contain two, the label map; one that names its labels is both. */
 async function readBoth(files: NamedBytes[]): Promise<[NamedVolume, NamedVolume?]> {
-  const segmentations = files.filter(isSegmentation);
-  const [segmentation] = segmentations;
-  if (segmentation) {
-    if (segmentations.length > 1)
-      throw new Refusal('bad-file', text('files.manySegmentations', { count: segmentations.length }));
-    const map = await readMap([segmentation]);
-    const others = files.filter((file) => file !== segmentation);
-    return others.length > 0 ? [await readImage(others), map] : [map, map];
-  }
   const groups = groupFiles(files);
-  if (files.some(isDicom) || files.every(isTiff) || groups.length < 2) return [await readImage(files)];
   if (groups.length > 2) throw new Refusal('bad-file', text('segment.atMostTwo', { count: groups.length }));
-  const [first, second] = (await Promise.all(groups.map(readMap))) as [NamedVolume, NamedVolume];
+  const [first, second] = await Promise.all(groups.map(readMap));
+  if (!first) throw new Refusal('bad-file', text('files.noFile'));
+  if (!second) return first.known.length > 0 ? [first, first] : [first];
   return isMap(first, second) ? [second, first] : [first, second];
-}
-
-async function readImage(files: NamedBytes[]): Promise<NamedVolume> {
-  const init = (await importVolume(files)) ?? (await readFiles(files));
-  return { name: files[0]?.name ?? '', init, known: [], isCropped: false };
 }
 
 /** Reads a label map, or what may be one, with what its file says of the labels. */
 async function readMap(group: NamedBytes[]): Promise<NamedVolume> {
-  const [first] = group;
-  if (first && isSegmentation(first)) {
-    const { init, labels, shared } = await importSegmentation(first);
-    const name = shared > 0 ? text('segment.sharedVoxels', { file: first.name, count: count(shared) }) : first.name;
-    return { name, init, known: labels, isCropped: true };
-  }
   const known = group.flatMap(({ bytes }) => labelsIn(bytes));
-  return { name: first?.name ?? '', init: await readFiles(group), known, isCropped: known.length > 0 };
+  return { name: group[0]?.name ?? '', init: await readFiles(group), known, isCropped: known.length > 0 };
 }
 
 /**

@@ -8,7 +8,7 @@ import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
 import { triangleArea } from '../worker/triangle-area';
-import { fitsNifti, viewOf } from '../worker/volumes';
+import { displayOf, fitsNifti, viewOf } from '../worker/volumes';
 import type {
   LabelArray,
   LabelBlock,
@@ -147,7 +147,7 @@ class Session {
       this.#open?.volume.free();
       this.#open = opened;
       const all = this.#all(live, opened.map, began);
-      const volume = viewOf(opened.volume, name);
+      const volume = { ...viewOf(opened.volume, name), ...displayOf(source) };
       return withTransfer({ ...all, volume, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
         all.voxels,

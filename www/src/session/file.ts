@@ -5,8 +5,9 @@
 import { strFromU8, strToU8, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
 import { LAB_IDS } from '../labs/address';
-import type { NamedBytes } from '../protocol';
+import type { FileNotes, NamedBytes } from '../protocol';
 import { text } from '../texts';
+import { warningsIn } from '../warnings';
 import { decode, encode, type Parts } from './codec';
 import { INDEX, isRecord } from './recognise';
 
@@ -24,6 +25,8 @@ export interface SourceFile {
   /** SHA-256 of its bytes in hexadecimal digits. */
   sha256: string;
   content?: Uint8Array;
+  /** What is known of a file that was written from one of another program. */
+  notes?: FileNotes;
 }
 
 /** A lab as the user left it. */
@@ -51,9 +54,10 @@ export async function sha256(bytes: Uint8Array): Promise<string> {
 /** Describes files of data, with their content if a session is to include it. */
 export function describe(files: NamedBytes[], included: boolean): Promise<SourceFile[]> {
   return Promise.all(
-    files.map(async ({ name, bytes }) => ({
+    files.map(async ({ name, bytes, notes }) => ({
       ...{ name, size: bytes.length, sha256: await sha256(bytes) },
       ...(included && { content: bytes }),
+      ...(notes && { notes }),
     })),
   );
 }
@@ -125,12 +129,24 @@ function indexOf(json: string): { version?: unknown; parts?: Record<string, stri
 
 /** Checks what all labs need of a session, and returns it. */
 function checked({ format: _, lab, hash, source, ...content }: Record<string, unknown>): Session {
-  const known = LAB_IDS.find((id) => id === lab);
-  if (!known) throw new Error(text('sessions.otherLab', { lab: String(lab) }));
+  const of = LAB_IDS.find((id) => id === lab);
+  if (!of) throw new Error(text('sessions.otherLab', { lab: String(lab) }));
   const { name, example, files } = isRecord(source) ? source : {};
   const isSound = typeof hash === 'string' && typeof name === 'string' && Array.isArray(files) && files.every(isFile);
   if (!isSound) throw new Error(text('sessions.badIndex'));
-  return { lab: known, hash, source: { name, files, ...(typeof example === 'string' && { example }) }, content };
+  const known = files.map((file: SourceFile) => ({ ...file, ...notesIn(file.notes) }));
+  return { lab: of, hash, source: { name, files: known, ...(typeof example === 'string' && { example }) }, content };
+}
+
+/** Returns the notes on a file that are sound. */
+function notesIn(value: unknown): { notes?: FileNotes } {
+  if (!isRecord(value)) return {};
+  const { warnings, remarks, space, inverted } = value;
+  const texts = Array.isArray(remarks) ? remarks.filter((one) => typeof one === 'string') : [];
+  const isLps = space === 'LPS' && { space: 'LPS' as const };
+  return {
+    notes: { warnings: warningsIn(warnings), remarks: texts, ...isLps, ...(inverted === true && { inverted }) },
+  };
 }
 
 function isFile(value: unknown): value is SourceFile {
@@ -146,9 +162,9 @@ function isFile(value: unknown): value is SourceFile {
  */
 export async function matching(wanted: readonly SourceFile[], files: NamedBytes[]): Promise<NamedBytes[]> {
   const sums = await Promise.all(files.map(({ bytes }) => sha256(bytes)));
-  return wanted.map(({ name, sha256 }) => {
+  return wanted.map(({ name, sha256, notes }) => {
     const file = files[sums.indexOf(sha256)];
-    if (file) return { name, bytes: file.bytes };
+    if (file) return { name, bytes: file.bytes, ...(notes && { notes }) };
     const other = files.some((one) => one.name === name);
     throw new Error(text(other ? 'sessions.otherContent' : 'sessions.wanted', { name }));
   });

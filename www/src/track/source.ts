@@ -1,7 +1,6 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, Volume } from 'vesicle';
-import { importVolume } from '../importers';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -25,8 +24,7 @@ export async function openImage(source: ImageSource): Promise<Volume> {
       frameSeconds: CINE_SECONDS,
     });
   }
-  const foreign = await importVolume(source.files);
-  return foreign ? new Volume(foreign) : fromParts(groupFiles(source.files));
+  return fromParts(groupFiles(source.files));
 }
 
 async function fromParts(parts: NamedBytes[][]): Promise<Volume> {

@@ -8,7 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
-import { viewOf } from '../worker/volumes';
+import { displayOf, viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
 import { trackForComparison } from './comparing';
@@ -46,6 +46,8 @@ interface LoadedImage {
   spec: CineSpec | undefined;
   preparedVolume: Volume;
   preparation: Preparation;
+  /** How notes on the files change the display. */
+  display: ReturnType<typeof displayOf>;
 }
 
 class Session {
@@ -101,7 +103,8 @@ class Session {
       const { dims, spacing } = original;
       this.#freeImage();
       const files = 'files' in source ? source.files.map((file) => ({ name: file.name })) : [];
-      this.#loaded = { name, files, original, spec, preparedVolume: made, preparation: setup.preparation };
+      const { preparation } = setup;
+      this.#loaded = { name, files, original, spec, preparedVolume: made, preparation, display: displayOf(source) };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
       return withTransfer({ ...ready, volume, dims, spacing, truth, openingMs: took }, [volume.voxels]);
@@ -160,8 +163,8 @@ class Session {
   }
 
   #view(): VolumeView {
-    const { name, preparedVolume } = this.#image();
-    return viewOf(preparedVolume, name, preparedVolume.frames);
+    const { name, preparedVolume, display } = this.#image();
+    return { ...viewOf(preparedVolume, name, preparedVolume.frames), ...display };
   }
 
   #image(): LoadedImage {

@@ -1,7 +1,8 @@
+import { type Admission, admitted, notesOf } from '../importers';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
-import { type Dropped, largestSeries, readFolders } from './folders';
+import { type Dropped, readFolders } from './folders';
 
 export { nameOf } from './folders';
 
@@ -16,6 +17,7 @@ export function fileChooser(
   onFiles: (files: File[]) => void,
   accept = VOLUME_FILES,
   label = text('controls.openFile'),
+  admission: Admission = 'volume',
 ): HTMLElement {
   const id = uniqueId('file');
   const input = h('input', { type: 'file', id, multiple: true, accept: `${accept},.zip`, class: 'visually-hidden' });
@@ -23,21 +25,28 @@ export function fileChooser(
     const files = [...(input.files ?? [])];
     // Makes choosing the same file again a change.
     input.value = '';
-    if (files.length > 0) void largestSeriesOrAll(files).then(onFiles);
+    if (files.length > 0) void letIn(files, admission).then((opened) => opened && onFiles(opened));
   });
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
 }
 
+/** What is done with files that are dropped. */
+interface DropOptions {
+  admission?: Admission;
+  /** Takes a folder that is an OME-Zarr image. */
+  onFolder?: ((folder: FileSystemDirectoryHandle) => void) | undefined;
+}
+
 /**
  * Accepts files dropped anywhere on the page, until `signal` is aborted, and shows `overlay` while files are dragged
- * over the page or folders are read. All files in a folder are passed on, or of a DICOM series only those; a folder that
- * is an OME-Zarr image is passed to `onFolder`, if given, in browsers that have handles of folders.
+ * over the page or folders are read. All files in a folder are passed on, or of other programs' formats the volume that the
+ * user chooses; a folder that is an OME-Zarr image is passed to `onFolder`, if given, in browsers that have handles of folders.
  */
 export function acceptDrops(
   overlay: HTMLElement,
   onFiles: (files: File[]) => void,
   signal: AbortSignal,
-  onFolder?: (folder: FileSystemDirectoryHandle) => void,
+  { admission = 'volume', onFolder }: DropOptions = {},
 ): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   window.addEventListener(
@@ -61,11 +70,11 @@ export function acceptDrops(
     const drop = ++drops;
     // If a folder cannot be read, opening it as a file gives the error message.
     const dropped = (await folders?.catch(() => undefined)) ?? { files };
-    const chosen = 'zarr' in dropped ? dropped : { files: await largestSeriesOrAll(dropped.files) };
     if (drop !== drops || signal.aborted) return;
     overlay.hidden = true;
-    if ('files' in chosen) onFiles(chosen.files);
-    else onFolder?.(chosen.zarr);
+    if ('zarr' in dropped) return onFolder?.(dropped.zarr);
+    const opened = await letIn(dropped.files, admission);
+    if (drop === drops && !signal.aborted && opened) onFiles(opened);
   };
   window.addEventListener(
     'drop',
@@ -96,11 +105,29 @@ export function acceptDropsOn(element: HTMLElement, onDrop: (data: DataTransfer 
     });
 }
 
-/** Returns the files to open; all if some cannot be read, of which opening them then says why. */
-const largestSeriesOrAll = (files: File[]) => largestSeries(files).catch(() => files);
+/** Files that could not be let in, and why: opening them says it. */
+const refused = new WeakMap<readonly File[], Error>();
 
+/** Returns the files to open; undefined if the user cancels. */
+async function letIn(files: File[], admission: Admission): Promise<File[] | undefined> {
+  try {
+    return await admitted(files, admission);
+  } catch (error) {
+    refused.set(files, error as Error);
+    return files;
+  }
+}
+
+/** Reads files whole; throws why they were not let in, if so. */
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {
-  return Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
+  const reason = refused.get(files);
+  if (reason) throw reason;
+  return Promise.all(files.map(readFile));
+}
+
+async function readFile(file: File): Promise<NamedBytes> {
+  const notes = notesOf(file);
+  return { name: file.name, bytes: new Uint8Array(await file.arrayBuffer()), ...(notes && { notes }) };
 }
 
 /** Downloads bytes as a file with the given name and media type. */

@@ -1,10 +1,5 @@
-import { isDicom, isSegmentation } from '../importers';
-import { seriesOf } from '../importers/dicom-header';
-import type { NamedBytes } from '../protocol';
-import { plural, text } from '../texts';
+import { text } from '../texts';
 
-/** Number of bytes at the start of a DICOM file that are searched for its series. */
-const HEAD = 2 ** 16;
 /** Files at the top of an OME-Zarr image, of the versions of the format. */
 const ZARR = ['zarr.json', '.zattrs', '.zgroup', '.zarray'];
 
@@ -18,6 +13,11 @@ export function nameOf(files: readonly File[]): string {
   const [first, second] = files.map(({ name }) => name);
   if (files.length === 2) return text('controls.twoFiles', { first: first ?? '', second: second ?? '' });
   return files.length > 1 ? text('controls.moreFiles', { first: first ?? '', more: files.length - 1 }) : (first ?? '');
+}
+
+/** Gives a set of files a name for display. */
+export function setName(files: readonly File[], name: string): void {
+  titles.set(files, name);
 }
 
 /** A dropped folder: an OME-Zarr image, as a handle of the folder, or any other, as the files in it. */
@@ -67,37 +67,4 @@ async function entriesOf(folder: FileSystemDirectoryEntry): Promise<FileSystemEn
     if (some.length === 0) return all;
     all.push(...some);
   }
-}
-
-/**
- * Returns the files of the largest DICOM series among `files`, and all segmentations; other files are left out, unless
- * none is DICOM. The name of the returned files says which series was chosen.
- */
-export async function largestSeries(files: File[]): Promise<File[]> {
-  if (files.length < 2) return files;
-  const segmentations: File[] = [];
-  const series = new Map<string, { description: string; files: File[] }>();
-  // One after another: the heads of all files of a large folder may not fit into memory.
-  for (const file of files) {
-    const head = await headOf(file);
-    if (isSegmentation(head)) segmentations.push(file);
-    else if (!isDicom(head)) continue;
-    if (segmentations.at(-1) === file) continue;
-    const { uid, description } = seriesOf(head.bytes);
-    const one = series.get(uid) ?? { description, files: [] };
-    series.set(uid, one);
-    one.files.push(file);
-  }
-  const [largest, second] = [...series.values()].sort((a, b) => b.files.length - a.files.length);
-  if (!largest) return files;
-  const chosen = [...largest.files, ...segmentations];
-  const name = titles.get(files) ?? nameOf(largest.files);
-  const description = largest.description || nameOf(largest.files);
-  if (second) titles.set(chosen, plural('files.seriesChosen', series.size, { name, description }));
-  else titles.set(chosen, titles.get(files) ?? nameOf(chosen));
-  return chosen;
-}
-
-async function headOf(file: File): Promise<NamedBytes> {
-  return { name: file.name, bytes: new Uint8Array(await file.slice(0, HEAD).arrayBuffer()) };
 }

@@ -34,7 +34,8 @@ export function paintSlice(
     let source = index * strides[orientation.axis] + row + first;
     for (let i = 0; i < width; i++) {
       // The array of pixels rounds and clamps.
-      const grey = ((volume.voxels[source] ?? 0) - low) * scale;
+      const value = ((volume.voxels[source] ?? 0) - low) * scale;
+      const grey = volume.inverted ? 255 - value : value;
       out[target++] = grey;
       out[target++] = grey;
       out[target++] = grey;

@@ -1,8 +1,7 @@
 /** Opens volumes in the app's workers, and reduces them to the data that the page displays. */
 import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle';
 import startReaders, { parseVolume } from 'vesicle/import';
-import { importVolume } from '../importers';
-import type { Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
+import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
@@ -42,11 +41,23 @@ export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   await startReaders();
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
-  if (!second) return parseFile(first);
+  if (!second) return withNotes(parseFile(first), first.notes);
   if (files.length > 2) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
   return parseVolume(header.bytes, { data: data.bytes });
 }
+
+/** Returns a volume with what its file could not hold. */
+function withNotes(init: VolumeInit, notes: FileNotes | undefined): VolumeInit {
+  if (!notes) return init;
+  const { warnings = [], affine, ...rest } = init;
+  const isTurned = notes.space === 'LPS' && init.space === 'RAS' && affine !== undefined;
+  const turned = isTurned && { affine: Array.from(affine, turnedAbout), space: 'LPS' as const };
+  return { ...rest, ...(affine && { affine }), ...turned, warnings: [...warnings, ...notes.warnings] };
+}
+
+/** Returns an entry of a transform to RAS as that of the one to LPS: x and y change their signs. */
+const turnedAbout = (entry: number, k: number) => (k % 4 < 2 ? -entry : entry);
 
 /** One frame of a volume, the number of all its frames, and the unit of length that its file states. */
 export interface OpenFrame {
@@ -77,7 +88,7 @@ function withoutFrame({ code, text, where }: Warning): Warning {
 
 async function read(source: VolumeSource): Promise<VolumeInit> {
   if ('shape' in source) return shapeVoxels(source.shape);
-  return (await importVolume(source.files)) ?? readFiles(source.files);
+  return readFiles(source.files);
 }
 
 /** A volume as a file, with the extension of its format. */
@@ -100,6 +111,14 @@ export function fileOf(volume: Volume): VolumeBytes {
   return fitsNifti(volume)
     ? { extension: 'nii', bytes: volume.toNifti() }
     : { extension: 'nrrd', bytes: toNrrd(volume) };
+}
+
+/** Returns how the notes on a source's files change its display. */
+export function displayOf(source: object): Pick<VolumeView, 'inverted' | 'remarks'> {
+  const { files = [] } = source as { files?: readonly NamedBytes[] };
+  const remarks = files.flatMap(({ notes }) => notes?.remarks ?? []);
+  const inverted = files.some(({ notes }) => notes?.inverted);
+  return { ...(inverted && { inverted }), ...(remarks.length > 0 && { remarks }) };
 }
 
 /** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */

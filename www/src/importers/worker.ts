@@ -1,0 +1,142 @@
+/** Worker that reads formats of other programs (DICOM, TIFF) and writes them as files that all labs read. */
+import init, { Volume, type VolumeInit } from 'vesicle';
+import { type DicomVolume, openDicom } from 'vesicle/dicom';
+import type { FileNotes, NamedBytes, Vec3 } from '../protocol';
+import { type Label, newLabel } from '../segment/labels';
+import { withLabels } from '../segment/slicer';
+import { text } from '../texts';
+import { Refusal } from '../worker/refusal';
+import { reply, withTransfer } from '../worker/serving';
+import type { Candidate, Listing, ProgressEvent, Requests } from './protocol';
+import { HEAD, isTiff } from './recognise';
+import { readStack } from './tiff';
+
+/** A volume of the last list: how the page shows it, and how it is read. */
+interface Listed {
+  candidate: Omit<Candidate, 'id'>;
+  read: (resample: boolean) => Promise<NamedBytes>;
+}
+
+let listed: Listed[] = [];
+
+const decoders = new URL('./dicom', pageAddress());
+
+/** Returns the address of the page: the worker's own file is in a subfolder of the built page. */
+function pageAddress(): string {
+  return new URL(import.meta.env.DEV ? import.meta.env.BASE_URL : '../', self.location.href).href;
+}
+
+const tell =
+  (stage: ProgressEvent['stage']) =>
+  ({ done, total }: { done: number; total: number }) =>
+    self.postMessage({ event: 'progress', stage, done, total } satisfies ProgressEvent);
+
+async function list({ files }: { files: File[] }): Promise<Listing> {
+  const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, HEAD).arrayBuffer())));
+  const { candidates, skipped } = heads.every(isTiff) ? await listTiff(files) : await listDicom(files);
+  listed = candidates;
+  return { candidates: listed.map(({ candidate }, id) => ({ ...candidate, id })), skipped };
+}
+
+async function listTiff(files: File[]): Promise<Found> {
+  const bytes = await Promise.all(
+    files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })),
+  );
+  const volume = await readStack(bytes);
+  const [nx, ny, nz, frames = 1] = volume.dims;
+  if (nz === 1) throw new Refusal('bad-file', text('files.singleSlice', { format: 'TIFF' }));
+  const known = {
+    kind: 'image',
+    patient: '',
+    modality: '',
+    date: '',
+    unit: '',
+    uneven: undefined,
+    warnings: [],
+    remarks: [],
+  } as const;
+  const name = files[0]?.name.replace(/\.(ome\.)?tiff?$/i, '') ?? '';
+  const candidate = {
+    ...known,
+    warnings: [],
+    remarks: [],
+    name,
+    dims: [nx, ny, nz] as Vec3,
+    spacing: [1, 1, 1] as Vec3,
+    frames,
+    images: nz,
+  };
+  return { candidates: [{ candidate, read: async () => written(name, volume, {}) }], skipped: [] };
+}
+
+interface Found {
+  candidates: Listed[];
+  skipped: Listing['skipped'];
+}
+
+async function listDicom(files: File[]): Promise<Found> {
+  const { volumes, skipped } = await openDicom(files, { onProgress: tell('headers') });
+  return {
+    candidates: volumes.map((volume) => ({
+      candidate: dicomCandidate(volume),
+      read: (resample) => readDicom(volume, resample),
+    })),
+    skipped: skipped.map(({ name, reason }) => ({ name, reason })),
+  };
+}
+
+function dicomCandidate(volume: DicomVolume): Omit<Candidate, 'id'> {
+  const { kind, name, patient, modality, date, dims, spacing, frames, images, remarks, uneven } = volume;
+  const known = { kind, name, patient, modality, date, dims, spacing, frames, images, uneven };
+  return { ...known, unit: 'mm', warnings: volume.warnings.map(({ text }) => text), remarks: [...remarks] };
+}
+
+async function readDicom(volume: DicomVolume, resample: boolean): Promise<NamedBytes> {
+  const uneven = resample ? 'resample' : 'refuse';
+  const init = await volume.read({ uneven, decoders, onProgress: tell('images') });
+  const { name, inverted, remarks, segments } = volume;
+  const notes = { remarks: [...remarks], ...(inverted && { inverted }) };
+  if (volume.kind === 'image') return written(name, init, notes);
+  const labels = segments.map(({ value, ...known }) => newLabel(value, known));
+  return written(name, init, notes, labels);
+}
+
+async function read({ ids, resample }: Requests['read']['body']): Promise<NamedBytes[]> {
+  await init();
+  const files: NamedBytes[] = [];
+  for (const id of ids) {
+    const volume = listed[id];
+    if (!volume) throw new Refusal('page', text('importing.noVolume'));
+    files.push(await volume.read(resample));
+  }
+  return withTransfer(
+    files,
+    files.map(({ bytes }) => bytes),
+  );
+}
+
+/** Returns a volume as a file: labels as NRRD with their names and colours, intensities as NIfTI. */
+function written(name: string, init: VolumeInit, known: Omit<FileNotes, 'warnings'>, labels?: Label[]): NamedBytes {
+  const { warnings = [], ...voxels } = init;
+  const volume = new Volume(voxels);
+  try {
+    const stem =
+      name
+        .replace(/[\\/:*?"<>|\p{Cc}]+/gu, ' ')
+        .trim()
+        .slice(0, 80) || 'volume';
+    const notes: FileNotes = { ...known, warnings };
+    if (labels)
+      return { name: `${stem}.seg.nrrd`, bytes: withLabels(volume.toBytes('nrrd'), labels, volume.dims), notes };
+    // NIfTI is always in RAS.
+    return {
+      name: `${stem}.nii`,
+      bytes: volume.toNifti(),
+      notes: { ...notes, ...(init.space === 'LPS' && { space: 'LPS' }) },
+    };
+  } finally {
+    volume.free();
+  }
+}
+
+self.onmessage = ({ data }) => void reply({ list, read }, data);
