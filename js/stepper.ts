@@ -94,7 +94,7 @@ const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
  * Yields to the event loop by posting a message to itself, which is faster than a timer, since browsers throttle
  * timers.
  */
-class EventLoopYield {
+export class EventLoopYield {
   readonly #channel = new MessageChannel();
 
   wait(): Promise<void> {

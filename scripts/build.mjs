@@ -47,7 +47,10 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
 /** Packages that an entry point imports when it is used. */
-const OPTIONAL_PEERS = ['zarrita', '@zarrita/storage'];
+const OPTIONAL_PEERS = ['zarrita', '@zarrita/storage', 'geotiff'];
+
+/** Folders of `js` that are an entry point each, for files that other packages help to read. */
+const FORMATS = ['tiff', 'zarr'];
 
 /**
  * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same
@@ -156,6 +159,8 @@ const entry = (part) => [
   file(`${part}/vesicle_bg`),
 ];
 
+const format = (name) => [`./${name}`, { types: `./${name}/index.d.ts`, default: `./${name}/index.js` }];
+
 async function manifest(modules) {
   const { description, license, version, engines, devDependencies } = JSON.parse(
     await readFile(at('package.json'), 'utf8'),
@@ -169,7 +174,7 @@ async function manifest(modules) {
     type: 'module',
     sideEffects: ['./worker-host.js', './element.js'],
     engines,
-    // For `vesicle/zarr` only.
+    // For `FORMATS` only.
     peerDependencies: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, `^${devDependencies[name]}`])),
     peerDependenciesMeta: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, { optional: true }])),
     main: './index.js',
@@ -181,7 +186,7 @@ async function manifest(modules) {
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
-      './zarr': { types: './zarr/index.d.ts', default: './zarr/index.js' },
+      ...Object.fromEntries(FORMATS.map(format)),
       './element': { types: './element/index.d.ts', default: './element.js' },
       ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(({ name }) => file(name))),
       './package.json': './package.json',

@@ -1,0 +1,60 @@
+// The description of a stack by ImageJ.
+import { positive, type Stated, secondsIn } from './lengths.js';
+
+/** A stack as its description says. */
+export interface ImageJ {
+  sizes: { Z: number; C: number; T: number };
+  /** Number of images; undefined if it is not stated. */
+  images: number | undefined;
+  /** Units along x, y and z; undefined if none is stated. */
+  units: [string, string, string] | undefined;
+  /** Distance of the slices. */
+  between: Stated;
+  frameSeconds: number | undefined;
+  /** Intensity of a stored value: value * slope + intercept. */
+  calibration: { slope: number; intercept: number } | undefined;
+  /** What was found and is not used. */
+  unused: string[];
+}
+
+/** Returns whether a text is the description of a stack by ImageJ, or by SCIFIO, which has the same lines. */
+export const isImageJ = (text: string): boolean => /^(ImageJ|SCIFIO)=/.test(text);
+
+/** Parses the description of a stack by ImageJ. */
+export function parseImageJ(text: string): ImageJ {
+  const lines = new Map<string, string>();
+  for (const line of text.split(/\r?\n/)) {
+    const equals = line.indexOf('=');
+    if (equals > 0 && !lines.has(line.slice(0, equals)))
+      lines.set(line.slice(0, equals), line.slice(equals + 1).trim());
+  }
+  const size = (name: string) => Math.max(1, Math.floor(positive(lines.get(name)) ?? 1));
+  const sizes = { Z: size('slices'), C: size('channels'), T: size('frames') };
+  const images = lines.has('images') ? size('images') : undefined;
+  // ImageJ leaves slices out of a stack that is not a hyperstack.
+  if (images && !lines.has('slices')) sizes.Z = Math.max(1, Math.floor(images / (sizes.C * sizes.T)));
+  const unit = lines.get('unit');
+  const units =
+    unit === undefined ? undefined : ([unit, lines.get('yunit') ?? unit, lines.get('zunit') ?? unit] as const);
+  // Distances below 0 only reverse the display in ImageJ.
+  const between = { size: positive(lines.get('spacing')?.replace(/^-/, '')), unit: units?.[2] ?? '' };
+  return { sizes, images, units: units && [...units], between, ...timesIn(lines), ...calibrationIn(lines) };
+}
+
+function timesIn(lines: Map<string, string>): Pick<ImageJ, 'frameSeconds'> {
+  const seconds = secondsIn(lines.get('tunit') ?? 'sec');
+  const interval = positive(lines.get('finterval'));
+  return { frameSeconds: interval && seconds && interval * seconds };
+}
+
+/** Number of ImageJ's function of a straight line, and of those that do nothing. */
+const [LINE, NONE] = ['0', ['', '20', '22']];
+
+function calibrationIn(lines: Map<string, string>): Pick<ImageJ, 'calibration' | 'unused'> {
+  const kind = lines.get('cf') ?? '';
+  if (NONE.includes(kind)) return { calibration: undefined, unused: [] };
+  const [intercept, slope] = [Number(lines.get('c0') ?? Number.NaN), Number(lines.get('c1') ?? Number.NaN)];
+  const isLine = kind === LINE && Number.isFinite(intercept) && Number.isFinite(slope) && slope !== 0;
+  const unused = ['the calibration of intensities is not a straight line: stored values are given'];
+  return isLine ? { calibration: { slope, intercept }, unused: [] } : { calibration: undefined, unused };
+}

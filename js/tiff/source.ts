@@ -1,0 +1,69 @@
+// Files by name, of which parts are read.
+import { invalid } from '../check.js';
+import { badTiff } from './error.js';
+
+/** A TIFF file: a `File` or `Blob`, of which only parts are read at a time, or its name and content. */
+export type TiffFile = Blob | { name: string; bytes: Uint8Array };
+
+/** Number of bytes that are read together around small values. */
+const WINDOW = 16384;
+
+/** The content of a file. */
+export class Source {
+  readonly name: string;
+  readonly size: number;
+  readonly #content: Blob | Uint8Array;
+  #window = { at: 0, bytes: new Uint8Array() };
+
+  constructor(name: string, content: Blob | Uint8Array) {
+    this.name = name;
+    this.size = content instanceof Uint8Array ? content.byteLength : content.size;
+    this.#content = content;
+  }
+
+  /** Throws `bad-file` unless the file has the bytes from `at`, included, to `at + length`, excluded. */
+  check(at: number, length: number): void {
+    if (at + length <= this.size) return;
+    throw badTiff(this.name, `truncated: bytes ${at} to ${at + length} are needed, the file has ${this.size}`);
+  }
+
+  /** Returns a copy of some bytes. */
+  async read(at: number, length: number): Promise<Uint8Array<ArrayBuffer>> {
+    this.check(at, length);
+    if (this.#content instanceof Uint8Array) return Uint8Array.from(this.#content.subarray(at, at + length));
+    try {
+      return new Uint8Array(await this.#content.slice(at, at + length).arrayBuffer());
+    } catch (error) {
+      throw badTiff(this.name, `cannot be read: ${error instanceof Error ? error.message : error}`);
+    }
+  }
+
+  /** Returns a few bytes, which must not be changed; those around them are kept for the next call. */
+  async peek(at: number, length: number): Promise<Uint8Array> {
+    this.check(at, length);
+    const { at: start, bytes } = this.#window;
+    if (at < start || at + length > start + bytes.length) {
+      const more = Math.min(Math.max(length, WINDOW), this.size - at);
+      this.#window = { at, bytes: await this.read(at, more) };
+    }
+    const from = at - this.#window.at;
+    return this.#window.bytes.subarray(from, from + length);
+  }
+}
+
+/** Returns the sources of one or several files, in the order of the numbers in their names. */
+export function sourcesOf(files: unknown): Source[] {
+  const isOne = files instanceof Blob || 'bytes' in Object(files);
+  const list = isOne ? [files] : Array.from(Object(files) as ArrayLike<unknown>);
+  if (list.length === 0) throw invalid('files', 'must be one or several TIFF files');
+  const sources = list.map((file, k) => sourceOf(file, isOne ? 'files' : `files[${k}]`));
+  return sources.sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
+}
+
+function sourceOf(file: unknown, parameter: string): Source {
+  const { name = 'file', bytes } = Object(file) as { name?: unknown; bytes?: unknown };
+  const content = file instanceof Blob ? file : bytes;
+  if (typeof name === 'string' && (content instanceof Blob || content instanceof Uint8Array))
+    return new Source(name, content);
+  throw invalid(parameter, 'must be a File, a Blob, or { name, bytes } with a Uint8Array');
+}
