@@ -2,10 +2,13 @@
 import { type Page, TAG } from './directory.js';
 import { badTiff, importGeotiff } from './error.js';
 import type { Compression } from './format.js';
-import { jpegSize, zstandardBound } from './frames.js';
+import { jpegSize, zstandardFrame } from './frames.js';
 import { lzw } from './lzw.js';
 
 type Bytes = Uint8Array<ArrayBuffer>;
+
+/** Most bytes in a block of Zstandard: the decoder does not notice when its memory is full. */
+const LARGEST_ZSTANDARD = 2 ** 29;
 
 /** Size of what a block holds. */
 export interface BlockSize {
@@ -65,9 +68,11 @@ export class Decompressor {
   }
 
   async #zstandard(stored: Bytes, { bytes }: BlockSize): Promise<Bytes> {
-    // Blocks of a frame may decode to 128 KiB each.
-    if (zstandardBound(stored) > 4 * bytes + 2 ** 26) throw this.#damaged();
-    return this.#byGeotiff(50000, stored, {});
+    if (bytes > LARGEST_ZSTANDARD)
+      throw badTiff(this.#page.label, `${bytes} bytes in one block of Zstandard are too many`);
+    const frame = zstandardFrame(stored, bytes);
+    if (!frame) throw this.#damaged();
+    return this.#byGeotiff(50000, frame, {});
   }
 
   async #byGeotiff(number: number, stored: Bytes, more: object): Promise<Bytes> {

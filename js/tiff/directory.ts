@@ -104,13 +104,21 @@ export class Page {
   readonly isLittle: boolean;
   /** Name for messages: that of the file, and the number of the page from 1. */
   readonly label: string;
+  readonly #at: number;
   readonly #fields: Map<number, Field>;
 
-  constructor(source: Source, index: number, isLittle: boolean, fields: Map<number, Field>) {
+  constructor(source: Source, index: number, at: number, isLittle: boolean, fields: Map<number, Field>) {
     this.source = source;
+    this.#at = at;
     this.isLittle = isLittle;
     this.label = `${source.name}: page ${index + 1}`;
     this.#fields = fields;
+  }
+
+  /** Returns whether the directory, or a value of a tag, begins in a part of the file. */
+  isWithin(start: number, end: number): boolean {
+    const offsets = [this.#at, ...Array.from(this.#fields.values(), ({ value }) => value)];
+    return offsets.some((at) => typeof at === 'number' && at >= start && at < end);
   }
 
   has(tag: number): boolean {
@@ -189,7 +197,7 @@ export async function readPages(source: Source, pause: Pause): Promise<Page[]> {
     // Directories that overlap could be as many as bytes.
     bytes += length;
     if (bytes > source.size) throw badTiff(source.name, 'the directories of its pages overlap');
-    pages.push(new Page(source, pages.length, order.isLittle, fields));
+    pages.push(new Page(source, pages.length, at, order.isLittle, fields));
     at = next;
     await pause.turn();
   }

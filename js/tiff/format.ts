@@ -127,9 +127,11 @@ async function sampleType(page: Page): Promise<SampleType> {
   const kind = FORMATS[format];
   if (format === 5 || format === 6) throw badTiff(page.label, 'complex numbers are not supported');
   if (formats.size > 1 || !kind) throw badTiff(page.label, `unsupported SampleFormat ${[...formats].join(', ')}`);
-  const isKnown = kind === 'float' ? [16, 32, 64].includes(bits) : (bits >= 1 && bits <= 32) || bits === 64;
-  if (isKnown) return { kind, bits };
-  const known = kind === 'float' ? 'floats of 16, 32 and 64 bits' : 'integers of 1 to 32 and of 64 bits';
+  // Readers disagree about the order of three bytes.
+  const isInteger = (bits >= 1 && bits <= 32 && bits !== 24) || bits === 64;
+  if (kind === 'float' ? [16, 32, 64].includes(bits) : isInteger) return { kind, bits };
+  const known =
+    kind === 'float' ? 'floats of 16, 32 and 64 bits' : 'integers of 1 to 32 bits, but for 24, and of 64 bits';
   throw badTiff(page.label, `BitsPerSample is ${bits}; ${known} are read`);
 }
 

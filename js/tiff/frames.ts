@@ -20,29 +20,56 @@ export function jpegSize(
   return found.length === 1 ? found[0] : undefined;
 }
 
-/** Largest number of bytes that a compressed block of Zstandard stands for. */
-const ZSTANDARD_BLOCK = 2 ** 17;
+/** Number at the start of a frame of Zstandard. */
+const MAGIC = 0xfd2fb528;
 
-/** Returns the most bytes that frames of Zstandard can decode to; Infinity if they are damaged. */
-export function zstandardBound(bytes: Uint8Array): number {
+/** Bytes that a frame may have beyond those that are needed. */
+const SURPLUS = 2 ** 20;
+
+/**
+ * Returns the first frame of Zstandard, with `size` as the size of its content if it states none; undefined if it is
+ * damaged, or states a size that does not fit. The decoder of geotiff 3.0 does not end on damaged frames without a size, and needs
+ * frames without surplus bytes.
+ */
+export function zstandardFrame(bytes: Uint8Array, size: number): Uint8Array<ArrayBuffer> | undefined {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  let bound = 0;
-  for (let at = 0; at < bytes.length; ) {
-    // Surplus bytes after a frame.
-    if (at + 5 > bytes.length || view.getUint32(at, true) !== 0xfd2fb528) return at > 0 ? bound : Infinity;
-    const flags = view.getUint8(at + 4);
-    const isSingle = (flags & 32) !== 0;
-    const sizeBytes = [isSingle ? 1 : 0, 2, 4, 8][flags >> 6] ?? 0;
-    at += 5 + (isSingle ? 0 : 1) + ([0, 1, 2, 4][flags & 3] ?? 0) + sizeBytes;
-    for (let last = false; !last; ) {
-      if (at + 3 > bytes.length) return Infinity;
-      const head = view.getUint16(at, true) + (view.getUint8(at + 2) << 16);
-      const [kind, size] = [(head >> 1) & 3, head >> 3];
-      bound += kind === 2 ? ZSTANDARD_BLOCK : size;
-      at += 3 + (kind === 1 ? 1 : size);
-      last = (head & 1) === 1;
-    }
-    if ((flags & 4) !== 0) at += 4;
+  if (bytes.length < 6 || view.getUint32(0, true) !== MAGIC) return undefined;
+  const flags = view.getUint8(4);
+  const isSingle = (flags & 32) !== 0;
+  const sizeBytes = [isSingle ? 1 : 0, 2, 4, 8][flags >> 6] ?? 0;
+  const fixed = 5 + (isSingle ? 0 : 1) + ([0, 1, 2, 4][flags & 3] ?? 0);
+  const end = endOfBlocks(view, fixed + sizeBytes, (flags & 4) !== 0);
+  if (end === undefined) return undefined;
+  if (sizeBytes > 0) {
+    const stated = statedSize(view, fixed, sizeBytes) ?? 0;
+    return stated >= size && stated <= 4 * size + SURPLUS ? bytes.slice(0, end) : undefined;
   }
-  return bound;
+  const frame = new Uint8Array(end + 8);
+  frame.set(bytes.subarray(0, fixed));
+  // A size of 8 bytes.
+  frame[4] = flags | 0xc0;
+  new DataView(frame.buffer).setBigUint64(fixed, BigInt(size), true);
+  frame.set(bytes.subarray(fixed, end), fixed + 8);
+  return frame;
+}
+
+function statedSize(view: DataView, at: number, length: number): number | undefined {
+  if (at + length > view.byteLength) return undefined;
+  if (length === 1) return view.getUint8(at);
+  if (length === 2) return view.getUint16(at, true) + 256;
+  return length === 4 ? view.getUint32(at, true) : Number(view.getBigUint64(at, true));
+}
+
+/** Returns where a frame ends whose blocks start at `at`; undefined if they go beyond the bytes. */
+function endOfBlocks(view: DataView, at: number, hasSum: boolean): number | undefined {
+  let end = at;
+  for (let isLast = false; !isLast; ) {
+    if (end + 3 > view.byteLength) return undefined;
+    const head = view.getUint16(end, true) + (view.getUint8(end + 2) << 16);
+    const isRun = ((head >> 1) & 3) === 1;
+    end += 3 + (isRun ? 1 : head >> 3);
+    isLast = (head & 1) === 1;
+  }
+  end += hasSum ? 4 : 0;
+  return end <= view.byteLength ? end : undefined;
 }

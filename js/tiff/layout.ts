@@ -50,7 +50,8 @@ export interface Components {
 
 const product = ({ Z, C, T }: Sizes) => Z * C * T;
 
-const sampleParts = (count: number) => Array.from({ length: count }, (_, k) => ({ name: `sample ${k + 1}`, part: k }));
+const sampleParts = (count: number) =>
+  Array.from({ length: count }, (_, k) => ({ name: `(sample ${k + 1})`, part: k }));
 
 /** Returns what of a page is read as a slice of a channel: a sample, or the luminance of colours. */
 export async function componentsOf(page: Page, format: Format): Promise<Components> {
@@ -86,8 +87,8 @@ function channelsOf(sizes: Sizes, order: string, imageAt: ImageAt, { parts }: Co
   return Array.from({ length: sizes.C * parts.length }, (_, k) => {
     const [c, { name, part } = { name: '', part: 0 }] = [Math.floor(k / parts.length), parts[k % parts.length]];
     const planeAt = (z: number, t: number) => ({ ...imageAt(c * strideC + z * strideZ + t * strideT), part });
-    const own = sizes.C > 1 ? `channel ${c + 1}` : '';
-    return { name: [own, name].filter(Boolean).join(', ') || 'channel 1', planeAt };
+    const own = `channel ${c + 1}`;
+    return { name: [own, name].filter(Boolean).join(' '), planeAt };
   });
 }
 
@@ -192,7 +193,10 @@ async function checkFollowing(page: Page, format: Format, count: number): Promis
   const blocks = await blocksOf(page, format, 0, 0);
   const gap = blocks.findIndex(({ at, bytes }, k) => k + 1 < blocks.length && at + bytes !== blocks[k + 1]?.at);
   if (gap >= 0) throw badTiff(page.label, `${count} images are described, but only one has a directory`);
-  page.source.check(blocks[0]?.at ?? 0, count * pageBytes(format));
+  const [start, bytes] = [blocks[0]?.at ?? 0, count * pageBytes(format)];
+  page.source.check(start, bytes);
+  if (page.isWithin(start, start + bytes))
+    throw badTiff(page.label, `${count} images are described, but the file has fewer`);
 }
 
 async function imageJStack({ source, pages, text }: OpenFile): Promise<Layout> {
@@ -238,13 +242,15 @@ async function statedSizes(page: Page, { units, between }: ImageJ): Promise<Stat
   const resolutionUnit = await page.number(TAG.resolutionUnit, 1);
   // Without a unit, a resolution may be that of paper.
   const isScale = units !== undefined || resolutionUnit === 1;
+  // ImageJ leaves out what is 1.
+  const missing = units ? 1 : undefined;
   const size = async (tag: number) => {
     const perUnit = isScale ? await page.number(tag, 0) : 0;
-    return Number.isFinite(perUnit) && perUnit > 0 ? 1 / perUnit : undefined;
+    return Number.isFinite(perUnit) && perUnit > 0 ? 1 / perUnit : missing;
   };
   return [
     { size: await size(TAG.xResolution), unit: units?.[0] ?? '' },
     { size: await size(TAG.yResolution), unit: units?.[1] ?? '' },
-    between,
+    { size: between.size ?? missing, unit: between.unit },
   ];
 }

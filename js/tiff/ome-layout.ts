@@ -234,7 +234,7 @@ class Placing {
     };
     const missing = isMissing ? this.#firstMissing(c) : undefined;
     return this.#components.parts.map((one) => ({
-      name: this.#components.parts.length > 1 ? `${name}, ${one.name}` : name,
+      name: this.#components.parts.length > 1 ? `${name} ${one.name}` : name,
       planeAt: (z: number, t: number) => planeAt(z, t, one.part),
       ...(missing && { missing }),
     }));

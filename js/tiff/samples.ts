@@ -113,14 +113,12 @@ function exact(values: BigInt64Array | BigUint64Array, label: string): Float64Ar
   return out;
 }
 
-/** Returns numbers that are not whole bytes, or 3 of them: bits from the highest to the lowest, rows from whole bytes. */
-function unpacked(bytes: Bytes, { type, row, isLittle }: Storage): VoxelArray {
+/** Returns numbers that are not whole bytes: bits from the highest to the lowest, rows from whole bytes. */
+function unpacked(bytes: Bytes, { type, row }: Storage): VoxelArray {
   const { bits, kind } = type;
   const stride = Math.ceil((row * bits) / 8);
   const rows = bytes.length / stride;
   const out = new (arrayOf(type))(rows * row);
-  // Only whole bytes have an order.
-  if (isLittle && bits === 24) reverseTriples(bytes);
   const [half, whole] = [2 ** (bits - 1), 2 ** bits];
   for (let y = 0; y < rows; y++) {
     for (let x = 0; x < row; x++) {
@@ -129,10 +127,6 @@ function unpacked(bytes: Bytes, { type, row, isLittle }: Storage): VoxelArray {
     }
   }
   return out;
-}
-
-function reverseTriples(bytes: Bytes): void {
-  for (let k = 0; k + 2 < bytes.length; k += 3) [bytes[k], bytes[k + 2]] = [bytes[k + 2] ?? 0, bytes[k] ?? 0];
 }
 
 /** Returns the unsigned integer of some bits, up to 32. */

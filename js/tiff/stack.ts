@@ -100,8 +100,8 @@ export class TiffStack {
   }
 
   #severalChannels(): string {
-    const names = this.channels.slice(0, 10).map(({ name }) => name);
-    return `the first of ${this.channels.length} channels is read: ${names.join(', ')}`;
+    const [first, ...others] = this.channels.slice(0, 10).map(({ name }) => `"${name}"`);
+    return `the first of ${this.channels.length} channels is read, ${first}; the others are ${others.join(', ')}`;
   }
 
   #init(data: VoxelArray, warnings: Warning[]): VolumeInit {
