@@ -165,7 +165,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
-      { find: /^vesicle\/(import|zarr)$/, replacement: `${here('../pkg')}/$1/index.js` },
+      { find: /^vesicle\/(import|tiff|zarr)$/, replacement: `${here('../pkg')}/$1/index.js` },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],

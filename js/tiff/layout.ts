@@ -75,6 +75,13 @@ export async function componentsOf(page: Page, format: Format): Promise<Componen
   return { parts: sampleParts(left), warnings: [] };
 }
 
+/** Returns a warning about pages that are to be shown mirrored or rotated. */
+export async function orientationOf(page: Page): Promise<string[]> {
+  const orientation = await page.number(TAG.orientation, 1);
+  if (orientation <= 1) return [];
+  return [`the pages have orientation ${orientation}, which is not applied: the image may be mirrored or rotated`];
+}
+
 /** Returns all samples of a page as channels. */
 export const allSamples = (samples: number): Components => ({ parts: sampleParts(samples), warnings: [] });
 
@@ -123,7 +130,7 @@ export async function stackOf(file: OpenFile, pause: Pause): Promise<Layout> {
   return {
     ...PLAIN,
     ...{ channels: channelsOf(sizes, order, imageAt, components), slices: sizes.Z, frames: sizes.T },
-    warnings: [...warnings, ...components.warnings, ...vendor(first)],
+    warnings: [...warnings, ...components.warnings, ...vendor(first), ...(await orientationOf(first))],
   };
 }
 
@@ -216,7 +223,7 @@ async function imageJStack({ source, pages, text }: OpenFile): Promise<Layout> {
     channels: channelsOf(sizes, 'CZT', imageAt, components),
     ...{ slices: sizes.Z, frames: sizes.T, spacing, unit },
     ...{ frameSeconds: described.frameSeconds, calibration: described.calibration },
-    warnings: [...warnings, ...assumed, ...components.warnings, ...described.unused],
+    warnings: [...warnings, ...assumed, ...components.warnings, ...described.unused, ...(await orientationOf(first))],
   };
 }
 

@@ -1,7 +1,7 @@
 // Which pages of an OME-TIFF, of one or several files, are which slices.
 import type { Page } from './directory.js';
 import { badTiff } from './error.js';
-import { formatOf } from './format.js';
+import { type Format, formatOf } from './format.js';
 import {
   allSamples,
   type Channel,
@@ -9,6 +9,7 @@ import {
   componentsOf,
   type Layout,
   type OpenFile,
+  orientationOf,
   type Sizes,
 } from './layout.js';
 import { spacingOf } from './lengths.js';
@@ -106,7 +107,7 @@ class Placing {
     const { Z, C, T } = image.sizes;
     // All samples of a page count as channels.
     this.#perPage = samples > 1 && C % samples === 0 ? samples : 1;
-    this.#components = this.#perPage > 1 ? allSamples(samples) : components;
+    this.#components = components;
     this.#sizes = { Z, C: C / this.#perPage, T };
     if (Z * C * T > Number.MAX_SAFE_INTEGER)
       throw badTiff(page.label, `SizeZ, SizeC, SizeT ${Z}, ${C}, ${T} are too large`);
@@ -120,8 +121,9 @@ class Placing {
       if (!page) continue;
       const format = await formatOf(page);
       const isSplit = format.samples > 1 && image.sizes.C % format.samples === 0;
-      const components = isSplit ? allSamples(format.samples) : await componentsOf(page, format);
-      return new Placing(main, image, finder, page, format.samples, components);
+      const { parts, warnings } = isSplit ? allSamples(format.samples) : await componentsOf(page, format);
+      const all = [...warnings, ...contradictions(image, format), ...(await orientationOf(page))];
+      return new Placing(main, image, finder, page, format.samples, { parts, warnings: all });
     }
     return undefined;
   }
@@ -280,4 +282,26 @@ class Placing {
     }
     return [`${C - this.#channels.size} of ${C} channels are not in the files that were opened: ${names.join(', ')}`];
   }
+}
+
+/** Names of the types in OME's XML. */
+const KINDS: Record<string, Format['type']['kind']> = {
+  int: 'signed',
+  uint: 'unsigned',
+  float: 'float',
+  double: 'float',
+};
+
+/** Returns warnings about what pages are, and the description says otherwise. */
+function contradictions({ sizes, type }: OmeImage, format: Format): string[] {
+  const found: string[] = [];
+  const isOther = sizes.X !== format.width || sizes.Y !== format.height;
+  if (isOther && sizes.X > 0 && sizes.Y > 0) {
+    const described = `${sizes.X} × ${sizes.Y} pixels are described`;
+    found.push(`${described}, the pages have ${format.width} × ${format.height}: voxel sizes may be wrong`);
+  }
+  const kind = KINDS[/^[a-z]+/.exec(type)?.[0] ?? ''];
+  if (kind && kind !== format.type.kind)
+    found.push(`the described type is ${type}, but samples are read as ${format.type.kind}, as the pages say`);
+  return found;
 }

@@ -17,6 +17,9 @@ export interface TiffData {
 /** One image of a description. */
 export interface OmeImage {
   name: string;
+  /** Type of the samples, by its name. */
+  type: string;
+  /** Number of pixels, 0 if it is not stated; of slices, channels and frames. */
   sizes: { X: number; Y: number; Z: number; C: number; T: number };
   /** Slices (Z), channels (C) and frames (T), the fastest first. */
   order: string;
@@ -53,6 +56,7 @@ export function parseOme(text: string): Ome {
 
 const imageOf = (tag: Tag): OmeImage => ({
   name: tag.attribute('Name') ?? '',
+  type: '',
   ...{ sizes: { X: 0, Y: 0, Z: 1, C: 1, T: 1 }, order: 'ZCT', axes: [], frameSeconds: undefined },
   ...{ channels: [], tiffData: [] },
 });
@@ -70,7 +74,9 @@ function addTo(image: OmeImage | undefined, tag: Tag): void {
 
 function addPixels(image: OmeImage, tag: Tag): void {
   const size = (name: string) => Math.max(1, Math.floor(positive(tag.attribute(name)) ?? 1));
-  image.sizes = { X: size('SizeX'), Y: size('SizeY'), Z: size('SizeZ'), C: size('SizeC'), T: size('SizeT') };
+  const pixels = (name: string) => positive(tag.attribute(name)) ?? 0;
+  image.sizes = { X: pixels('SizeX'), Y: pixels('SizeY'), Z: size('SizeZ'), C: size('SizeC'), T: size('SizeT') };
+  image.type = tag.attribute('Type') ?? '';
   const order = /^XY([ZCT]{3})$/.exec(tag.attribute('DimensionOrder') ?? '')?.[1];
   if (order && new Set(order).size === 3) image.order = order;
   image.axes = ['X', 'Y', 'Z'].map((axis) => ({

@@ -1,6 +1,6 @@
 /**
- * Imports volume formats that other libraries read (DICOM, TIFF); each library is loaded when the first such file is
- * opened.
+ * Imports volume formats that other libraries read (DICOM), or another entry of the package (TIFF); each is loaded when the
+ * first such file is opened.
  */
 import type { VolumeInit } from 'vesicle';
 import type { NamedBytes } from '../protocol';
@@ -49,7 +49,7 @@ export async function importSegmentation(file: NamedBytes): Promise<Segmentation
 /**
  * Reads the volume from the DICOM files among `files`, or else from TIFF files with one slice each or all in one;
  * undefined if no file is DICOM and not all are TIFF. A DICOM segmentation is read if there is no series. Throws a
- * `Refusal` if the files cannot be read or hold a single slice.
+ * `Refusal`, or for TIFF a `VesicleError`, if the files cannot be read, and a `Refusal` if they hold a single slice.
  */
 export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
   // DICOM folders contain other files as well, and DICOM files without that extension.
@@ -62,7 +62,7 @@ export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | un
   }
   if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
   if (files.length > 0 && files.every(isTiff))
-    return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
+    return rejectSingleSlice('TIFF', await (await import('vesicle/tiff')).readTiff(files));
   return undefined;
 }
 
