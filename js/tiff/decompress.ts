@@ -107,7 +107,7 @@ async function inflateParts(parts: Bytes[], size: number): Promise<Bytes> {
   const stream = new DecompressionStream('deflate');
   const [writer, reader] = [stream.writable.getWriter(), stream.readable.getReader()];
   const given = parts.map((part) => writer.write(part));
-  // What was wrong is seen by what is missing.
+  // Errors show in the number of bytes.
   const settled = Promise.allSettled([...given, writer.close()]);
   const out = new Uint8Array(size);
   let length = 0;

@@ -1,4 +1,4 @@
-// What compressed blocks say of their size.
+// Sizes that compressed blocks state.
 
 /** Returns the size in the header of a JPEG; undefined if it has not exactly one. */
 export function jpegSize(

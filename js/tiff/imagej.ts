@@ -13,7 +13,7 @@ export interface ImageJ {
   frameSeconds: number | undefined;
   /** Intensity of a stored value: value * slope + intercept. */
   calibration: { slope: number; intercept: number } | undefined;
-  /** What was found and is not used. */
+  /** Warnings about lines that are not used. */
   unused: string[];
 }
 

@@ -42,7 +42,7 @@ export interface Layout {
 /** Numbers of slices, channels and frames. */
 export type Sizes = Record<'Z' | 'C' | 'T', number>;
 
-/** What of each page is a slice. */
+/** The parts of each page that are a slice each. */
 export interface Components {
   parts: { name: string; part: Part }[];
   warnings: string[];

@@ -49,7 +49,7 @@ export interface Stated {
 export interface Spacing {
   spacing: Vec3;
   unit?: LengthUnit;
-  /** What had to be assumed. */
+  /** Warnings about sizes that had to be assumed. */
   assumed: string[];
 }
 

@@ -7,7 +7,7 @@ import type { Format } from './format.js';
 import type { Pause } from './pause.js';
 import { numbersOf, reverseBits } from './samples.js';
 
-/** What of a page one slice is: a sample, or the luminance of red, green and blue. */
+/** The part of a page that is a slice: a sample, or the luminance of red, green and blue. */
 export type Part = number | 'luminance';
 
 /** One slice: an image of a page. */
@@ -30,7 +30,7 @@ interface Target {
   data: VoxelArray;
 }
 
-/** What happens while pages are read. */
+/** Observer of the reading of pages. */
 export interface Listener {
   pause: Pause;
   /** Called with the fraction of the page that has been read. */

@@ -58,7 +58,7 @@ export class TiffStack {
   readonly unit: LengthUnit | undefined;
   /** Seconds from one frame to the next; undefined if not stated, or there is one frame. */
   readonly frameSeconds: number | undefined;
-  /** What to know about the stack before relying on it. */
+  /** Findings of the reader: assumptions that it made, and parts that it leaves out. */
   readonly warnings: readonly Warning[];
   readonly #layout: Layout;
   readonly #sources: Source[];

@@ -1,4 +1,4 @@
-// `vesicle/tiff` with files that are damaged or meant to harm, and work that is aborted.
+// `vesicle/tiff` with damaged and malicious files, and work that is aborted.
 import { describe, expect, test } from 'vitest';
 import { VesicleError } from '../../pkg/index.js';
 import { openTiff, readTiff, type TiffFile, type TiffOptions } from '../../pkg/tiff/index.js';
