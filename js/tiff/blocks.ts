@@ -59,18 +59,19 @@ async function storedBlocks(page: Page, format: Format, sample: number): Promise
     const rows = block.isTile ? block.height : Math.min(block.height, height - y);
     const found = { at: offsets[before + k] ?? 0, x: (k % wide) * block.width, y, width: block.width, height: rows };
     const bytes = bytesOf(format, found, counts[before + k]);
-    if (bytes === undefined) throw badTiff(page.label, `number of bytes of ${name} is missing`);
+    if (bytes === undefined) throw badTiff(page.label, `offset or number of bytes of ${name} is missing`);
     return { ...found, bytes };
   });
 }
 
 /**
- * Returns the number of bytes of a block. Of one that is not compressed it is known, and some writers count wrong, among
- * them those of files above 4 GB.
+ * Returns the number of bytes of a block; undefined if it is not known. Of one that is not compressed it is, and some
+ * writers count wrong, among them those of files above 4 GB.
  */
 function bytesOf(format: Format, block: Omit<Block, 'bytes'>, counted: number | undefined): number | undefined {
-  if (block.at === 0) return 0;
-  return format.compression === 'none' ? block.height * rowBytes(format, block.width) : counted;
+  if (block.at === 0) return counted === 0 ? 0 : undefined;
+  if (format.compression === 'none') return block.height * rowBytes(format, block.width);
+  return counted === 0 ? undefined : counted;
 }
 
 /** Splits a strip that is not compressed, so that no more of it is in memory than needed. */

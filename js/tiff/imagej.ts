@@ -4,12 +4,16 @@ import { positive, type Stated, secondsIn } from './lengths.js';
 /** A stack as its description says. */
 export interface ImageJ {
   sizes: { Z: number; C: number; T: number };
+  /** Slices (Z), channels (C) and frames (T), the fastest first. */
+  order: string;
   /** Number of images; undefined if it is not stated. */
   images: number | undefined;
   /** Units along x, y and z; undefined if none is stated. */
-  units: [string, string, string] | undefined;
+  units: readonly [string, string, string] | undefined;
   /** Distance of the slices. */
   between: Stated;
+  /** Sizes along x, y and z, if the description has them all. */
+  axes?: Stated[];
   frameSeconds: number | undefined;
   /** Intensity of a stored value: value * slope + intercept. */
   calibration: { slope: number; intercept: number } | undefined;
@@ -17,10 +21,10 @@ export interface ImageJ {
   unused: string[];
 }
 
-/** Returns whether a text is the description of a stack by ImageJ, or by SCIFIO, which has the same lines. */
+/** Returns whether a text is the description of a stack by ImageJ, or by SCIFIO. */
 export const isImageJ = (text: string): boolean => /^(ImageJ|SCIFIO)=/.test(text);
 
-/** Parses the description of a stack by ImageJ. */
+/** Parses the description of a stack by ImageJ, or SCIFIO, which has lines of its own besides. */
 export function parseImageJ(text: string): ImageJ {
   const lines = new Map<string, string>();
   for (const line of text.split(/\r?\n/)) {
@@ -38,7 +42,28 @@ export function parseImageJ(text: string): ImageJ {
     unit === undefined ? undefined : ([unit, lines.get('yunit') ?? unit, lines.get('zunit') ?? unit] as const);
   // Distances below 0 only reverse the display in ImageJ.
   const between = { size: positive(lines.get('spacing')?.replace(/^-/, '')), unit: units?.[2] ?? '' };
-  return { sizes, images, units: units && [...units], between, ...timesIn(lines), ...calibrationIn(lines) };
+  const found = { sizes, order: 'CZT', images, units, between };
+  return { ...found, ...timesIn(lines), ...calibrationIn(lines), ...scifioIn(lines) };
+}
+
+/** Axes of SCIFIO. */
+const AXES: Record<string, 'Z' | 'C' | 'T'> = { Z: 'Z', Channel: 'C', Time: 'T' };
+
+/** Returns the numbers, order and sizes that SCIFIO states; nothing if it states none. */
+function scifioIn(lines: Map<string, string>): Pick<ImageJ, 'sizes' | 'order' | 'axes'> | undefined {
+  const [names = [], lengths = [], scales = [], units = []] = ['axes', 'lengths', 'scales', 'units'].map((name) =>
+    lines.get(name)?.split(','),
+  );
+  const outer = names.slice(2).map((name) => AXES[name]);
+  const isKnown = names[0] === 'X' && names[1] === 'Y' && outer.every((axis) => axis !== undefined);
+  if (!isKnown || !lines.has('SCIFIO') || lengths.length !== names.length) return undefined;
+  const sizes = { Z: 1, C: 1, T: 1 };
+  for (const [k, axis] of outer.entries()) if (axis) sizes[axis] = Math.floor(positive(lengths[k + 2]) ?? 1);
+  const axes = ['X', 'Y', 'Z'].map((axis) => {
+    const [size, unit = ''] = [positive(scales[names.indexOf(axis)]), units[names.indexOf(axis)]];
+    return { size, unit: unit === 'null' ? '' : unit };
+  });
+  return { sizes, order: [...new Set([...outer, 'C', 'Z', 'T'])].join(''), axes };
 }
 
 function timesIn(lines: Map<string, string>): Pick<ImageJ, 'frameSeconds'> {

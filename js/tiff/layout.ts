@@ -218,9 +218,9 @@ async function imageJStack({ source, pages, text }: OpenFile): Promise<Layout> {
   const count = Math.max(following, pages.length);
   const { sizes, warnings } = fitted(source, described.sizes, count);
   const imageAt: ImageAt = (k) => (following > 1 ? { page: first, after: k } : { page: pages[k] ?? first, after: 0 });
-  const { spacing, unit, assumed } = spacingOf(await statedSizes(first, described), sizes.Z);
+  const { spacing, unit, assumed } = spacingOf(described.axes ?? (await statedSizes(first, described)), sizes.Z);
   return {
-    channels: channelsOf(sizes, 'CZT', imageAt, components),
+    channels: channelsOf(sizes, described.order, imageAt, components),
     ...{ slices: sizes.Z, frames: sizes.T, spacing, unit },
     ...{ frameSeconds: described.frameSeconds, calibration: described.calibration },
     warnings: [...warnings, ...assumed, ...components.warnings, ...described.unused, ...(await orientationOf(first))],

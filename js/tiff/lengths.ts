@@ -2,29 +2,39 @@
 import type { LengthUnit, Vec3 } from '../data.js';
 
 /** Micrometres in each unit of length, by the names that OME and ImageJ have for it. */
-const MICROMETRES = new Map([
-  ...['pm', 'picometer'].map((name) => [name, 1e-6] as const),
-  ...['Å', 'Å', 'angstrom', 'angstroms'].map((name) => [name, 1e-4] as const),
-  ...['nm', 'nanometer', 'nanometers', 'nanometre', 'nanometres'].map((name) => [name, 1e-3] as const),
-  ...['um', 'micron', 'microns', 'micrometer', 'micrometers', 'micrometre', 'micrometres'].map(
-    (name) => [name, 1] as const,
-  ),
-  ...['mm', 'millimeter', 'millimeters', 'millimetre', 'millimetres'].map((name) => [name, 1e3] as const),
-  ...['cm', 'centimeter', 'centimeters', 'centimetre', 'centimetres'].map((name) => [name, 1e4] as const),
-  ...['in', 'inch', 'inches'].map((name) => [name, 25400] as const),
-  ...['m', 'meter', 'meters', 'metre', 'metres'].map((name) => [name, 1e6] as const),
-]);
+const MICROMETRES = named({
+  1e-6: 'pm picometer',
+  1e-4: 'Å \u212b angstrom angstroms',
+  1e-3: 'nm nanometer nanometers nanometre nanometres',
+  1: 'um micron microns micrometer micrometers micrometre micrometres',
+  1e3: 'mm millimeter millimeters millimetre millimetres',
+  1e4: 'cm centimeter centimeters centimetre centimetres',
+  1e5: 'dm',
+  1e6: 'm meter meters metre metres',
+  1e9: 'km',
+  25.4: 'thou',
+  25400: 'in inch inches',
+  304800: 'ft',
+  914400: 'yd',
+});
 
 /** Seconds in each unit of time. */
-const SECONDS = new Map([
-  ...['ns'].map((name) => [name, 1e-9] as const),
-  ...['us', 'usec'].map((name) => [name, 1e-6] as const),
-  ...['ms', 'msec', 'millisecond', 'milliseconds'].map((name) => [name, 1e-3] as const),
-  ...['s', 'sec', 'secs', 'second', 'seconds'].map((name) => [name, 1] as const),
-  ...['min', 'mins', 'minute', 'minutes'].map((name) => [name, 60] as const),
-  ...['h', 'hr', 'hour', 'hours'].map((name) => [name, 3600] as const),
-  ...['d', 'day', 'days'].map((name) => [name, 86400] as const),
-]);
+const SECONDS = named({
+  1e-9: 'ns',
+  1e-6: 'us usec',
+  1e-3: 'ms msec millisecond milliseconds',
+  1: 's sec secs second seconds',
+  60: 'min mins minute minutes',
+  3600: 'h hr hour hours',
+  86400: 'd day days',
+});
+
+/** Returns the sizes of units by their names, which are given by their sizes. */
+function named(units: Record<number, string>): Map<string, number> {
+  return new Map(
+    Object.entries(units).flatMap(([size, names]) => names.split(' ').map((name) => [name, Number(size)])),
+  );
+}
 
 /** Returns the name of a unit with the signs for micro as u, which ImageJ also writes as an escape. */
 const plain = (name: string) => name.trim().replace(/^(\\u00B5|[µμ])/i, 'u');

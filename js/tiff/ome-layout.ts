@@ -1,7 +1,7 @@
 // Which pages of an OME-TIFF, of one or several files, are which slices.
 import type { Page } from './directory.js';
 import { badTiff } from './error.js';
-import { type Format, formatOf } from './format.js';
+import { type Format, formatOf, PHOTOMETRIC } from './format.js';
 import {
   allSamples,
   type Channel,
@@ -21,6 +21,9 @@ import type { Part } from './planes.js';
 export interface OmeFile extends OpenFile {
   ome: Ome | undefined;
 }
+
+/** Photometric interpretations whose samples may be channels. */
+const CHANNELS: number[] = [PHOTOMETRIC.whiteIsZero, PHOTOMETRIC.blackIsZero, PHOTOMETRIC.rgb];
 
 /** Position of a page. */
 type Place = { z: number; c: number; t: number };
@@ -120,7 +123,7 @@ class Placing {
       const page = finder.find(file)?.pages[ifd];
       if (!page) continue;
       const format = await formatOf(page);
-      const isSplit = format.samples > 1 && image.sizes.C % format.samples === 0;
+      const isSplit = image.sizes.C % format.samples === 0 && CHANNELS.includes(format.photometric);
       const { parts, warnings } = isSplit ? allSamples(format.samples) : await componentsOf(page, format);
       const all = [...warnings, ...contradictions(image, format), ...(await orientationOf(page))];
       return new Placing(main, image, finder, page, format.samples, { parts, warnings: all });

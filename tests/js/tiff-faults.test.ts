@@ -58,7 +58,13 @@ describe('a file that is', () => {
       /truncated: bytes 8 to 4000000008/,
     );
     expect(await refusal(page({ 256: 0 }, 7))).toMatch(/ImageWidth must be from 1 to 2147483647, got 0/);
-    expect(await refusal(page({ 256: 4, 278: 0, 259: 5, 279: [] }, 7))).toMatch(/number of bytes of strips is missing/);
+    expect(await refusal(page({ 256: 4, 259: 5, 279: 0 }, 7))).toMatch(
+      /offset or number of bytes of strips is missing/,
+    );
+    expect(await refusal(page({ 256: 4, 273: 0 }, 7))).toMatch(/offset or number of bytes of strips is missing/);
+    expect(await refusal(page({ 256: 4, 278: 0, 259: 5, 279: [] }, 7))).toMatch(
+      /offset or number of bytes of strips is missing/,
+    );
   });
 
   test('small, with a strip that decodes to much', async () => {

@@ -189,6 +189,15 @@ describe('an OME description', () => {
     expect((await pagesIn(stack(2, text))).dims).toEqual([5, 3, 2]);
   });
 
+  test('contradicts the pages: a warning', async () => {
+    const warned = async (from: string, to: string) =>
+      (await pagesIn(stack(2, ome('SizeZ="2"').replace(from, to)))).warnings;
+    expect(await warned('SizeX="5"', 'SizeX="10"')).toMatch(/10 × 3 pixels are described, the pages have 5 × 3/);
+    expect(await warned('Type="uint16"', 'Type="int16"')).toMatch(
+      /described type is int16, but samples are read as unsigned/,
+    );
+  });
+
   test('counts the samples of a page as channels', async () => {
     const data = Uint8Array.from([1, 2, 3, 4, 5, 6]);
     const tags = {
@@ -200,6 +209,12 @@ describe('an OME description', () => {
     };
     const file = { name: 'rgb.ome.tif', bytes: tiff([{ data, tags }]) };
     expect([...(await readTiff(file, { channel: 2 })).data]).toEqual([3, 6]);
+  });
+
+  test('counts the samples of colours that are not red, green and blue: refused', async () => {
+    const tags = { 258: [8, 8, 8, 8], 262: 5, 277: 4, 270: ome('SizeC="4"') };
+    const file = { name: 'cmyk.ome.tif', bytes: tiff([{ data: new Uint8Array(4), tags }]) };
+    expect((await rejection(readTiff(file))).message).toMatch(/PhotometricInterpretation 5 with 4 samples/);
   });
 
   test('has coarser levels in pages of pages, which are not counted', async () => {
@@ -229,6 +244,13 @@ describe('units', () => {
     expect(nm).toMatchObject({ spacing: [0.2, 0.2, 1], unit: 'um' });
     expect(await omeWorld(sized([1, 'cm'], [1, 'cm'], [5, 'mm']))).toMatchObject({ spacing: [10, 10, 5], unit: 'mm' });
     expect(await omeWorld(sized([2, 'm'], [2, 'm'], [50, 'cm']))).toMatchObject({ spacing: [2, 2, 0.5], unit: 'm' });
+  });
+
+  test('of OME that are rare', async () => {
+    const z = async (size: number, unit: string) => (await omeWorld(sized([1], [1], [size, unit]))).spacing?.[2];
+    expect(await z(5000, 'Å')).toBeCloseTo(0.5, 12);
+    expect(await z(0.00001, 'dm')).toBeCloseTo(1, 12);
+    expect(await z(1, 'thou')).toBe(25.4);
   });
 
   test('that are not lengths: sizes as they are, without a unit', async () => {
@@ -336,6 +358,18 @@ describe('ImageJ', () => {
     expect(error.message).toMatch(/3 slices, 3 channels, 1 frames are described, but the file has 2 images/);
   });
 
+  test('and SCIFIO, which states the order and the sizes', async () => {
+    const lines = [
+      'axes=X,Y,Z,Channel',
+      'lengths=5,3,3,2',
+      'scales=0.5,0.5,2,1',
+      'units=\\u00B5m,\\u00B5m,\\u00B5m,null',
+    ];
+    const file = stack(6, ['SCIFIO=0.42', ...lines, 'images=6', 'channels=2', 'slices=3', ''].join('\n'));
+    expect((await pagesIn(file, 1)).pages).toEqual([3, 4, 5]);
+    expect(await worldOf(file)).toMatchObject({ spacing: [0.5, 0.5, 2], unit: 'um' });
+  });
+
   test('has signed integers as unsigned ones with a calibration', async () => {
     const text = imageJ('images=1', 'cf=0', 'c0=-32768.0', 'c1=1.0', 'vunit=Gray Value');
     expect(await readTiff(stack(1, text))).toMatchObject({ slope: 1, intercept: -32768 });
@@ -374,6 +408,13 @@ describe('pages without such a description', () => {
     const bytes = tiff([{ data, tags: { ...pagesOf(1)[0]?.tags, 33629: [1, 2, 3] } }]);
     const { pages, warnings } = await pagesIn({ name: 'film.stk', bytes });
     expect({ pages, warnings }).toMatchObject({ pages: [0, 1, 2], warnings: expect.stringMatching(/MetaMorph/) });
+  });
+
+  test('are mirrored or rotated: a warning', async () => {
+    for (const text of ['', imageJ('images=2', 'slices=2'), ome('SizeZ="2"')])
+      expect((await pagesIn(stack(2, text, 'x.tif', { 274: 4 }))).warnings).toMatch(
+        /orientation 4, which is not applied/,
+      );
   });
 
   test('of several sizes: thumbnails and coarser levels are left out, with a warning', async () => {

@@ -193,6 +193,12 @@ describe('compression', () => {
     expect([...data]).toEqual([10, 10, 10]);
   });
 
+  test('LZW without the code for the end, or with other bits there', async () => {
+    // Clear, 10, 258.
+    for (const rest of [[0x40], [0x5f, 0xff], [0x48, 0x08]])
+      expect([...(await readTiff(page({ 256: 3, 259: 5 }, 0x80, 0x02, 0xa0, ...rest))).data]).toEqual([10, 10, 10]);
+  });
+
   test('deflate with surplus bytes after the stream', async () => {
     const stream = new Blob([Uint8Array.of(1, 2, 3)]).stream().pipeThrough(new CompressionStream('deflate'));
     const stored = new Uint8Array(await new Response(stream).arrayBuffer());
