@@ -36,8 +36,6 @@ export const TAG = {
   lsm: 34412,
 } as const;
 
-const KNOWN = new Set<number>(Object.values(TAG));
-
 /** Number of bytes of a value of each type. */
 const SIZES = new Map([
   ...[1, 2, 6, 7].map((type) => [type, 1] as const),
@@ -46,17 +44,20 @@ const SIZES = new Map([
   ...[5, 10, 12, 16, 17, 18].map((type) => [type, 8] as const),
 ]);
 
-interface Field {
-  type: number;
-  count: number;
-  /** The value, if it is in the directory, or else its offset. */
-  value: Uint8Array | number;
-}
-
 /** How numbers of a file are stored. */
 interface Order {
   isLittle: boolean;
   isBig: boolean;
+}
+
+/** The value of a tag. */
+interface Field {
+  type: number;
+  count: number;
+  /** Number of bytes. */
+  length: number;
+  /** The bytes, if they are in the directory, or else their offset. */
+  value: Uint8Array | number;
 }
 
 /** Reads a 64-bit integer, which must be exact. */
@@ -97,51 +98,87 @@ function valueAt(view: DataView, at: number, type: number, little: boolean): num
 
 const viewOf = (bytes: Uint8Array) => new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
 
-/** One page of a file: an image, and the tags that describe it. */
+/** Numbers of bytes of a directory: of the number of entries, of an entry, and of an offset. */
+const layoutOf = ({ isBig }: Order) => (isBig ? { head: 8, entry: 20, offset: 8 } : { head: 2, entry: 12, offset: 4 });
+
+/** Returns the field at `start` of the entries of a directory; undefined if its type is not known. */
+function fieldAt(entries: Uint8Array, start: number, order: Order): Field | undefined {
+  const { isLittle, isBig } = order;
+  const { entry, offset } = layoutOf(order);
+  const view = viewOf(entries);
+  const type = view.getUint16(start + 2, isLittle);
+  const size = SIZES.get(type);
+  if (size === undefined) return undefined;
+  const count = isBig ? long(view, start + 4, isLittle) : view.getUint32(start + 4, isLittle);
+  const [at, length] = [start + entry - offset, count * size];
+  const elsewhere = () => (isBig ? long(view, at, isLittle) : view.getUint32(at, isLittle));
+  return { type, count, length, value: length <= offset ? entries.subarray(at, at + length) : elsewhere() };
+}
+
+/** One page of a file: an image, and the tags that describe it. There may be very many, so that it is small. */
 export class Page {
   readonly source: Source;
-  /** Whether the file's numbers are little-endian. */
-  readonly isLittle: boolean;
-  /** Name for messages: that of the file, and the number of the page from 1. */
-  readonly label: string;
+  readonly #index: number;
   readonly #at: number;
-  readonly #fields: Map<number, Field>;
+  readonly #order: Order;
+  /** Entries of its directory. */
+  readonly #entries: Uint8Array;
 
-  constructor(source: Source, index: number, at: number, isLittle: boolean, fields: Map<number, Field>) {
+  constructor(source: Source, index: number, at: number, order: Order, entries: Uint8Array) {
     this.source = source;
+    this.#index = index;
     this.#at = at;
-    this.isLittle = isLittle;
-    this.label = `${source.name}: page ${index + 1}`;
-    this.#fields = fields;
+    this.#order = order;
+    this.#entries = entries;
+  }
+
+  /** Whether the file's numbers are little-endian. */
+  get isLittle(): boolean {
+    return this.#order.isLittle;
+  }
+
+  /** Name for messages: that of the file, and the number of the page from 1. */
+  get label(): string {
+    return `${this.source.name}: page ${this.#index + 1}`;
   }
 
   /** Returns whether the directory, or a value of a tag, begins in a part of the file. */
   isWithin(start: number, end: number): boolean {
-    const offsets = [this.#at, ...Array.from(this.#fields.values(), ({ value }) => value)];
-    return offsets.some((at) => typeof at === 'number' && at >= start && at < end);
+    const isInside = (at: unknown) => typeof at === 'number' && at >= start && at < end;
+    const { entry } = layoutOf(this.#order);
+    for (let at = 0; at < this.#entries.length; at += entry)
+      if (isInside(fieldAt(this.#entries, at, this.#order)?.value)) return true;
+    return isInside(this.#at);
+  }
+
+  #field(tag: number): Field | undefined {
+    const { isLittle } = this.#order;
+    const [view, { entry }] = [viewOf(this.#entries), layoutOf(this.#order)];
+    for (let at = 0; at < this.#entries.length; at += entry)
+      if (view.getUint16(at, isLittle) === tag) return fieldAt(this.#entries, at, this.#order);
+    return undefined;
   }
 
   has(tag: number): boolean {
-    return this.#fields.has(tag);
+    return this.#field(tag) !== undefined;
   }
 
   /** Returns the number of values of a tag; 0 if the page does not have it. */
   count(tag: number): number {
-    return this.#fields.get(tag)?.count ?? 0;
+    return this.#field(tag)?.count ?? 0;
   }
 
   /** Returns the bytes of the first `most` values of a tag. */
   async bytes(tag: number, most = Infinity): Promise<Uint8Array> {
-    const field = this.#fields.get(tag);
+    const field = this.#field(tag);
     if (!field) return new Uint8Array();
-    const length = Math.min(field.count, most) * (SIZES.get(field.type) ?? 1);
-    if (typeof field.value !== 'number') return field.value.subarray(0, length);
-    return this.source.peek(field.value, length);
+    const length = Math.min(field.length, most * (SIZES.get(field.type) ?? 1));
+    return typeof field.value === 'number' ? this.source.peek(field.value, length) : field.value.subarray(0, length);
   }
 
   /** Returns the first `most` values of a tag; none if the page does not have it. */
   async numbers(tag: number, most = Infinity): Promise<number[]> {
-    const type = this.#fields.get(tag)?.type ?? 1;
+    const { type = 1 } = this.#field(tag) ?? {};
     const size = SIZES.get(type) ?? 1;
     const view = viewOf(await this.bytes(tag, most));
     return Array.from({ length: view.byteLength / size }, (_, k) => valueAt(view, k * size, type, this.isLittle));
@@ -193,11 +230,12 @@ export async function readPages(source: Source, pause: Pause): Promise<Page[]> {
     if (seen.has(at))
       throw badTiff(source.name, `the directories form a cycle: page ${pages.length + 1} was read before`);
     seen.add(at);
-    const { fields, length, next } = await readDirectory(source, at, order);
+    const { entries, next } = await readDirectory(source, at, order);
     // Directories that overlap could be as many as bytes.
-    bytes += length;
+    bytes += entries.length + 6;
+    if (entries.length === 0) throw badTiff(source.name, `the directory of page ${pages.length + 1} is empty`);
     if (bytes > source.size) throw badTiff(source.name, 'the directories of its pages overlap');
-    pages.push(new Page(source, pages.length, at, order.isLittle, fields));
+    pages.push(new Page(source, pages.length, at, order, entries));
     at = next;
     await pause.turn();
   }
@@ -213,30 +251,19 @@ async function firstOffset(source: Source, { isLittle, isBig }: Order): Promise<
 }
 
 interface Directory {
-  fields: Map<number, Field>;
-  length: number;
+  entries: Uint8Array;
+  /** Offset of the next directory; 0 for none. */
   next: number;
 }
 
-async function readDirectory(source: Source, at: number, { isLittle, isBig }: Order): Promise<Directory> {
-  const [head, entry, offset] = isBig ? [8, 20, 8] : [2, 12, 4];
+async function readDirectory(source: Source, at: number, order: Order): Promise<Directory> {
+  const { isLittle, isBig } = order;
+  const { head, entry, offset } = layoutOf(order);
   const first = viewOf(await source.peek(at, head));
   const count = isBig ? long(first, 0, isLittle) : first.getUint16(0, isLittle);
-  const length = head + count * entry + offset;
-  source.check(at, length);
-  const bytes = await source.peek(at, length);
+  const end = head + count * entry;
+  const bytes = await source.peek(at, end + offset);
   const view = viewOf(bytes);
-  const fields = new Map<number, Field>();
-  for (let start = head; start < length - offset; start += entry) {
-    const [tag, type] = [view.getUint16(start, isLittle), view.getUint16(start + 2, isLittle)];
-    const size = SIZES.get(type);
-    if (!KNOWN.has(tag) || size === undefined) continue;
-    const amount = isBig ? long(view, start + 4, isLittle) : view.getUint32(start + 4, isLittle);
-    const value = start + entry - offset;
-    const isInside = amount * size <= offset;
-    const elsewhere = () => (isBig ? long(view, value, isLittle) : view.getUint32(value, isLittle));
-    fields.set(tag, { type, count: amount, value: isInside ? bytes.slice(value, value + offset) : elsewhere() });
-  }
-  const end = length - offset;
-  return { fields, length, next: isBig ? long(view, end, isLittle) : view.getUint32(end, isLittle) };
+  const next = isBig ? long(view, end, isLittle) : view.getUint32(end, isLittle);
+  return { entries: bytes.slice(head, end), next };
 }

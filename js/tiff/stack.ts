@@ -125,10 +125,12 @@ export class TiffStack {
   /** Reads how the slices are stored, which must be of the same size and type, before memory is allocated for them. */
   async #formats(channel: Channel, pause: Pause): Promise<Map<Plane['page'], Format>> {
     const formats = new Map<Plane['page'], Format>();
+    // Most pages are alike.
+    const kinds = new Map<string, Format>();
     let [bytes, ratio] = [0, 1];
     for (const { page } of this.#planes(channel)) {
       const known = formats.get(page);
-      const format = known ?? (await formatOf(page));
+      const format = known ?? shared(kinds, await formatOf(page));
       formats.set(page, format);
       if (!known) this.#checkAlike(page.label, format, formats.values().next().value ?? format);
       bytes += pageBytes(format) / format.samples;
@@ -189,6 +191,14 @@ interface Watch {
   onProgress: TiffOptions['onProgress'];
   /** Names of pages parts of which are not stored. */
   lost: Set<string>;
+}
+
+/** Returns a format that was there before, if one is equal. */
+function shared(kinds: Map<string, Format>, format: Format): Format {
+  const key = JSON.stringify(format);
+  const before = kinds.get(key) ?? format;
+  kinds.set(key, before);
+  return before;
 }
 
 const warning = (text: string): Warning => ({ code: 'reader', text: `TIFF: ${text}` });

@@ -34,15 +34,13 @@ describe('a file that is', () => {
     }
   });
 
-  test('a chain of directories that overlap is refused', async () => {
-    // Each directory of no entries is 6 bytes, and begins 1 byte after the one before.
+  test('a chain of empty directories is refused', async () => {
+    // As many as bytes, each beginning within the one before.
     const bytes = new Uint8Array(2000);
     bytes.set([0x49, 0x49, 42, 0, 8, 0, 0, 0]);
-    const error = await refusal({ name: 'x.tif', bytes });
-    expect(error).toMatch(/ImageWidth must be from 1/);
     const view = new DataView(bytes.buffer);
     for (let at = 8; at + 20 < bytes.length; at += 4) view.setUint32(at + 2, at + 4, true);
-    expect(await refusal({ name: 'x.tif', bytes })).toMatch(/^bad-file: /);
+    expect(await refusal({ name: 'x.tif', bytes })).toMatch(/^bad-file: TIFF: x.tif: the directory of page 1 is empty/);
   });
 
   test('small, but says that it is large, is refused before memory is allocated', async () => {
