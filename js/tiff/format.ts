@@ -99,9 +99,11 @@ export async function sizeOf(page: Page): Promise<{ width: number; height: numbe
 export async function formatOf(page: Page): Promise<Format> {
   const size = await sizeOf(page);
   const samples = await page.number(TAG.samples, 1);
-  if (samples < 1) throw badTiff(page.label, 'SamplesPerPixel must be at least 1, got 0');
+  if (samples < 1 || samples > 65_535) throw badTiff(page.label, `SamplesPerPixel must be 1 to 65535, got ${samples}`);
   const type = await sampleType(page);
   const compression = await compressionOf(page);
+  if (compression === 'JPEG' && (type.bits !== 8 || type.kind !== 'unsigned'))
+    throw badTiff(page.label, `samples in JPEG must be unsigned, 8 bits, got ${type.kind}, ${type.bits} bits`);
   const predictor = await predictorOf(page, compression, type);
   const planar = await page.number(TAG.planar, 1);
   if (planar !== 1 && planar !== 2) throw badTiff(page.label, `PlanarConfiguration must be 1 or 2, got ${planar}`);

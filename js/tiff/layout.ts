@@ -88,8 +88,17 @@ export const allSamples = (samples: number): Components => ({ parts: sampleParts
 /** Image `k` of a file. */
 type ImageAt = (k: number) => Omit<Plane, 'part'>;
 
+/** Largest number of channels: that of samples of a pixel in TIFF. */
+const MOST_CHANNELS = 65_535;
+
+/** Throws `bad-file` if there are too many channels to list them. */
+export function checkChannels(name: string, count: number): void {
+  if (count > MOST_CHANNELS) throw badTiff(name, `${count} channels; at most ${MOST_CHANNELS} are supported`);
+}
+
 /** Returns the channels of images that are stored in `order`, the fastest first. */
 function channelsOf(sizes: Sizes, order: string, imageAt: ImageAt, { parts }: Components): Channel[] {
+  checkChannels(imageAt(0).page.label, sizes.C * parts.length);
   const { strideC = 1, strideZ = 1, strideT = 1 } = stridesOf(sizes, order);
   return Array.from({ length: sizes.C * parts.length }, (_, k) => {
     const [c, { name, part } = { name: '', part: 0 }] = [Math.floor(k / parts.length), parts[k % parts.length]];
@@ -100,7 +109,7 @@ function channelsOf(sizes: Sizes, order: string, imageAt: ImageAt, { parts }: Co
 }
 
 /** Returns the distance, in images, of neighbours along each axis. */
-export function stridesOf(sizes: Sizes, order: string): Record<string, number> {
+function stridesOf(sizes: Sizes, order: string): Record<string, number> {
   let stride = 1;
   const found: Record<string, number> = {};
   for (const axis of order as Iterable<keyof Sizes>) {
@@ -121,7 +130,8 @@ export async function stackOf(file: OpenFile, pause: Pause): Promise<Layout> {
   const format = await formatOf(first);
   const components = await componentsOf(first, format);
   const shaped = shapeOf(file.text);
-  const inOne = pages.length === 1 ? Math.max(first.count(TAG.metaMorphPlanes), shaped?.images ?? 1) : 1;
+  const described = (shaped?.following ?? 1) / (format.width * format.height * format.samples);
+  const inOne = pages.length === 1 ? Math.max(first.count(TAG.metaMorphPlanes), Math.ceil(described)) : 1;
   if (inOne > 1) await checkFollowing(first, format, inOne);
   const count = Math.max(inOne, pages.length);
   const imageAt: ImageAt = (k) => (inOne > 1 ? { page: first, after: k } : { page: pages[k] ?? first, after: 0 });
@@ -166,8 +176,8 @@ const most = (values: number[]) => values.reduce((one, other) => Math.max(one, o
 interface Shape {
   /** Sizes of the axes, and their order, if they are known. */
   axes?: { sizes: Sizes; order: string };
-  /** Number of images, if only the first has a directory; else 1. */
-  images: number;
+  /** Number of all samples, if only the first image has a directory. */
+  following?: number;
 }
 
 /** Returns the shape of a stack by tifffile; undefined if the description has none. */
@@ -176,13 +186,13 @@ function shapeOf(text: string): Shape | undefined {
   const { shape, axes, truncated } = parsedJson(text);
   if (!Array.isArray(shape) || !shape.every((size) => Number.isSafeInteger(size) && size > 0)) return undefined;
   const isKnown = typeof axes === 'string' && axes.length === shape.length && /^[ZCT]*YXS?$/.test(axes);
-  const outer = isKnown ? [...axes.slice(0, axes.indexOf('Y'))] : shape.slice(0, -2);
-  const images = truncated === true ? shape.slice(0, outer.length).reduce((total, size) => total * size, 1) : 1;
-  if (!isKnown) return { images };
+  const following = truncated === true && { following: shape.reduce((total, size) => total * size, 1) };
+  if (!isKnown) return { ...following };
+  const outer = [...axes.slice(0, axes.indexOf('Y'))];
   const sizes = { Z: 1, C: 1, T: 1 };
   for (const [k, axis] of outer.entries()) sizes[axis as keyof Sizes] *= shape[k];
   // The fastest is the last.
-  return { axes: { sizes, order: [...new Set([...outer.reverse(), 'Z', 'C', 'T'])].join('') }, images };
+  return { axes: { sizes, order: [...new Set([...outer.reverse(), 'Z', 'C', 'T'])].join('') }, ...following };
 }
 
 function parsedJson(text: string): Record<string, unknown> {

@@ -6,21 +6,17 @@ import {
   allSamples,
   type Channel,
   type Components,
+  checkChannels,
   componentsOf,
   type Layout,
-  type OpenFile,
   orientationOf,
   type Sizes,
 } from './layout.js';
 import { spacingOf } from './lengths.js';
 import type { Ome, OmeImage, TiffData } from './ome.js';
+import { Finder, type OmeFile } from './ome-files.js';
 import type { Pause } from './pause.js';
 import type { Part } from './planes.js';
-
-/** A file of a data set, with its own description. */
-export interface OmeFile extends OpenFile {
-  ome: Ome | undefined;
-}
 
 /** Photometric interpretations whose samples may be channels. */
 const CHANNELS: number[] = [PHOTOMETRIC.whiteIsZero, PHOTOMETRIC.blackIsZero, PHOTOMETRIC.rgb];
@@ -30,8 +26,9 @@ type Place = { z: number; c: number; t: number };
 
 /** Returns the stack of the first image of a description that has a page in the files. */
 export async function omeStack(main: OmeFile, ome: Ome, files: OmeFile[], pause: Pause): Promise<Layout> {
+  const finder = new Finder(main, ome, files);
   for (const [k, image] of ome.images.entries()) {
-    const placing = await Placing.of(main, image, new Finder(main, ome, files));
+    const placing = await Placing.of(main, image, finder);
     if (!placing) continue;
     await placing.place(pause);
     if (placing.isEmpty) continue;
@@ -41,42 +38,6 @@ export async function omeStack(main: OmeFile, ome: Ome, files: OmeFile[], pause:
     return placing.layout([...several, ...(others > 0 ? [] : placing.unplaced())]);
   }
   throw badTiff(main.source.name, 'its OME description places no page of the files that were opened');
-}
-
-/** Returns the files that a description names, among those that were opened. */
-export function namedFiles(main: OmeFile, ome: Ome, files: OmeFile[]): Set<OmeFile> {
-  const finder = new Finder(main, ome, files);
-  const found = ome.images.flatMap(({ tiffData }) => tiffData.map(({ file }) => finder.find(file)));
-  return new Set(found.filter((file) => file !== undefined));
-}
-
-const baseName = (name: string) => name.slice(Math.max(name.lastIndexOf('/'), name.lastIndexOf('\\')) + 1);
-
-/** Finds the files that a description names. */
-class Finder {
-  readonly #byId = new Map<string, OmeFile>();
-  readonly #byName = new Map<string, OmeFile>();
-  readonly #unnamed: OmeFile | undefined;
-  readonly #only: OmeFile | undefined;
-
-  constructor(main: OmeFile, ome: Ome, files: OmeFile[]) {
-    const images = files.filter(({ pages }) => pages.length > 0);
-    for (const file of images) {
-      if (file.ome?.uuid) this.#byId.set(file.ome.uuid, file);
-      this.#byName.set(baseName(file.source.name), file);
-    }
-    const only = images.length === 1 ? images[0] : undefined;
-    this.#unnamed = main.pages.length > 0 ? main : only;
-    // One file whose description names one file is that, whatever its name is now.
-    const named = ome.images.flatMap(({ tiffData }) => tiffData.map(({ file }) => file?.uuid || file?.name || ''));
-    this.#only = new Set(named).size === 1 ? only : undefined;
-  }
-
-  /** Returns a file by its identifier, its name, or as the only one; undefined if it was not opened. */
-  find(file: TiffData['file']): OmeFile | undefined {
-    if (!file) return this.#unnamed;
-    return this.#byId.get(file.uuid) ?? this.#byName.get(baseName(file.name)) ?? this.#only;
-  }
 }
 
 /** The pages of one image of a description. */
@@ -216,6 +177,7 @@ class Placing {
     // Recordings may have been stopped early.
     const frames = complete.reduce((least, one) => (one.frames > 0 ? Math.min(least, one.frames) : least), this.#end.t);
     const { spacing, unit, assumed } = spacingOf(axes, this.#end.z);
+    checkChannels(this.#main.source.name, found.length * this.#components.parts.length);
     return {
       channels: complete.flatMap((one) => this.#channel(one.c, one.frames < frames)),
       ...{ slices: this.#end.z, frames, spacing, unit, frameSeconds },

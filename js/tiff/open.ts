@@ -4,7 +4,8 @@ import { isTiff, readPages, TAG } from './directory.js';
 import { badTiff } from './error.js';
 import { type Channel, type Layout, type OpenFile, stackOf } from './layout.js';
 import { isOme, parseOme } from './ome.js';
-import { namedFiles, type OmeFile, omeStack } from './ome-layout.js';
+import { namedFiles, type OmeFile } from './ome-files.js';
+import { omeStack } from './ome-layout.js';
 import type { Pause } from './pause.js';
 import type { Source } from './source.js';
 

@@ -8,14 +8,22 @@ export type TiffFile = Blob | { name: string; bytes: Uint8Array };
 /** Number of bytes that are read together around small values. */
 const WINDOW = 16384;
 
+/** Bytes of one of several sources that were read last. */
+interface Window {
+  source?: Source;
+  at: number;
+  bytes: Uint8Array;
+}
+
 /** The content of a file. */
 export class Source {
   readonly name: string;
   readonly size: number;
   readonly #content: Blob | Uint8Array;
-  #window = { at: 0, bytes: new Uint8Array() };
+  readonly #window: Window;
 
-  constructor(name: string, content: Blob | Uint8Array) {
+  constructor(name: string, content: Blob | Uint8Array, window: Window) {
+    this.#window = window;
     this.name = name;
     this.size = content instanceof Uint8Array ? content.byteLength : content.size;
     this.#content = content;
@@ -38,16 +46,16 @@ export class Source {
     }
   }
 
-  /** Returns a few bytes, which must not be changed; those around them are kept for the next call. */
+  /** Returns a few bytes, which must not be changed; those after them are kept for the next call. */
   async peek(at: number, length: number): Promise<Uint8Array> {
     this.check(at, length);
-    const { at: start, bytes } = this.#window;
-    if (at < start || at + length > start + bytes.length) {
-      const more = Math.min(Math.max(length, WINDOW), this.size - at);
-      this.#window = { at, bytes: await this.read(at, more) };
-    }
-    const from = at - this.#window.at;
-    return this.#window.bytes.subarray(from, from + length);
+    if (this.#content instanceof Uint8Array) return this.#content.subarray(at, at + length);
+    const { source, at: start, bytes } = this.#window;
+    if (source === this && at >= start && at + length <= start + bytes.length)
+      return bytes.subarray(at - start, at - start + length);
+    const found = await this.read(at, Math.min(Math.max(length, WINDOW), this.size - at));
+    Object.assign(this.#window, { source: this, at, bytes: found });
+    return found.subarray(0, length);
   }
 }
 
@@ -56,14 +64,15 @@ export function sourcesOf(files: unknown): Source[] {
   const isOne = files instanceof Blob || 'bytes' in Object(files);
   const list = isOne ? [files] : Array.from(Object(files) as ArrayLike<unknown>);
   if (list.length === 0) throw invalid('files', 'must be one or several TIFF files');
-  const sources = list.map((file, k) => sourceOf(file, isOne ? 'files' : `files[${k}]`));
+  const window: Window = { at: 0, bytes: new Uint8Array() };
+  const sources = list.map((file, k) => sourceOf(file, isOne ? 'files' : `files[${k}]`, window));
   return sources.sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
 }
 
-function sourceOf(file: unknown, parameter: string): Source {
+function sourceOf(file: unknown, parameter: string, window: Window): Source {
   const { name = 'file', bytes } = Object(file) as { name?: unknown; bytes?: unknown };
   const content = file instanceof Blob ? file : bytes;
   if (typeof name === 'string' && (content instanceof Blob || content instanceof Uint8Array))
-    return new Source(name, content);
+    return new Source(name, content, window);
   throw invalid(parameter, 'must be a File, a Blob, or { name, bytes } with a Uint8Array');
 }

@@ -55,6 +55,10 @@ describe('a file that is', () => {
     expect(await refusal(page({ 270: 'ImageJ=1\nimages=4000000000\nslices=4000000000\n' }, 7))).toMatch(
       /truncated: bytes 8 to 4000000008/,
     );
+    expect(await refusal(page({ 277: 4e9 }, 7))).toMatch(/SamplesPerPixel must be 1 to 65535, got 4000000000/);
+    const channels = { 258: 1, 270: 'ImageJ=1\nimages=70000\nchannels=70000\n', 273: 2 ** 12 };
+    const sparse = { name: 'x.tif', bytes: tiff([{ tags: channels }], { after: new Uint8Array(80_000) }) };
+    expect(await refusal(sparse)).toMatch(/70000 channels; at most 65535/);
     expect(await refusal(page({ 256: 0 }, 7))).toMatch(/ImageWidth must be from 1 to 2147483647, got 0/);
     expect(await refusal(page({ 256: 4, 259: 5, 279: 0 }, 7))).toMatch(
       /offset or number of bytes of strips is missing/,

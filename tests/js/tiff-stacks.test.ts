@@ -401,6 +401,9 @@ describe('pages without such a description', () => {
     const text = JSON.stringify({ shape: [3, HIGH, WIDE], truncated: true });
     const bytes = tiff([{ data, tags: { ...pagesOf(1, text)[0]?.tags } }]);
     expect((await pagesIn({ name: 'truncated.tif', bytes })).pages).toEqual([0, 1, 2]);
+    const colours = { 258: [8, 8, 8], 262: 2, 277: 3, 270: '{"shape": [2, 1, 1, 3], "truncated": true}' };
+    const rgb = tiff([{ data: Uint8Array.of(9, 9, 9, 4, 4, 4), tags: colours }]);
+    expect([...(await readTiff({ name: 'rgb.tif', bytes: rgb })).data]).toEqual([9, 4]);
   });
 
   test('of MetaMorph with one directory for all, with a warning', async () => {
