@@ -13,7 +13,7 @@ export function tooLarge(part: string, problem: string): VesicleError {
 }
 
 /** The package that decodes JPEG and Zstandard. */
-export type Geotiff = Pick<typeof import('geotiff'), 'getDecoder'>;
+export type Geotiff = Pick<typeof import('geotiff'), 'getDecoder' | 'ImageFileDirectory'>;
 
 /** Imports geotiff; throws `invalid-argument` if it is missing or too old. */
 export async function importGeotiff(compression: string): Promise<Geotiff> {
@@ -26,6 +26,7 @@ export async function importGeotiff(compression: string): Promise<Geotiff> {
       `this package, 3.0 or newer, is needed to read TIFF compressed by ${compression}: npm install geotiff`,
     );
   }
-  if (typeof geotiff.getDecoder === 'function') return geotiff;
+  // New in 3.0.
+  if (typeof geotiff.ImageFileDirectory === 'function') return geotiff;
   throw invalid('geotiff', `version 3.0 or newer is needed to read TIFF compressed by ${compression}`);
 }
