@@ -32,7 +32,9 @@ export class Decompressor {
     this.#ratio = ratio;
   }
 
-  /** Returns the bytes of a block; surplus ones are left out. Throws `bad-file` if there are fewer than `size.bytes`. */
+  /**
+   * Returns the bytes of a block; surplus ones are left out. Throws `bad-file` if there are fewer than `size.bytes`.
+   */
   async decompress(stored: Bytes, size: BlockSize): Promise<Bytes> {
     if (this.#compression === 'none') return stored;
     // Before memory is allocated for it.

@@ -2,7 +2,9 @@
 import { invalid } from '../check.js';
 import { VesicleError } from '../error.js';
 
-/** Returns the `bad-file` error whose message names the file, or the page in it, and its problem; the caller throws it. */
+/**
+ * Returns the `bad-file` error whose message names the file, or the page in it, and its problem; the caller throws it.
+ */
 export function badTiff(part: string, problem: string): VesicleError {
   return new VesicleError('bad-file', `TIFF: ${part}: ${problem}`);
 }

@@ -28,8 +28,8 @@ const SURPLUS = 2 ** 20;
 
 /**
  * Returns the first frame of Zstandard, with `size` as the size of its content if it states none; undefined if it is
- * damaged, or states a size that does not fit. The decoder of geotiff 3.0 does not end on damaged frames without a size, and needs
- * frames without surplus bytes.
+ * damaged, or states a size that does not fit. The decoder of geotiff 3.0 does not end on damaged frames without a
+ * size, and needs frames without surplus bytes.
  */
 export function zstandardFrame(bytes: Uint8Array, size: number): Uint8Array<ArrayBuffer> | undefined {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);

@@ -21,10 +21,10 @@ export { type TiffChannel, type TiffOptions, TiffStack } from './stack.js';
 /**
  * Opens a stack: reads the directories of its files, but no voxels.
  *
- * Slices are where the description of the files says: `TiffData` and `DimensionOrder` of OME-TIFF, whose data sets may have
- * several files; `channels`, `slices` and `frames` of ImageJ, also if only the first slice has a directory; the axes of
- * tifffile. Without a description, all pages of full size are slices. Several files that are not of one OME data set have
- * one or several slices each, in the order of the numbers in their names.
+ * Slices are where the description of the files says: `TiffData` and `DimensionOrder` of OME-TIFF, whose data sets may
+ * have several files; `channels`, `slices` and `frames` of ImageJ, also if only the first slice has a directory; the
+ * axes of tifffile. Without a description, all pages of full size are slices. Several files that are not of one OME
+ * data set have one or several slices each, in the order of the numbers in their names.
  *
  * Voxel sizes and times are those of OME and ImageJ, in one unit of length. x, y and z grow with column, row and slice.
  *
@@ -54,8 +54,9 @@ export async function openTiff(
  * Reads one channel of a stack, as options of a `Volume`: `new Volume(await readTiff(file))`.
  *
  * Stored values are given as they are: 0 is white in some files, and palettes are not applied. Colours become their
- * luminance, samples of less than 8 bits bytes, floats of 16 bits those of 32, and 64-bit integers 32-bit ones, or doubles
- * if these are exact. `slope` and `intercept` are those of ImageJ. All that was assumed or left out is in `warnings`.
+ * luminance, samples of less than 8 bits bytes, floats of 16 bits those of 32, and 64-bit integers 32-bit ones, or
+ * doubles if these are exact. `slope` and `intercept` are those of ImageJ. All that was assumed or left out is in
+ * `warnings`.
  *
  * @param files - As for {@link openTiff}.
  * @throws As {@link openTiff} and {@link TiffStack.read}.

@@ -203,7 +203,10 @@ function parsedJson(text: string): Record<string, unknown> {
   }
 }
 
-/** Throws `bad-file` unless `count` images of the same format follow each other, of which only the first has a directory. */
+/**
+ * Throws `bad-file` unless `count` images of the same format follow each other, of which only the first has a
+ * directory.
+ */
 async function checkFollowing(page: Page, format: Format, count: number): Promise<void> {
   if (format.compression !== 'none' || format.block.isTile)
     throw badTiff(page.label, `${count} images are described, but only one is in the file`);
@@ -238,8 +241,8 @@ async function imageJStack({ source, pages, text }: OpenFile): Promise<Layout> {
 }
 
 /**
- * Returns numbers of slices, channels and frames that fit the number of images, with a warning if they had to be changed:
- * recordings may have been stopped early.
+ * Returns numbers of slices, channels and frames that fit the number of images, with a warning if they had to be
+ * changed: recordings may have been stopped early.
  */
 function fitted({ name }: Source, described: Sizes, count: number): { sizes: Sizes; warnings: string[] } {
   if (product(described) === count) return { sizes: described, warnings: [] };

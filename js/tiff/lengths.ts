@@ -64,8 +64,8 @@ export interface Spacing {
 }
 
 /**
- * Returns the sizes of voxels along x, y and z in one unit of the library, the one closest to that of x; 1 where none is
- * stated, and as they are stated if a unit is not known. A single slice needs no distance.
+ * Returns the sizes of voxels along x, y and z in one unit of the library, the one closest to that of x; 1 where none
+ * is stated, and as they are stated if a unit is not known. A single slice needs no distance.
  */
 export function spacingOf(axes: Stated[], slices: number): Spacing {
   const scales = axes.map(({ size, unit }) => (size === undefined ? undefined : MICROMETRES.get(plain(unit))));

@@ -17,7 +17,9 @@ export interface TiffOptions {
   channel?: number;
   /** Aborts the reading, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
-  /** Called repeatedly with the fraction that has been read, up to 1. If it throws, the reading ends with that error. */
+  /**
+   * Called repeatedly with the fraction that has been read, up to 1. If it throws, the reading ends with that error.
+   */
   onProgress?: (share: number) => void;
 }
 
@@ -79,8 +81,9 @@ export class TiffStack {
   /**
    * Reads the voxels of a channel, as options of a `Volume`.
    *
-   * @throws `VesicleError` `bad-file`: truncated, damaged, or stored in a way that is not supported; `too-large`: more than
-   *   4 GB, or more than files of this size can hold; `invalid-argument` naming the option. `signal.reason` when aborted.
+   * @throws `VesicleError` `bad-file`: truncated, damaged, or stored in a way that is not supported; `too-large`: more
+   *   than 4 GB, or more than files of this size can hold; `invalid-argument` naming the option. `signal.reason` when
+   *   aborted.
    */
   async read(given?: TiffOptions): Promise<VolumeInit> {
     const { channel, signal, onProgress } = checkedOptions(given);
