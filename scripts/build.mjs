@@ -46,12 +46,15 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
-/** Packages that entry points import when they are used: of `vesicle/zarr`, then of `vesicle/dicom`. */
+/** Packages that entry points import when they are used: of `vesicle/zarr`, of `vesicle/tiff`, and of `vesicle/dicom`. */
 const OPTIONAL_PEERS = [
-  ...['zarrita', '@zarrita/storage'],
+  ...['zarrita', '@zarrita/storage', 'geotiff'],
   ...['dicom-parser', '@cornerstonejs/codec-libjpeg-turbo-8bit', '@cornerstonejs/jpeg-lossless-decoder-js'],
   ...['@cornerstonejs/codec-charls', '@cornerstonejs/codec-openjpeg', '@cornerstonejs/codec-openjph'],
 ];
+
+/** Folders of `js` that are an entry point each, for formats of files that other packages help to read. */
+const FORMATS = ['dicom', 'tiff', 'zarr'];
 
 /**
  * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same
@@ -153,17 +156,14 @@ async function assemble(modules) {
 
 const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
 
-/** Entry points that read formats by the packages of others. */
-const FORMATS = ['zarr', 'dicom'];
-
-const folderEntry = (name) => ({ types: `./${name}/index.d.ts`, default: `./${name}/index.js` });
-
 const file = (name) => [`./${name}.wasm`, `./${name}.wasm`];
 
 const entry = (part) => [
   [`./${part}`, { types: `./${part}/index.d.ts`, default: `./${part}/index.js` }],
   file(`${part}/vesicle_bg`),
 ];
+
+const format = (name) => [`./${name}`, { types: `./${name}/index.d.ts`, default: `./${name}/index.js` }];
 
 async function manifest(modules) {
   const { description, license, version, engines, devDependencies } = JSON.parse(
@@ -178,6 +178,7 @@ async function manifest(modules) {
     type: 'module',
     sideEffects: ['./worker-host.js', './element.js'],
     engines,
+    // For `FORMATS` only.
     peerDependencies: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, `^${devDependencies[name]}`])),
     peerDependenciesMeta: Object.fromEntries(OPTIONAL_PEERS.map((name) => [name, { optional: true }])),
     main: './index.js',
@@ -189,7 +190,7 @@ async function manifest(modules) {
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
-      ...Object.fromEntries(FORMATS.map((name) => [`./${name}`, folderEntry(name)])),
+      ...Object.fromEntries(FORMATS.map(format)),
       './element': { types: './element/index.d.ts', default: './element.js' },
       ...Object.fromEntries([WHOLE, PLAIN].filter((one) => modules.includes(one)).map(({ name }) => file(name))),
       './package.json': './package.json',

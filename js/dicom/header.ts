@@ -1,11 +1,11 @@
 // The images of a DICOM file, from its data set: what places, scales and identifies each (PS3.3).
 import type { DataSet } from 'dicom-parser';
 import type { Vec3 } from '../data.js';
-import type { FileReaderAt } from '../input-file.js';
 import { numberOf, numbersOf, textOf } from './elements.js';
 import { cross, dot } from './geometry.js';
 import { FLOAT_PIXELS, type Header, PIXEL_DATA } from './parser.js';
 import { segmentsOf, wholeFractionOf } from './segments.js';
+import type { Source } from './source.js';
 import type { Frame, PixelFormat, Series, Skipped } from './types.js';
 
 /** Most frames that are taken from one file. */
@@ -54,7 +54,7 @@ const MARKS: readonly (readonly [name: string, kind: 'number' | 'text', ...Attri
 ];
 
 /** Returns the images of a file, or why it has none that could be part of a volume. */
-export function framesIn(file: FileReaderAt, header: Header): Frame[] | Skipped {
+export function framesIn(file: Source, header: Header): Frame[] | Skipped {
   try {
     return frames(file, header);
   } catch (problem) {
@@ -64,7 +64,7 @@ export function framesIn(file: FileReaderAt, header: Header): Frame[] | Skipped 
 }
 
 /** Returns the images of a file; throws the reason if it has none. */
-function frames(file: FileReaderAt, header: Header): Frame[] {
+function frames(file: Source, header: Header): Frame[] {
   const { data, deflated } = header;
   if (data.elements.x00041220) throw new Unusable('an index of files (DICOMDIR)');
   const pixels = [PIXEL_DATA, ...FLOAT_PIXELS].map((tag) => data.elements[tag]).find(Boolean);

@@ -16,20 +16,21 @@
 import { checkProperties, invalid } from '../check.js';
 import type { VolumeInit } from '../data.js';
 import { VesicleError } from '../error.js';
-import { checkedFiles, type FileReaderAt, type InputFile } from '../input-file.js';
+import type { InputFiles } from '../input-file.js';
+import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import { badDicom } from './error.js';
 import { evennessOf } from './geometry.js';
 import { type Conflict, grouped, isParallel, type Stack, stacksOf } from './grouping.js';
 import { framesIn } from './header.js';
 import { importParser, type Parser, readHeader } from './parser.js';
-import { pausing } from './pause.js';
 import { SegmentationVolume } from './segmentation.js';
 import { LABEL_MAP, SEGMENTATION } from './segments.js';
+import { type Source, sourcesOf } from './source.js';
 import type { Frame, Skipped } from './types.js';
 import { type DicomProgress, type DicomReadOptions, type DicomVolume, ImageVolume } from './volume.js';
 
-export type { InputFile } from '../input-file.js';
+export type { InputFile, InputFiles } from '../input-file.js';
 export type { DecoderFiles } from './codecs.js';
 export type { Segment, Skipped } from './types.js';
 export { type DicomProgress, type DicomReadOptions, DicomVolume } from './volume.js';
@@ -63,21 +64,21 @@ export interface DicomListing {
  *
  * @throws `VesicleError` `invalid-argument`: `dicom-parser` is missing, or an argument is wrong. `signal.reason` when aborted.
  */
-export async function openDicom(files: Iterable<InputFile>, given?: DicomOptions): Promise<DicomListing> {
-  const readers = checkedFiles('files', files);
+export async function openDicom(files: InputFiles, given?: DicomOptions): Promise<DicomListing> {
+  const readers = sourcesOf(files);
   const { signal, onProgress } = checkProperties<DicomOptions>('options', given, ['signal', 'onProgress']);
   checkSignal(signal);
   checkListener('onProgress', onProgress);
   const parser = await importParser();
   const images: Frame[] = [];
   const skipped: Skipped[] = [];
-  await pausing(signal, async (pause) => {
+  await withPause(signal, async (pause) => {
     for (const [k, file] of readers.entries()) {
       const found = await imagesIn(parser, file);
       if ('reason' in found) skipped.push(found);
       else for (const image of found) images.push(image);
       onProgress?.({ done: k + 1, total: readers.length });
-      await pause();
+      await pause.turn();
     }
   });
   const volumes = volumesOf(parser, images, skipped);
@@ -90,7 +91,7 @@ export async function openDicom(files: Iterable<InputFile>, given?: DicomOptions
  * @throws As {@link openDicom} and {@link DicomVolume.read}; `bad-file` if there is no volume, with the reasons;
  *   `invalid-argument` if there are several: choose one by {@link openDicom}.
  */
-export async function readDicom(files: Iterable<InputFile>, options: DicomReadOptions = {}): Promise<VolumeInit> {
+export async function readDicom(files: InputFiles, options: DicomReadOptions = {}): Promise<VolumeInit> {
   const { signal } = options;
   const { volumes, skipped } = await openDicom(files, signal ? { signal } : {});
   const [volume, second] = volumes;
@@ -106,7 +107,7 @@ export async function readDicom(files: Iterable<InputFile>, options: DicomReadOp
 }
 
 /** Returns the images of a file; one that is damaged is skipped, and may be part of any volume. */
-async function imagesIn(parser: Parser, file: FileReaderAt): Promise<Frame[] | Skipped> {
+async function imagesIn(parser: Parser, file: Source): Promise<Frame[] | Skipped> {
   try {
     const header = await readHeader(parser, file);
     if (header) return framesIn(file, header);
@@ -117,7 +118,7 @@ async function imagesIn(parser: Parser, file: FileReaderAt): Promise<Frame[] | S
   }
 }
 
-const isNamedDicom = ({ name }: FileReaderAt) => /\.(dcm|dicom|ima)$/i.test(name);
+const isNamedDicom = ({ name }: Source) => /\.(dcm|dicom|ima)$/i.test(name);
 
 /** Returns the volumes of images; adds those that are part of none to `skipped`. */
 function volumesOf(parser: Parser, images: readonly Frame[], skipped: Skipped[]): DicomVolume[] {

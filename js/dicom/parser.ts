@@ -1,8 +1,8 @@
 // The data sets of DICOM files, by dicom-parser.
 import type { DataSet } from 'dicom-parser';
 import { invalid } from '../check.js';
-import type { FileReaderAt } from '../input-file.js';
 import { badDicom, reasonOf } from './error.js';
+import type { Source } from './source.js';
 
 export type Parser = typeof import('dicom-parser');
 
@@ -59,7 +59,7 @@ function syntaxWithout(head: Uint8Array): string | undefined {
 }
 
 /** Reads the data set of a file up to its pixels; undefined if the file is no DICOM. */
-export async function readHeader(parser: Parser, file: FileReaderAt): Promise<Header | undefined> {
+export async function readHeader(parser: Parser, file: Source): Promise<Header | undefined> {
   for (let size = HEAD; ; size *= MORE) {
     const bytes = await file.read(0, size);
     if (!looksLikeDicom(bytes)) return undefined;
@@ -72,7 +72,7 @@ export async function readHeader(parser: Parser, file: FileReaderAt): Promise<He
 /** Parses the first bytes of a file; undefined if its pixels are not among them. */
 async function parsedHead(
   parser: Parser,
-  file: FileReaderAt,
+  file: Source,
   bytes: Uint8Array,
   whole: boolean,
 ): Promise<Header | undefined> {
@@ -87,7 +87,7 @@ async function parsedHead(
 }
 
 /** Parses all of a file, with the places of its compressed frames. */
-export async function readWhole(parser: Parser, file: FileReaderAt): Promise<Header> {
+export async function readWhole(parser: Parser, file: Source): Promise<Header> {
   try {
     return await parse(parser, file, await file.read(), {});
   } catch (error) {
@@ -95,12 +95,7 @@ export async function readWhole(parser: Parser, file: FileReaderAt): Promise<Hea
   }
 }
 
-async function parse(
-  parser: Parser,
-  file: FileReaderAt,
-  bytes: Uint8Array,
-  options: { untilTag?: string },
-): Promise<Header> {
+async function parse(parser: Parser, file: Source, bytes: Uint8Array, options: { untilTag?: string }): Promise<Header> {
   if (!hasPreamble(bytes)) return parseWithout(parser, bytes, options);
   // With a tag that ends it, only the meta header is parsed.
   const meta = parser.readPart10Header(bytes, options as { untilTag: string });

@@ -1,11 +1,11 @@
 // The voxels of images: from bytes, compressed or not, to typed arrays of stored values.
 import type { DataSet, Element } from 'dicom-parser';
 import type { VoxelArray } from '../data.js';
-import type { FileReaderAt } from '../input-file.js';
 import { type Decode, type Decoded, type DecoderFiles, decoderOf } from './codecs.js';
 import { badDicom, reasonOf } from './error.js';
 import { FLOAT_PIXELS, type Parser, PIXEL_DATA, readWhole } from './parser.js';
 import { decodeRle } from './rle.js';
+import type { Source } from './source.js';
 import type { Frame, PixelFormat } from './types.js';
 
 /** Transfer syntaxes without compression of voxels: implicit, explicit, deflated as a whole, and big-endian. */
@@ -25,7 +25,7 @@ export function arrayOf({ bitsAllocated, signed, float }: PixelFormat): new (len
 export class PixelReader {
   readonly #parser: Parser;
   readonly #decoders: DecoderFiles | undefined;
-  #last: { file: FileReaderAt; data: DataSet } | undefined;
+  #last: { file: Source; data: DataSet } | undefined;
 
   constructor(parser: Parser, decoders: DecoderFiles | undefined) {
     this.#parser = parser;
@@ -72,7 +72,7 @@ export class PixelReader {
     return { bytes: transferSyntax === BIG_ENDIAN ? swapped(bytes, size) : bytes, size };
   }
 
-  async #whole(file: FileReaderAt): Promise<DataSet> {
+  async #whole(file: Source): Promise<DataSet> {
     if (this.#last?.file !== file) this.#last = { file, data: (await readWhole(this.#parser, file)).data };
     return this.#last.data;
   }

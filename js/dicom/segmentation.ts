@@ -1,8 +1,8 @@
 // Volumes of segmentations: one frame for each segment and slice, or the labels of each slice (PS3.3, A.51 and A.90).
 import type { VolumeInit } from '../data.js';
+import { withPause } from '../pause.js';
 import { affineOf, distancesOf } from './geometry.js';
 import type { Parser } from './parser.js';
-import { pausing } from './pause.js';
 import { PixelReader } from './pixels.js';
 import { LABEL_MAP } from './segments.js';
 import type { Frame } from './types.js';
@@ -84,7 +84,7 @@ export class SegmentationVolume extends DicomVolume {
     // A voxel of several segments gets the one that comes last in the file.
     const order = frames.map((_, k) => k).toSorted((a, b) => (frames[a]?.segment ?? 0) - (frames[b]?.segment ?? 0));
     let shared = 0;
-    await pausing(reading.signal, async (pause) => {
+    await withPause(reading.signal, async (pause) => {
       for (const [done, k] of order.entries()) {
         const frame = frames[k] as Frame;
         const values = await pixels.read(frame);
@@ -93,7 +93,7 @@ export class SegmentationVolume extends DicomVolume {
         else if (best) takeFractions(data, best, values, at, frame.segment ?? 1, wholeFraction);
         else shared += takeSegment(data, values, at, frame.segment ?? 1);
         reading.onProgress?.({ done: done + 1, total: order.length });
-        await pause();
+        await pause.turn();
       }
     });
     const text = `${shared} voxels are in several segments; each has the label of the last one.`;

@@ -1,6 +1,6 @@
 // What is known of DICOM images before their voxels are read.
 import type { Vec3 } from '../data.js';
-import type { FileReaderAt } from '../input-file.js';
+import type { Source } from './source.js';
 
 /** How the voxels of a frame are stored (PS3.5, section 8; PS3.3, C.7.6.3). */
 export interface PixelFormat {
@@ -17,7 +17,7 @@ export interface PixelFormat {
 
 /** One image of a file: a slice at one position and time. */
 export interface Frame {
-  file: FileReaderAt;
+  file: Source;
   /** Number of the frame in its file, and of all frames there. */
   index: number;
   count: number;

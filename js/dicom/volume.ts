@@ -2,6 +2,7 @@
 import { checkProperties, choice } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
+import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import type { DecoderFiles } from './codecs.js';
@@ -9,7 +10,6 @@ import { badDicom } from './error.js';
 import { affineOf, distancesOf, evennessOf } from './geometry.js';
 import type { Stack } from './grouping.js';
 import type { Parser } from './parser.js';
-import { pausing } from './pause.js';
 import { arrayOf, PixelReader } from './pixels.js';
 import { secondsOf } from './time.js';
 import type { Frame, Segment, Series } from './types.js';
@@ -199,7 +199,7 @@ export class ImageVolume extends DicomVolume {
     const data = allocated(Kind, nx * ny * nz * frames.length);
     const pixels = new PixelReader(this.#parser, reading.decoders);
     const progress = { done: 0, total: this.images };
-    await pausing(reading.signal, async (pause) => {
+    await withPause(reading.signal, async (pause) => {
       for (const [k, slices] of frames.entries()) {
         const out = data.subarray(k * nx * ny * nz, (k + 1) * nx * ny * nz);
         const fill = new SliceFiller(out, distancesOf(slices), nx * ny, nz);
@@ -208,7 +208,7 @@ export class ImageVolume extends DicomVolume {
           fill.add(isOneScale ? stored : rescaled(stored, slice, Kind));
           progress.done += 1;
           reading.onProgress?.({ ...progress });
-          await pause();
+          await pause.turn();
         }
       }
     });

@@ -420,7 +420,7 @@ describe('arguments', () => {
   test('that are wrong are refused by name', async () => {
     const wrong = (message: RegExp) => ({ code: 'invalid-argument', message: expect.stringMatching(message) });
     await expect(openDicom(5 as never)).rejects.toMatchObject(wrong(/^files: /));
-    await expect(openDicom([{ name: 'x' }] as never)).rejects.toMatchObject(wrong(/^files\[0\].bytes/));
+    await expect(openDicom([{ name: 'x' }] as never)).rejects.toMatchObject(wrong(/^files\[0\]: must be a File/));
     await expect(openDicom([], { foo: 1 } as never)).rejects.toMatchObject(wrong(/foo/));
     const volume = await only(series());
     await expect(volume.read({ uneven: 'guess' } as never)).rejects.toMatchObject(wrong(/^uneven/));

@@ -133,7 +133,7 @@ class Session {
       const ready = this.#replaceModel(model, fitting, saved ? 'checked' : 'measured');
       if (saved) this.#continue(saved);
       this.#keep({ volume });
-      const files = 'files' in source ? source.files.map(({ name }) => ({ name })) : [];
+      const files = 'files' in source ? source.files.map(({ name, notes }) => ({ name, notes })) : [];
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
       this.#inverted = view.inverted === true;

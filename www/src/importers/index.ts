@@ -5,7 +5,7 @@
  */
 import type { FileNotes } from '../protocol';
 import { text } from '../texts';
-import { nameOf, setName } from '../ui/folders';
+import { setName } from '../ui/folders';
 import { type Chosen, VolumeChoice } from '../ui/volume-choice';
 import { groupFiles } from '../worker/file-groups';
 import { ImportClient } from './client';
@@ -63,6 +63,7 @@ async function oneOf(files: File[]): Promise<File[] | undefined> {
 
 function nativeCandidate(name: string, id: number): Candidate {
   const unknown = {
+    title: name,
     patient: '',
     modality: '',
     date: '',
@@ -90,7 +91,8 @@ async function imported(files: File[], foreign: File[], admission: Admission): P
     const read = await choice.during(client.request('read', chosen));
     if (!read) return undefined;
     const opened = read.map(({ name, bytes, notes }) => noted(new File([bytes as BlobPart], name), notes));
-    setName(opened, nameOf(opened));
+    const titles = listing.candidates.filter(({ id }) => chosen.ids.includes(id)).map(({ title }) => title);
+    setName(opened, titles.join(' + '));
     return opened;
   } finally {
     choice.close();

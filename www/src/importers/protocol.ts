@@ -10,6 +10,8 @@ export interface Candidate {
   id: number;
   kind: 'image' | 'segmentation';
   name: string;
+  /** Name of the volume once it is open: that of its file, if it is one. */
+  title: string;
   /** Name of the patient, to choose by; it is not to go anywhere else. */
   patient: string;
   modality: string;

@@ -1,7 +1,8 @@
 /** Worker that reads formats of other programs (DICOM, TIFF) and writes them as files that all labs read. */
 import init, { Volume, type VolumeInit } from 'vesicle';
 import { type DicomVolume, openDicom } from 'vesicle/dicom';
-import type { FileNotes, NamedBytes, Vec3 } from '../protocol';
+import { openTiff } from 'vesicle/tiff';
+import type { FileNotes, NamedBytes } from '../protocol';
 import { type Label, newLabel } from '../segment/labels';
 import { withLabels } from '../segment/slicer';
 import { text } from '../texts';
@@ -9,7 +10,6 @@ import { Refusal } from '../worker/refusal';
 import { reply, withTransfer } from '../worker/serving';
 import type { Candidate, Listing, ProgressEvent, Requests } from './protocol';
 import { HEAD, isTiff } from './recognise';
-import { readStack } from './tiff';
 
 /** A volume of the last list: how the page shows it, and how it is read. */
 interface Listed {
@@ -39,34 +39,32 @@ async function list({ files }: { files: File[] }): Promise<Listing> {
 }
 
 async function listTiff(files: File[]): Promise<Found> {
-  const bytes = await Promise.all(
-    files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })),
-  );
-  const volume = await readStack(bytes);
-  const [nx, ny, nz, frames = 1] = volume.dims;
-  if (nz === 1) throw new Refusal('bad-file', text('files.singleSlice', { format: 'TIFF' }));
-  const known = {
-    kind: 'image',
-    patient: '',
-    modality: '',
-    date: '',
-    unit: '',
-    uneven: undefined,
-    warnings: [],
-    remarks: [],
-  } as const;
-  const name = files[0]?.name.replace(/\.(ome\.)?tiff?$/i, '') ?? '';
-  const candidate = {
-    ...known,
-    warnings: [],
-    remarks: [],
-    name,
-    dims: [nx, ny, nz] as Vec3,
-    spacing: [1, 1, 1] as Vec3,
-    frames,
-    images: nz,
-  };
-  return { candidates: [{ candidate, read: async () => written(name, volume, {}) }], skipped: [] };
+  const stack = await openTiff(files);
+  const { dims, spacing, frames, unit = '', warnings, channels } = stack;
+  if (dims[2] === 1) throw new Refusal('bad-file', text('files.singleSlice', { format: 'TIFF' }));
+  const stem = files[0]?.name.replace(/(\.ome)?\.tiff?$/i, '') ?? '';
+  const known = { kind: 'image', patient: '', modality: '', date: '', uneven: undefined, remarks: [] } as const;
+  const candidates = channels.map(({ name }, channel): Listed => {
+    const own = channels.length > 1 ? `${stem}, ${text('importing.channel', { name })}` : stem;
+    const title = files.length === 1 ? (files[0]?.name ?? own) : own;
+    const shown = {
+      ...known,
+      name: own,
+      title: channels.length > 1 ? `${title}, ${name}` : title,
+      dims,
+      spacing,
+      frames,
+      images: dims[2] * frames,
+      unit: unit === 'um' ? 'µm' : unit,
+    };
+    const onProgress = (share: number) =>
+      tell('images')({ done: Math.round(share * shown.images), total: shown.images });
+    return {
+      candidate: { ...shown, remarks: [], warnings: warnings.map(({ text }) => text) },
+      read: async () => written(own, await stack.read({ channel, onProgress }), {}),
+    };
+  });
+  return { candidates, skipped: [] };
 }
 
 interface Found {
@@ -87,7 +85,7 @@ async function listDicom(files: File[]): Promise<Found> {
 
 function dicomCandidate(volume: DicomVolume): Omit<Candidate, 'id'> {
   const { kind, name, patient, modality, date, dims, spacing, frames, images, remarks, uneven } = volume;
-  const known = { kind, name, patient, modality, date, dims, spacing, frames, images, uneven };
+  const known = { kind, name, title: name, patient, modality, date, dims, spacing, frames, images, uneven };
   return { ...known, unit: 'mm', warnings: volume.warnings.map(({ text }) => text), remarks: [...remarks] };
 }
 

@@ -17,6 +17,7 @@ import { interpolateSlice } from './interpolate-slice';
 import type {
   BoundaryVotes,
   ComparedTrack,
+  NamedBytes,
   OpenedImage,
   ParamValues,
   Preparation,
@@ -41,7 +42,7 @@ const send = sender<WorkerEvent>();
 interface LoadedImage {
   name: string;
   /** Files of the image; none if it was computed. */
-  files: { name: string }[];
+  files: Pick<NamedBytes, 'name' | 'notes'>[];
   original: Volume;
   spec: CineSpec | undefined;
   preparedVolume: Volume;
@@ -102,7 +103,7 @@ class Session {
       const ready = this.#adopt(made, setup, saved);
       const { dims, spacing } = original;
       this.#freeImage();
-      const files = 'files' in source ? source.files.map((file) => ({ name: file.name })) : [];
+      const files = 'files' in source ? source.files.map(({ name, notes }) => ({ name, notes })) : [];
       const { preparation } = setup;
       this.#loaded = { name, files, original, spec, preparedVolume: made, preparation, display: displayOf(source) };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));

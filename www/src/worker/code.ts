@@ -57,9 +57,11 @@ const VOLUME_FILES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/i;
  * Returns the part of a program that reads a volume, and the expression of that volume: from the files that were opened
  * if the package reads them, else from one that the lab saves, with the geometry of `saved` where that file rounds it.
  */
-export function volumeOf(files: readonly Pick<NamedBytes, 'name'>[], saved: Volume, stem: string) {
+export function volumeOf(files: readonly Pick<NamedBytes, 'name' | 'notes'>[], saved: Volume, stem: string) {
   const names = files.map(({ name }) => name);
-  const heads = names.filter((name) => VOLUME_FILES.test(name));
+  // The user has no files that the app has written of others.
+  const own = files.filter(({ name, notes }) => VOLUME_FILES.test(name) && !notes);
+  const heads = own.map(({ name }) => name);
   // A header before its voxels.
   const all = [...heads, ...names.filter((name) => !heads.includes(name))];
   if (heads.length === 1 && all.length === 2)
