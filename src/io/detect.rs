@@ -5,8 +5,7 @@ use super::{FormatError, VolumeOptions, metaimage, nifti, nrrd};
 use crate::volume::Volume;
 
 const ANY: &str = "volume file";
-const ACCEPTED: &str =
-    "NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
+const ACCEPTED: &str = "NIfTI (.nii, .nii.gz, .hdr with .img), Analyze 7.5 (.hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
 /// Number of bytes inflated from the start of a gzipped volume file to detect its format.
 const START: usize = 512;
 
@@ -41,6 +40,8 @@ pub fn parse_volume_with(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Vo
         }
         return Err(unsupported_format(&start));
     }
+    // A mark that text editors set at the start of a header.
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if nifti::is_nifti(bytes) {
         nifti::parse(bytes, options)
     } else if nrrd::is_nrrd(bytes) {

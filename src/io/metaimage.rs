@@ -16,7 +16,9 @@ use super::units::{metres, unit_of};
 use super::{FormatError, VolumeOptions};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+use crate::warning::{Warning, WarningCode};
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 pub(super) const FORMAT: &str = "MetaImage";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
@@ -69,13 +71,13 @@ fn series(pattern: &str, numbers: &[i64], sizes: &[usize]) -> Option<DataFiles> 
 
 /// The `key = value` lines of a MetaImage header, up to and including the one that names the data file.
 struct Fields {
-    pairs: Vec<(String, String)>,
+    pairs: HashMap<String, String>,
 }
 
 impl Fields {
     /// Reads the `key = value` lines of the header, up to and including the one that names the data file.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
-        let mut pairs: Vec<(String, String)> = Vec::new();
+        let mut pairs: HashMap<String, String> = HashMap::new();
         while let Some(line) = lines.next_line() {
             if line.trim().is_empty() {
                 continue;
@@ -88,8 +90,12 @@ impl Fields {
                     format!("'{shown}' is not a 'key = value' line"),
                 ));
             };
-            pairs.push((key.trim().to_owned(), value.trim().to_owned()));
-            if key.trim() == "ElementDataFile" {
+            let (key, value) = (key.trim(), value.trim());
+            let before = pairs.insert(key.to_owned(), value.to_owned());
+            if key != "Comment" && before.is_some_and(|before| before != value) {
+                return Err(FormatError::invalid(FORMAT, key, "is given twice, with different values"));
+            }
+            if key == "ElementDataFile" {
                 break;
             }
         }
@@ -98,8 +104,13 @@ impl Fields {
 
     /// Returns a field by its key, if the header has it.
     fn get(&self, key: &'static str) -> Option<Field<'_>> {
-        let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
+        let text = self.pairs.get(key)?;
         Some(Field { format: FORMAT, name: key, text })
+    }
+
+    /// Returns whether the file is a sequence of images: whether it says something about each of them.
+    fn is_sequence(&self) -> bool {
+        self.pairs.keys().any(|key| key.starts_with("Seq_Frame"))
     }
 
     /// Returns the field under the first of several synonymous keys that the header has, if any.
@@ -145,6 +156,7 @@ struct Header {
     intercept: f64,
     affine: DAffine3,
     unit: LengthUnit,
+    warnings: Vec<Warning>,
 }
 
 impl Header {
@@ -156,9 +168,10 @@ impl Header {
         let sizes = fields.need("DimSize")?.sizes(rank)?;
         dims[..rank].copy_from_slice(&sizes);
         let scalar = scalar(&fields.need("ElementType")?)?;
+        let colours = colours(fields, scalar)?;
         Ok(Self {
             scalar,
-            colours: colours(fields, scalar)?,
+            colours,
             sizes,
             dims,
             big: fields.flag(&["BinaryDataByteOrderMSB", "ElementByteOrderMSB"])?,
@@ -169,6 +182,11 @@ impl Header {
             intercept: fields.number("ElementToIntensityFunctionOffset", 0.0)?,
             affine: affine(fields, rank)?,
             unit: unit(fields),
+            warnings: colours
+                .map(Colours::warning)
+                .into_iter()
+                .chain(sequence_warning(fields, rank))
+                .collect(),
         })
     }
 
@@ -188,7 +206,7 @@ impl Header {
             space: Space::Lps,
         });
         let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
-        Ok(self.colours.into_iter().fold(volume, |volume, colours| volume.with_warning(colours.warning())))
+        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
     }
 
     /// Reads the numbers of the voxels from `source`.
@@ -249,6 +267,13 @@ fn colours(fields: &Fields, scalar: Scalar) -> Result<Option<Colours>, FormatErr
             Err(FormatError::unsupported(FORMAT, field.name, format!("'{other}'"), accepted))
         }
     }
+}
+
+/// Returns a warning about a sequence of slices, such as the frames of an ultrasound probe, whose third axis counts them.
+fn sequence_warning(fields: &Fields, rank: usize) -> Option<Warning> {
+    let text = "The file is a sequence of images (Seq_Frame…). They are read as the slices of a volume along the third axis, \
+                whatever their positions and times.";
+    (rank == 3 && fields.is_sequence()).then(|| Warning::new(WarningCode::Reader, text))
 }
 
 /// Returns the number of axes of the image; an error unless it is 1 to 4.

@@ -570,3 +570,71 @@ fn metaimage_fields_with_more_numbers_than_axes() {
         assert!(refusal(&[header.as_bytes(), &[0; 12]].concat()).contains(field));
     }
 }
+
+#[test]
+fn fields_that_are_given_twice_are_refused() {
+    for line in ["spacings: 1 2 3\nspacings: 1 2 4", "space: LPS\nspace: LPS"] {
+        let message = refusal(&nrrd(&[line]));
+        assert!(message.contains("is given twice"), "{message}");
+    }
+    let meta = |lines: &str| {
+        let header = format!(
+            "NDims = 3\nDimSize = 2 2 1\nElementType = MET_UCHAR\n{lines}\nElementDataFile = LOCAL\n"
+        );
+        [header.as_bytes(), &[1, 2, 3, 4]].concat()
+    };
+    let message = refusal(&meta("ElementSpacing = 1 2 3\nElementSpacing = 4 5 6"));
+    assert!(message.contains("ElementSpacing: is given twice, with different values"), "{message}");
+    silent(&meta("ElementSpacing = 1 2 3\nComment = a\nElementSpacing = 1 2 3\nComment = b"));
+}
+
+#[test]
+fn more_voxels_than_the_header_says_are_no_padding() {
+    let header = "NDims = 3\nDimSize = 2 2 2\nElementType = MET_LONG\nElementDataFile = LOCAL\n";
+    let with = |numbers: &[u8]| [header.as_bytes(), numbers].concat();
+    let of_8_bytes: Vec<u8> = (0..8u64).flat_map(u64::to_le_bytes).collect();
+    let message = refusal(&with(&of_8_bytes));
+    assert!(message.contains("64 bytes of voxels, the header accounts for 32"), "{message}");
+    let of_4_bytes: Vec<u8> = (0..8u32).flat_map(u32::to_le_bytes).collect();
+    silent(&with(&[&of_4_bytes[..], &[0; 480]].concat()));
+    silent(&with(&[&of_4_bytes[..], b"\n"].concat()));
+}
+
+#[test]
+fn a_byte_order_mark_before_a_header_is_skipped() {
+    assert_eq!(values(&silent(&[b"\xEF\xBB\xBF", &nrrd(&["spacings: 1 2 3"])[..]].concat())).len(), 24);
+    let meta = b"\xEF\xBB\xBFNDims = 1\nDimSize = 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\nab";
+    assert_eq!(values(&silent(meta)), [97.0, 98.0]);
+}
+
+#[test]
+fn a_single_channel_before_the_axes_of_a_volume_is_no_axis_of_it() {
+    let four = |sizes: &str| {
+        let header = format!("NRRD0004\ntype: uint8\ndimension: 4\nsizes: {sizes}\nencoding: raw\n\n");
+        let volume = silent(&[header.into_bytes(), (0..24).collect()].concat());
+        (volume.dims(), volume.frames())
+    };
+    assert_eq!(four("1 4 3 2"), ([4, 3, 2], 1));
+    assert_eq!(four("4 3 2 1"), ([4, 3, 2], 1));
+    assert_eq!(four("1 4 6 1"), ([1, 4, 6], 1));
+    assert_eq!(four("4 3 1 2"), ([4, 3, 1], 2));
+}
+
+#[test]
+fn a_sequence_of_slices_is_a_volume_with_a_warning() {
+    let header = "NDims = 3\nDimSize = 2 1 2\nSeq_Frame0000_Timestamp = 1.5\nSeq_Frame0001_Timestamp = 2.5\n\
+                  ElementType = MET_UCHAR\nElementDataFile = LOCAL\nabcd";
+    assert_warned(&whole(header.as_bytes()), "Seq_Frame");
+}
+
+#[test]
+fn what_follows_a_gzip_stream_is_named() {
+    let whole = {
+        let small = silent(&Header::new().file());
+        vesicle::io::write_volume(&small, vesicle::io::VolumeFormat::Nifti, vesicle::io::Compression::Deflate)
+            .unwrap()
+    };
+    silent(&[&whole[..], &[0; 40]].concat());
+    let message = refusal(&[&whole[..], b"garbage at the end"].concat());
+    assert!(message.contains("followed by 18 bytes that are no gzip stream"), "{message}");
+}

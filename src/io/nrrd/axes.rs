@@ -3,7 +3,7 @@
 //!
 //! If axes have directions, the axis without one counts frames. Otherwise the frame axis is the one whose kind says so,
 //! or that has a unit of time, or whose spacing alone is unknown; of four axes that nothing distinguishes it is the
-//! last.
+//! first, if that has a single entry and the last has several, else the last.
 
 use super::FORMAT;
 use super::axis::{Axis, AxisKind, KINDS, axes, words};
@@ -205,6 +205,8 @@ fn frame_axis_by_kind(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let alike: Vec<usize> = (0..axes.len()).filter(|&i| signs(&axes[i]) == most).collect();
     match alike[..] {
         [one] if axes.len() >= 2 => Ok(Some(one)),
+        // A channel, of which there is one, before those of a volume.
+        [0, .., last] if last == 3 && axes[0].size == 1 && axes[last].size > 1 => Ok(Some(0)),
         [.., last] if last >= 1 && last == axes.len() - 1 => Ok(Some(last)),
         _ => {
             let problem = "ambiguous frame axis; mark it as 'list' or 'time'";

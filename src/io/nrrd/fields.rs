@@ -101,6 +101,9 @@ impl Fields {
         if !KNOWN.contains(&key.as_str()) {
             return Err(FormatError::invalid(FORMAT, name, "not a field of the format"));
         }
+        if self.pairs.iter().any(|(known, _)| *known == key) {
+            return Err(FormatError::invalid(FORMAT, name, "is given twice"));
+        }
         let files = key == "datafile" && value.trim_start().starts_with("LIST");
         self.pairs.push((key, value.trim().to_owned()));
         Ok(files)
