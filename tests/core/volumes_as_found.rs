@@ -2,9 +2,11 @@
 //! colours. Each is read right, with a warning if something had to be assumed, or refused with the reason. Expected
 //! values are those of nibabel and of ITK.
 
-use vesicle::io::{FormatError, VolumeOptions, parse_volume, parse_volume_with};
+use vesicle::io::{
+    Compression, FormatError, VolumeFormat, VolumeOptions, parse_volume, parse_volume_with, write_volume,
+};
 use vesicle::math::DVec3;
-use vesicle::volume::{LengthUnit, Space, Volume, Voxels};
+use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -514,6 +516,26 @@ fn each_of_several_files_has_its_own_header_to_skip() {
     assert_eq!(read_slices(header.as_bytes(), &hex), in_order([0, 1, 2, 3]));
 }
 
+/// Returns bytes as a gzip stream, or as a zlib stream.
+fn deflated(bytes: &[u8], format: VolumeFormat) -> Vec<u8> {
+    let init = VolumeInit::new(Voxels::U8(bytes.to_vec()), [bytes.len(), 1, 1, 1]);
+    let file = write_volume(&Volume::new(init).unwrap(), format, Compression::Deflate).unwrap();
+    let end: &[u8] = if format == VolumeFormat::Nrrd { b"\n\n" } else { b"LOCAL\n" };
+    let at = file.windows(end.len()).position(|part| part == end).unwrap();
+    file[at + end.len()..].to_vec()
+}
+
+#[test]
+fn each_of_several_files_is_compressed_by_itself() {
+    let packed = |format| -> Vec<(String, Vec<u8>)> {
+        (0..4).map(|k| (format!("s{k}"), deflated(&slice(k, 0), format))).collect()
+    };
+    let nrrd = String::from_utf8(detached_nrrd("s%d 0 3 1", "")).unwrap().replace("raw", "gzip");
+    let meta = detached_meta("s%d 0 3 1", "CompressedData = True\n");
+    assert_eq!(read_slices(nrrd.as_bytes(), &packed(VolumeFormat::Nrrd)), in_order([0, 1, 2, 3]));
+    assert_eq!(read_slices(&meta, &packed(VolumeFormat::Mha)), in_order([0, 1, 2, 3]));
+}
+
 #[test]
 fn files_that_are_missing_or_of_another_size_are_named() {
     let files = slices(|k| format!("s{k}.raw"), 0);
@@ -631,8 +653,7 @@ fn a_sequence_of_slices_is_a_volume_with_a_warning() {
 fn what_follows_a_gzip_stream_is_named() {
     let whole = {
         let small = silent(&Header::new().file());
-        vesicle::io::write_volume(&small, vesicle::io::VolumeFormat::Nifti, vesicle::io::Compression::Deflate)
-            .unwrap()
+        write_volume(&small, VolumeFormat::Nifti, Compression::Deflate).unwrap()
     };
     silent(&[&whole[..], &[0; 40]].concat());
     let message = refusal(&[&whole[..], b"garbage at the end"].concat());

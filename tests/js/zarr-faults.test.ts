@@ -249,7 +249,7 @@ describe('metadata that lies', () => {
     ['no chunks', 'chunk_grid', undefined, /array "s0": cannot be read/],
     ['no codecs', 'codecs', undefined, /array "s0": cannot be read/],
     ['text', 'data_type', 'string', /array "s0".data_type: must be one of uint8, .*got "string"/],
-    ['half precision', 'data_type', 'float16', /must be one of uint8, .*float16/],
+    ['half precision', 'data_type', 'float16', /array "s0": .*float16/],
     ['unknown type', 'data_type', 'quaternion', /array "s0": .*quaternion/],
     ['another type', 'data_type', 'uint16', /array "s1": must have the voxel type of level 0, u16/],
     ['no array', 'node_type', 'group', /array "s0"/],

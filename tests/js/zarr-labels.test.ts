@@ -43,7 +43,7 @@ describe('integers of 64 bits', () => {
     const { data } = await zarr.voxels(0, WHOLE);
     expect(data).toEqual(Int32Array.of(0, -1, 9, 9, 2, 3, 9, 9, 4, 5, 9, 9, 6, 2 ** 31 - 1, 9, 9));
     const region = await zarr.region(0, WHOLE);
-    expect(region.labels()).toHaveLength(9);
+    expect(region.labels()).toHaveLength(8);
     const big = new DataView(new ArrayBuffer(64));
     big.setBigUint64(56, 4294967295n);
     const unsigned = await openZarr(imageOf({ dtype: '>u8', fill: 0, chunks: { '0.0.1': big } }));
