@@ -2,7 +2,6 @@
 
 use super::FormatError;
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 /// Files beside a header, among which a reader finds those that the header names.
 pub trait FileSet {
@@ -40,9 +39,9 @@ pub(super) enum DataFiles {
 pub(super) struct Series {
     start: String,
     end: String,
-    /// Least number of digits, filled up with `fill`.
+    /// Least number of characters of the number, filled up with zeros or spaces.
     width: usize,
-    fill: char,
+    has_zeros: bool,
     first: i64,
     step: i64,
     count: u64,
@@ -59,20 +58,20 @@ impl Series {
         let width = if digits.is_empty() { 0 } else { digits.parse().ok()? };
         let steps = last.checked_sub(first)?.checked_div(step)?;
         let (count, fits) = (u64::try_from(steps).ok()?.checked_add(1)?, width <= MOST_DIGITS);
-        let fill = if digits.starts_with('0') { '0' } else { ' ' };
+        let has_zeros = digits.starts_with('0');
         let (start, end) = (start.to_owned(), end.to_owned());
-        fits.then_some(Self { start, end, width, fill, first, step, count })
+        fits.then_some(Self { start, end, width, has_zeros, first, step, count })
     }
 
     fn name(&self, index: u64) -> String {
         // Within the first and the last number, so that nothing overflows.
         let number = self.first.saturating_add(self.step.saturating_mul(index as i64));
-        let text = number.unsigned_abs().to_string();
-        let sign = if number < 0 { "-" } else { "" };
-        let fill = self.fill.to_string().repeat(self.width.saturating_sub(text.len() + sign.len()));
-        let padded =
-            if self.fill == '0' { format!("{sign}{fill}{text}") } else { format!("{fill}{sign}{text}") };
-        format!("{}{padded}{}", self.start, self.end)
+        let Self { start, end, width, .. } = self;
+        if self.has_zeros {
+            format!("{start}{number:0width$}{end}")
+        } else {
+            format!("{start}{number:width$}{end}")
+        }
     }
 }
 
@@ -120,10 +119,9 @@ impl DataFiles {
     /// Files that are missing, or a name that several files have.
     pub(super) fn find(&self, format: &'static str, files: &dyn FileSet) -> Result<Vec<Found>, FormatError> {
         let given = files.names();
-        let index = Index::of(&given);
         let (mut found, mut missing) = (Vec::new(), Vec::new());
         for name in self.first(given.len().saturating_add(MOST_NAMED)) {
-            match index.find(&given, &name)[..] {
+            match matching(&given, &name)[..] {
                 [at] => found.push(Found { at, name: base(&name).to_owned() }),
                 [] => missing.push(name),
                 _ => {
@@ -163,31 +161,31 @@ pub(super) struct Found {
     name: String,
 }
 
-/// The indices of files by their names without folders, as written and in lower case.
-struct Index<'a> {
-    written: HashMap<&'a str, Vec<usize>>,
-    lower: HashMap<String, Vec<usize>>,
+/// Returns the files of a name: those that are written like it, else those in upper or lower case; of several ones, that
+/// whose folders are those of the name, if there is one.
+fn matching(names: &[&str], wanted: &str) -> Vec<usize> {
+    let all = |fits: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        (0..names.len()).filter(|&at| fits(names[at])).collect()
+    };
+    let wanted_base = base(wanted);
+    let mut found = all(&|name| base(name) == wanted_base);
+    if found.is_empty() {
+        found = all(&|name| base(name).eq_ignore_ascii_case(wanted_base));
+    }
+    let whole = all(&|name| is_same_path(name, wanted));
+    if found.len() > 1 && whole.len() == 1 { whole } else { found }
 }
 
-impl<'a> Index<'a> {
-    fn of(names: &[&'a str]) -> Self {
-        let mut index = Self { written: HashMap::new(), lower: HashMap::new() };
-        for (at, name) in names.iter().enumerate() {
-            index.written.entry(base(name)).or_default().push(at);
-            index.lower.entry(base(name).to_lowercase()).or_default().push(at);
+/// Returns whether two names are the same with their folders, whatever separates these.
+fn is_same_path(one: &str, other: &str) -> bool {
+    let [mut one, mut other] = [one, other].map(|name| name.strip_prefix("./").unwrap_or(name).bytes());
+    loop {
+        match (one.next(), other.next()) {
+            (Some(b'/' | b'\\'), Some(b'/' | b'\\')) => {}
+            (a, b) if a != b => return false,
+            (None, _) => return true,
+            _ => {}
         }
-        index
-    }
-
-    /// Returns the files of a name; of several ones, that whose folders are those of the name, if there is one.
-    fn find(&self, names: &[&str], wanted: &str) -> Vec<usize> {
-        let written = self.written.get(base(wanted));
-        let found =
-            written.or_else(|| self.lower.get(&base(wanted).to_lowercase())).cloned().unwrap_or_default();
-        let folders = |name: &str| name.replace('\\', "/").trim_start_matches("./").to_owned();
-        let whole = folders(wanted);
-        let exact: Vec<usize> = found.iter().copied().filter(|&at| folders(names[at]) == whole).collect();
-        if found.len() > 1 && exact.len() == 1 { exact } else { found }
     }
 }
 

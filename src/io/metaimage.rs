@@ -18,7 +18,6 @@ use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 use crate::warning::{Warning, WarningCode};
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 pub(super) const FORMAT: &str = "MetaImage";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
@@ -69,15 +68,43 @@ fn series(pattern: &str, numbers: &[i64], sizes: &[usize]) -> Option<DataFiles> 
     (numbers.len() <= 3).then(|| Series::parse(pattern, first, last, step)).flatten().map(DataFiles::Series)
 }
 
-/// The `key = value` lines of a MetaImage header, up to and including the one that names the data file.
+/// The keys that the reader uses.
+const KEYS: [&str; 22] = [
+    "ObjectType",
+    "NDims",
+    "DimSize",
+    "ElementType",
+    "ElementNumberOfChannels",
+    "ElementDataFile",
+    "ElementSpacing",
+    "ElementSize",
+    "ElementByteOrderMSB",
+    "ElementToIntensityFunctionSlope",
+    "ElementToIntensityFunctionOffset",
+    "BinaryData",
+    "BinaryDataByteOrderMSB",
+    "CompressedData",
+    "HeaderSize",
+    "Offset",
+    "Position",
+    "Origin",
+    "TransformMatrix",
+    "Rotation",
+    "Orientation",
+    "DistanceUnits",
+];
+
+/// The `key = value` lines of a MetaImage header that the reader uses, up to and including the one that names the data file.
 struct Fields {
-    pairs: HashMap<String, String>,
+    pairs: Vec<(&'static str, String)>,
+    /// Whether the file is a sequence of images: whether it says something about each of them.
+    is_sequence: bool,
 }
 
 impl Fields {
     /// Reads the `key = value` lines of the header, up to and including the one that names the data file.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
-        let mut pairs: HashMap<String, String> = HashMap::new();
+        let mut fields = Self { pairs: Vec::new(), is_sequence: false };
         while let Some(line) = lines.next_line() {
             if line.trim().is_empty() {
                 continue;
@@ -90,27 +117,31 @@ impl Fields {
                     format!("'{shown}' is not a 'key = value' line"),
                 ));
             };
-            let (key, value) = (key.trim(), value.trim());
-            let before = pairs.insert(key.to_owned(), value.to_owned());
-            if key != "Comment" && before.is_some_and(|before| before != value) {
-                return Err(FormatError::invalid(FORMAT, key, "is given twice, with different values"));
-            }
-            if key == "ElementDataFile" {
+            if fields.add(key.trim(), value.trim())? == Some("ElementDataFile") {
                 break;
             }
         }
-        Ok(Self { pairs })
+        Ok(fields)
+    }
+
+    /// Adds a field, if the reader uses it, and returns its key.
+    fn add(&mut self, key: &str, value: &str) -> Result<Option<&'static str>, FormatError> {
+        self.is_sequence |= key.starts_with("Seq_Frame");
+        let Some(&key) = KEYS.iter().find(|&&known| known == key) else { return Ok(None) };
+        match self.get(key) {
+            Some(before) if before.text != value => {
+                return Err(FormatError::invalid(FORMAT, key, "is given twice, with different values"));
+            }
+            Some(_) => {}
+            None => self.pairs.push((key, value.to_owned())),
+        }
+        Ok(Some(key))
     }
 
     /// Returns a field by its key, if the header has it.
     fn get(&self, key: &'static str) -> Option<Field<'_>> {
-        let text = self.pairs.get(key)?;
+        let (_, text) = self.pairs.iter().find(|&&(name, _)| name == key)?;
         Some(Field { format: FORMAT, name: key, text })
-    }
-
-    /// Returns whether the file is a sequence of images: whether it says something about each of them.
-    fn is_sequence(&self) -> bool {
-        self.pairs.keys().any(|key| key.starts_with("Seq_Frame"))
     }
 
     /// Returns the field under the first of several synonymous keys that the header has, if any.
@@ -273,7 +304,7 @@ fn colours(fields: &Fields, scalar: Scalar) -> Result<Option<Colours>, FormatErr
 fn sequence_warning(fields: &Fields, rank: usize) -> Option<Warning> {
     let text = "The file is a sequence of images (Seq_Frame…). They are read as the slices of a volume along the third axis, \
                 whatever their positions and times.";
-    (rank == 3 && fields.is_sequence()).then(|| Warning::new(WarningCode::Reader, text))
+    (rank == 3 && fields.is_sequence).then(|| Warning::new(WarningCode::Reader, text))
 }
 
 /// Returns the number of axes of the image; an error unless it is 1 to 4.

@@ -4,20 +4,30 @@ use crate::volume::LengthUnit;
 
 /// Returns the metres in a unit of length, by its name or symbol; `None` if `name` is no known unit of length.
 pub(super) fn metres(name: &str) -> Option<f64> {
-    let name = name.trim();
-    if name == "m" {
-        return Some(1.0);
+    let symbol = match name.trim() {
+        "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" | "MM" => 1e-3,
+        "um" | "\u{b5}m" | "\u{3bc}m" => 1e-6,
+        "nm" => 1e-9,
+        word => return metres_of_word(word),
+    };
+    Some(symbol)
+}
+
+/// Returns the metres in a unit of length by its name, in British or American spelling, singular or plural.
+fn metres_of_word(word: &str) -> Option<f64> {
+    let word = word.to_ascii_lowercase();
+    let word = word.strip_suffix('s').unwrap_or(&word);
+    if word == "micron" {
+        return Some(1e-6);
     }
-    let lower = name.to_lowercase();
-    // British and American spelling, singular and plural.
-    let lower = lower.strip_suffix('s').unwrap_or(&lower).replace("metre", "meter");
-    match lower.as_str() {
-        "meter" => Some(1.0),
-        "cm" | "centimeter" => Some(1e-2),
-        "mm" | "millimeter" => Some(1e-3),
-        "um" | "\u{b5}m" | "\u{3bc}m" | "micron" | "micrometer" => Some(1e-6),
-        "nm" | "nanometer" => Some(1e-9),
-        "\u{e5}" | "angstrom" | "\u{e5}ngstr\u{f6}m" => Some(1e-10),
+    match word.strip_suffix("meter").or_else(|| word.strip_suffix("metre"))? {
+        "" => Some(1.0),
+        "centi" => Some(1e-2),
+        "milli" => Some(1e-3),
+        "micro" => Some(1e-6),
+        "nano" => Some(1e-9),
         _ => None,
     }
 }

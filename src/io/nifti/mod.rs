@@ -76,8 +76,11 @@ pub(super) fn parse(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume,
 
 /// Returns whether a name is that of a file with the voxels of a pair.
 fn is_image(name: &str) -> bool {
-    let name = name.to_lowercase();
-    name.ends_with(".img") || name.ends_with(".img.gz")
+    let ends_with = |end: &str| {
+        let at = name.len().saturating_sub(end.len());
+        name.get(at..).is_some_and(|rest| rest.eq_ignore_ascii_case(end))
+    };
+    ends_with(".img") || ends_with(".img.gz")
 }
 
 /// The content of a header, checked for consistency.

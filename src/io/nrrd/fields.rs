@@ -97,7 +97,8 @@ impl Fields {
                 ));
             }
         };
-        let key: String = name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect();
+        let key: String =
+            name.chars().filter(|c| !c.is_whitespace()).map(|c| c.to_ascii_lowercase()).collect();
         if !KNOWN.contains(&key.as_str()) {
             return Err(FormatError::invalid(FORMAT, name, "not a field of the format"));
         }

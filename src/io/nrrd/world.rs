@@ -116,7 +116,7 @@ type Oriented = (Space, bool);
 /// spaces or nothing in place of hyphens, or be abbreviated, as RAST for right-anterior-superior-time.
 fn parse_space(field: &Field<'_>) -> Result<(Option<Oriented>, bool), FormatError> {
     let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
-    let name: String = letters.flat_map(char::to_lowercase).collect();
+    let name: String = letters.map(|c| c.to_ascii_lowercase()).collect();
     let untimed = name.strip_suffix("time").or_else(|| name.strip_suffix('t'));
     let oriented = match untimed.unwrap_or(&name) {
         "rightanteriorsuperior" | "ras" => Some((Space::Ras, false)),
