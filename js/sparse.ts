@@ -33,7 +33,7 @@ export interface SparseSource {
   coarsest: VoxelArray;
   /** Intensity of voxels that are not stored. */
   fill: number;
-  /** What had to be assumed about the volume. */
+  /** Warnings about assumptions on the volume. */
   warnings: readonly Warning[];
   /** Creates the WebAssembly object that holds the voxels of one model, with the coarsest level, which is freed with it. */
   create(): Handle<RawSparseVolume>;

@@ -13,7 +13,7 @@ export interface Multiscale {
   unit: 'mm' | undefined;
   /** Where each level is, finest first. */
   levels: LevelTransform[];
-  /** What had to be assumed. */
+  /** Warnings about assumptions. */
   warnings: Warning[];
 }
 

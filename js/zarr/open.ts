@@ -20,7 +20,7 @@ export async function importZarrita(): Promise<Zarrita> {
   throw invalid('zarrita', 'version 0.7 or newer is needed to read OME-Zarr');
 }
 
-/** The levels of an image, its unit of length, and what had to be assumed. */
+/** The levels of an image, its unit of length, and warnings about assumptions. */
 type Opened = { levels: Level[]; unit: 'mm' | undefined; warnings: Warning[] };
 
 /** Opens the levels of an image in a store, finest first, and checks them. */

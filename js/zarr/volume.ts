@@ -42,7 +42,7 @@ export class ZarrVolume {
   readonly levels: readonly ZarrLevel[];
   /** Unit of world coordinates: millimetres, into which lengths were converted; undefined if the image states none. */
   readonly unit: 'mm' | undefined;
-  /** What the metadata leave out and had to be assumed; volumes made from the image have the same warnings. */
+  /** Warnings about assumptions where metadata are missing; volumes made from the image have the same. */
   readonly warnings: readonly Warning[];
   readonly #levels: Level[];
   readonly #cache: BrickCache;

@@ -6,7 +6,7 @@ use super::text::Field;
 use crate::volume::{Space, Voxels};
 use std::borrow::Cow;
 
-/// What a volume is read with, besides the bytes of its file.
+/// Options of reading a volume, besides the bytes of its file.
 #[derive(Clone, Copy, Default)]
 pub struct VolumeOptions<'a> {
     /// Content of the data file, if the header is in a file of its own; several data files are concatenated in order.

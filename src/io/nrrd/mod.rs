@@ -74,7 +74,7 @@ fn data_files(file: &Field<'_>, mut lines: Lines<'_>, sizes: &[usize]) -> Result
     }
 }
 
-/// Returns the number of axes that the files of a list have, if the list says it; `None` if this is no list.
+/// Returns the number of axes that the files of a list have, if the list says it; `None` if it does not name a list.
 fn list_rank(text: &str) -> Option<Option<i64>> {
     let rank = text.strip_prefix("LIST").filter(|rank| !rank.starts_with(|c: char| !c.is_whitespace()))?;
     if rank.is_empty() { Some(None) } else { rank.trim().parse().ok().map(Some) }
