@@ -2,6 +2,7 @@
 //! colours. Each is read right, with a warning if something had to be assumed, or refused with the reason. Expected
 //! values are those of nibabel and of ITK.
 
+use super::common::Random;
 use vesicle::io::{
     Compression, FormatError, VolumeFormat, VolumeOptions, parse_volume, parse_volume_with, write_volume,
 };
@@ -658,4 +659,49 @@ fn what_follows_a_gzip_stream_is_named() {
     silent(&[&whole[..], &[0; 40]].concat());
     let message = refusal(&[&whole[..], b"garbage at the end"].concat());
     assert!(message.contains("followed by 18 bytes that are no gzip stream"), "{message}");
+}
+
+/// Returns headers of all kinds whose voxels are in the files `s0` to `s3`, `a.img` and in themselves.
+fn headers() -> Vec<Vec<u8>> {
+    let colours = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 3 2 2 1\nkinds: RGB-color domain domain domain\nencoding: raw\n\n";
+    vec![
+        detached_nrrd("LIST 2\ns2\ns0\ns3\ns1", "units: \"mm\" \"um\" \"mm\"\n"),
+        detached_nrrd("s%01d 3 0 -1 2", "byte skip: -1\naxis mins: 1 2 3\ncenters: cell node cell\n"),
+        detached_meta("LIST\ns2\ns0\ns3\ns1", "HeaderSize = -1\n"),
+        detached_meta("s%d 0 3 1", "ElementSpacing = 1 2 3 4\n"),
+        analyze().bytes(253, &[2, 0, 2, 0, 1, 0]).0,
+        Header::new().ints(40, &[3, 2, 2, 1]).ints(70, &[128, 24]).with(&RGB),
+        Header::new().ints(254, &[1]).with_qform().file(),
+        [colours.as_bytes(), &RGB].concat(),
+        nrrd(&["space dimension: 3", PLACED]),
+    ]
+}
+
+#[test]
+fn damaged_headers_give_a_volume_or_an_error() {
+    let mut random = Random(20_261_128);
+    let mut files = slices(|k| format!("s{k}"), 0);
+    files.push(("a.img".to_owned(), numbers()));
+    let files: Vec<File<'_>> = files.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice())).collect();
+    for (at, header) in headers().iter().enumerate() {
+        assert!(beside(header, &files).is_ok(), "header {at}");
+        let mut counts = [0; 2];
+        for _ in 0..2000 {
+            let mut damaged = header.clone();
+            for _ in 0..=random.below(4) {
+                let at = random.below(damaged.len());
+                damaged[at] = random.below(256) as u8;
+            }
+            let found = beside(&damaged, &files);
+            if let Ok(volume) = &found {
+                let count = volume.dims().iter().product::<usize>() * volume.frames();
+                assert!(
+                    count == volume.voxels().len() && count <= damaged.len() + 48,
+                    "header {at}: {count}"
+                );
+            }
+            counts[usize::from(found.is_ok())] += 1;
+        }
+        assert!(counts.iter().all(|&count| count > 50), "header {at}: {counts:?} refused and read");
+    }
 }
