@@ -170,6 +170,15 @@ fn a_single_slice_without_thickness_is_of_thickness_one() {
 }
 
 #[test]
+fn a_nifti_file_without_a_transform_is_in_the_space_that_is_chosen() {
+    let file = Header::new().file();
+    let sizes = |x: f64, y: f64| [[x, 0.0, 0.0, 0.0], [0.0, y, 0.0, 0.0], [0.0, 0.0, 3.0, 0.0]];
+    assert_rows(&silent(&file), sizes(1.0, 2.0));
+    assert_rows(&in_space(&file, Space::Lps), sizes(-1.0, -2.0));
+    assert_rows(&in_space(&Header::new().with_qform().file(), Space::Lps), TURNED);
+}
+
+#[test]
 fn axes_of_one_entry_count_for_nothing() {
     for sizes in [[4, 4, 3, 2, 0, 9, 9, 9], [5, 4, 3, 2, 1, 1, 9, 9], [7, 4, 3, 2, 1, 0, 1, 1]] {
         let volume = silent(&Header::new().ints(40, &sizes).file());

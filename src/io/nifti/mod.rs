@@ -2,7 +2,8 @@
 //! their own); and of Analyze 7.5, whose pairs NIfTI-1 continues.
 //!
 //! World space is RAS. The affine is the sform if its code is positive and it can be inverted, else the qform if its
-//! code is positive, else the voxel sizes with the first voxel at the origin (methods 3, 2 and 1 of the standard).
+//! code is positive, else the voxel sizes with the first voxel at the origin (methods 3, 2 and 1 of the standard), in the
+//! space that the caller chooses, if any.
 //! Lengths stay in the file's unit, given by [`Volume::unit`]. A slope of 0 or NaN means that stored numbers are
 //! intensities. The time between frames is `pixdim[4]` in the file's time unit, or in seconds if it names none. Of
 //! colours (RGB24, RGBA32) the luminance is read.
@@ -108,12 +109,12 @@ impl Header {
         let (scalar, colours) = fields.numbers()?;
         let (slope, intercept) = if colours.is_some() { (1.0, 0.0) } else { fields.scaling()? };
         let offset = fields.offset(container)?;
-        let (affine, own_space) = match container {
-            Container::Analyze => {
-                (fields.analyze_affine(dims, space, &mut warnings)?, space.unwrap_or_default())
-            }
-            _ => (fields.affine(&mut warnings)?, Space::Ras),
+        let is_analyze = container == Container::Analyze;
+        let affine = match is_analyze {
+            true => fields.analyze_affine(dims, space, &mut warnings)?,
+            false => fields.affine(&mut warnings)?,
         };
+        let space = space.filter(|_| is_analyze || !fields.has_transform()).unwrap_or_default();
         warnings.extend(colours.map(Colours::warning));
         Ok(Self {
             big: fields.big,
@@ -124,7 +125,7 @@ impl Header {
             slope,
             intercept,
             affine,
-            space: own_space,
+            space,
             frame_seconds: fields.frame_seconds(dims[3])?,
             unit: fields.unit(),
             warnings,

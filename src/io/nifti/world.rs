@@ -12,6 +12,11 @@ use crate::warning::Warning;
 const QUATERNION_TOLERANCE: f64 = 1e-5;
 
 impl Fields {
+    /// Returns whether the header states how the volume lies in a body.
+    pub(super) fn has_transform(&self) -> bool {
+        self.sform_code > 0 || self.qform_code > 0
+    }
+
     /// Returns the transform from voxel indices to world space: the sform if the file has one, else the qform, else a
     /// scaling by the voxel sizes. An sform without an inverse gives way to the qform, with a warning.
     pub(super) fn affine(&self, warnings: &mut Vec<Warning>) -> Result<DAffine3, FormatError> {
