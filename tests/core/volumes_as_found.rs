@@ -474,6 +474,10 @@ fn voxels_in_a_list_of_files() {
     ] {
         assert_eq!(read_slices(&header, &files), in_order([2, 0, 3, 1]));
     }
+    // A name that begins like a list.
+    let header = detached_nrrd("LISTED.raw\nspace units: \"mm\" \"mm\" \"mm\"", "");
+    let whole: Vec<u8> = (0..4).flat_map(|k| slice(k, 0)).collect();
+    assert_eq!(beside(&header, &[("LISTED.raw", &whole)]).unwrap().unit(), LengthUnit::Millimetre);
     // Slabs of two slices.
     let slabs = [
         ("a".to_owned(), [slice(0, 0), slice(1, 0)].concat()),

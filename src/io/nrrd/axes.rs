@@ -270,7 +270,8 @@ fn length_of(fields: &Fields, axis: &Axis) -> Result<f64, FormatError> {
     }
     match (fields.get("axismaxs"), axis.is_node) {
         (Some(_), _) if max.is_nan() => Ok(1.0),
-        (Some(_), Some(true)) if !min.is_nan() && size > 1.0 => Ok((max - min) / (size - 1.0)),
+        (Some(_), Some(true)) if size == 1.0 => Ok(1.0),
+        (Some(_), Some(true)) if !min.is_nan() => Ok((max - min) / (size - 1.0)),
         (Some(_), Some(false)) if !min.is_nan() => Ok((max - min) / size),
         (Some(field), _) => {
             let accepted = "spacings, space directions, or axis mins and axis maxs with centers";

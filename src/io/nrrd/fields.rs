@@ -105,7 +105,7 @@ impl Fields {
         if self.pairs.iter().any(|(known, _)| *known == key) {
             return Err(FormatError::invalid(FORMAT, name, "is given twice"));
         }
-        let files = key == "datafile" && value.trim_start().starts_with("LIST");
+        let files = key == "datafile" && value.split_whitespace().next() == Some("LIST");
         self.pairs.push((key, value.trim().to_owned()));
         Ok(files)
     }
