@@ -81,8 +81,13 @@ export class Level {
 
   #fillOf(value: unknown): number {
     const fill = Number(value);
+    const part = `${this.#part}.fill_value`;
+    // zarrita passes on bytes of floats, which are written in hexadecimal digits, as if they were a number.
+    if (typeof value === 'string' && (/^0x/i.test(value) || (Number.isNaN(fill) && value !== 'NaN'))) {
+      throw badZarr(part, `must be a number, "NaN", "Infinity" or "-Infinity", got ${shown(value)}`);
+    }
     if (typeof value !== 'bigint' || new this.VoxelArrays([fill])[0] === fill) return fill;
-    throw badZarr(`${this.#part}.fill_value`, `${TOO_LONG}, got ${value}`);
+    throw badZarr(part, `${TOO_LONG}, got ${value}`);
   }
 
   #along(values: number[], missing: number): Vec3 {

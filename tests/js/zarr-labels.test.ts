@@ -75,6 +75,12 @@ test('voxels of chunks that are not stored are NaN if the fill value is', async 
   const { NaN: none } = Number;
   expect(values).toEqual([1, 2, none, none, 3, 4, none, none, 5, 6, none, none, 7, 8, none, none]);
   expect(zarr.range).toEqual([1, 8]);
+  for (const fill of ['0x7fc00000', 'nothing']) {
+    const { message } = await rejection(openZarr(imageOf({ dtype: '<f4', fill, chunks })));
+    expect(message).toContain(
+      `array "0".fill_value: must be a number, "NaN", "Infinity" or "-Infinity", got "${fill}"`,
+    );
+  }
 });
 
 describe('an axis without a unit', () => {
