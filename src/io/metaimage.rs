@@ -12,7 +12,7 @@ use super::gzip::{gunzip, is_gzip, unzlib};
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
 use super::source::Source;
 use super::text::{Field, Lines};
-use super::units::{metres, unit_of};
+use super::units::{metres, thickness_warning, unit_of};
 use super::{FormatError, VolumeOptions};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
@@ -200,6 +200,9 @@ impl Header {
         dims[..rank].copy_from_slice(&sizes);
         let scalar = scalar(&fields.need("ElementType")?)?;
         let colours = colours(fields, scalar)?;
+        let mut warnings: Vec<Warning> =
+            colours.map(Colours::warning).into_iter().chain(sequence_warning(fields, rank)).collect();
+        let affine = affine(fields, &sizes, &mut warnings)?;
         Ok(Self {
             scalar,
             colours,
@@ -211,13 +214,9 @@ impl Header {
             skip: skip(fields)?,
             slope: fields.number("ElementToIntensityFunctionSlope", 1.0)?,
             intercept: fields.number("ElementToIntensityFunctionOffset", 0.0)?,
-            affine: affine(fields, rank)?,
+            affine,
             unit: unit(fields),
-            warnings: colours
-                .map(Colours::warning)
-                .into_iter()
-                .chain(sequence_warning(fields, rank))
-                .collect(),
+            warnings,
         })
     }
 
@@ -344,12 +343,18 @@ fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }
 }
 
-/// Returns the transform from voxel indices to world space (LPS).
-fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
+/// Returns the transform from voxel indices to world space (LPS) of an image with these numbers of voxels. A single slice
+/// without a thickness has one of 1, with a warning.
+fn affine(fields: &Fields, sizes: &[usize], warnings: &mut Vec<Warning>) -> Result<DAffine3, FormatError> {
+    let rank = sizes.len();
     let mut columns = axes(fields, rank)?;
     if let Some(field) = fields.any(&["ElementSpacing", "ElementSize"]) {
-        for (column, spacing) in columns.iter_mut().zip(field.finite_first(rank)?) {
-            *column *= spacing;
+        for (axis, (column, spacing)) in columns.iter_mut().zip(field.finite_first(rank)?).enumerate() {
+            if spacing == 0.0 && sizes[axis] == 1 {
+                warnings.push(thickness_warning(axis));
+            } else {
+                *column *= spacing;
+            }
         }
     }
     let mut origin = [0.0; 3];

@@ -1,6 +1,7 @@
-//! Names of units of length in volume files.
+//! Lengths in volume files: names of units, and those that are missing.
 
 use crate::volume::LengthUnit;
+use crate::warning::{Warning, WarningCode};
 
 /// Returns the metres in a unit of length, by its name or symbol; `None` if `name` is no known unit of length.
 pub(super) fn metres(name: &str) -> Option<f64> {
@@ -40,6 +41,13 @@ pub(super) fn unit_of(metres: f64) -> LengthUnit {
         1e-6 => LengthUnit::Micrometre,
         _ => LengthUnit::Unknown,
     }
+}
+
+/// Returns the warning that a single slice along an axis, to which the file gives no thickness, has one of 1.
+pub(super) fn thickness_warning(axis: usize) -> Warning {
+    let name = ["x", "y", "z"].get(axis).unwrap_or(&"time");
+    let text = format!("The file gives no thickness of the single slice along {name}; 1 was assumed.");
+    Warning::new(WarningCode::Reader, text)
 }
 
 #[cfg(test)]

@@ -170,6 +170,43 @@ fn a_single_slice_without_thickness_is_of_thickness_one() {
 }
 
 #[test]
+fn a_single_slice_without_thickness_in_other_formats() {
+    let nrrd = |sizes: &str, lines: &str| {
+        let header =
+            format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\nencoding: raw\n{lines}\n\n");
+        [header.as_bytes(), &[0, 1, 2, 3]].concat()
+    };
+    let space = "space: RAS\nspace origin: (5,6,7)\nspace directions:";
+    for (file, columns) in [
+        (nrrd("2 2 1", "spacings: 2 3 0"), [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 1.0]]),
+        (
+            nrrd("2 2 1", &format!("{space} (0,2,0) (0,0,3) (0,0,0)")),
+            [[0.0, 2.0, 0.0], [0.0, 0.0, 3.0], [1.0, 0.0, 0.0]],
+        ),
+        (
+            nrrd("2 1 2", &format!("{space} (2,0,0) (0,0,0) (0,0,3)")),
+            [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 3.0]],
+        ),
+        (
+            nrrd("1 2 2", &format!("{space} (0,0,0) (0,2,0) (0,0,3)")),
+            [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]],
+        ),
+    ] {
+        let volume = whole(&file);
+        assert_warned(&volume, "no thickness of the single slice");
+        let found = volume.affine().matrix3;
+        assert_eq!([found.x_axis, found.y_axis, found.z_axis].map(|column| column.to_array()), columns);
+    }
+    let meta = "NDims = 3\nDimSize = 2 2 1\nElementSpacing = 2 3 0\nTransformMatrix = 0 1 0 1 0 0 0 0 -1\n\
+                ElementType = MET_UCHAR\nElementDataFile = LOCAL\nabcd";
+    let volume = whole(meta.as_bytes());
+    assert_warned(&volume, "along z");
+    assert_rows(&volume, [[0.0, -3.0, 0.0, 0.0], [-2.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]]);
+    assert!(refusal(&nrrd("2 1 2", "spacings: 2 3 0")).contains("spacings: "));
+    assert!(refusal(meta.replace("2 2 1", "2 1 2").as_bytes()).contains("affine"));
+}
+
+#[test]
 fn a_nifti_file_without_a_transform_is_in_the_space_that_is_chosen() {
     let file = Header::new().file();
     let sizes = |x: f64, y: f64| [[x, 0.0, 0.0, 0.0], [0.0, y, 0.0, 0.0], [0.0, 0.0, 3.0, 0.0]];

@@ -3,6 +3,7 @@
 use super::fields::Fields;
 use super::{FORMAT, warning};
 use crate::io::FormatError;
+use crate::io::units::thickness_warning;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::is_placement;
 use crate::warning::Warning;
@@ -114,11 +115,6 @@ impl Fields {
 
     /// Returns a warning if the thickness of a single slice had to be assumed.
     pub(super) fn thickness_warning(&self) -> Option<Warning> {
-        let axis = (0..3).find(|&axis| (axis as i64) < self.dim[0] && self.is_thin(axis))?;
-        let name = ["x", "y", "z"][axis];
-        Some(warning(format!(
-            "The header gives no thickness of the single slice along {name} (pixdim[{}]); 1 was assumed.",
-            axis + 1
-        )))
+        (0..3).find(|&axis| (axis as i64) < self.dim[0] && self.is_thin(axis)).map(thickness_warning)
     }
 }

@@ -12,7 +12,7 @@ use super::world::World;
 use crate::io::FormatError;
 use crate::io::colour::Colours;
 use crate::io::text::Field;
-use crate::io::units::{metres, unit_of};
+use crate::io::units::{metres, thickness_warning, unit_of};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space};
 use crate::warning::Warning;
@@ -29,6 +29,8 @@ pub(super) struct Axes {
     world: World,
     affine: DAffine3,
     unit: LengthUnit,
+    /// Index among the spatial axes of one with a single slice to which the file gives no thickness.
+    thin: Option<usize>,
     space_units: Vec<String>,
 }
 
@@ -56,7 +58,8 @@ impl Axes {
             None => placement_from_spacings(fields, &in_space)?,
         };
         let affine = DAffine3::from_scale(factors) * affine_of(fields, &world, placement)?;
-        Ok(Self { sizes, axes, colours, frames, world, affine, unit, space_units })
+        let thin = in_space.iter().position(|axis| axis.is_thin());
+        Ok(Self { sizes, colours, frames, world, affine, unit, thin, space_units, axes })
     }
 
     /// Returns the sizes of all axes, in the order of the file.
@@ -71,7 +74,8 @@ impl Axes {
 
     /// Returns what a user should know about the axes.
     pub(super) fn warnings(&self) -> Vec<Warning> {
-        self.world.warning().into_iter().chain(self.colours.map(Colours::warning)).collect()
+        let thin = self.thin.map(thickness_warning);
+        self.world.warning().into_iter().chain(self.colours.map(Colours::warning)).chain(thin).collect()
     }
 
     /// Returns the number of voxels along x, y and z, and the number of frames.
@@ -226,13 +230,17 @@ fn seconds(unit: &str) -> Option<f64> {
 }
 
 /// Returns the columns of the affine map from voxel index to world, from the directions of one to three spatial axes;
-/// missing axes get unit vectors perpendicular to the others.
+/// missing axes, and those with a single slice of no thickness, get unit vectors perpendicular to the others.
 fn columns_from_directions(axes: &[&Axis]) -> [DVec3; 3] {
-    let directions: Vec<DVec3> = axes.iter().filter_map(|axis| axis.direction).map(|v| v.space).collect();
-    match directions[..] {
-        [x, y, z] => [x, y, z],
-        [x, y] => [x, y, x.cross(y).normalize_or_zero()],
-        [x] => {
+    let direction = |axis: usize| axes.get(axis).filter(|axis| !axis.is_thin())?.direction.map(|v| v.space);
+    let columns = [direction(0), direction(1), direction(2)];
+    let normal = |a: DVec3, b: DVec3| a.cross(b).normalize_or_zero();
+    match columns {
+        [Some(x), Some(y), Some(z)] => [x, y, z],
+        [Some(x), Some(y), None] => [x, y, normal(x, y)],
+        [Some(x), None, Some(z)] => [x, normal(z, x), z],
+        [None, Some(y), Some(z)] => [normal(y, z), y, z],
+        [Some(x), None, None] => {
             let (y, z) = x.normalize_or_zero().any_orthonormal_pair();
             [x, y, z]
         }
@@ -266,7 +274,7 @@ fn placement_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<DAffine3, 
 fn length_of(fields: &Fields, axis: &Axis) -> Result<f64, FormatError> {
     let ([min, max], size) = (axis.ends, axis.size as f64);
     if !axis.spacing.is_nan() {
-        return Ok(axis.spacing);
+        return Ok(if axis.is_thin() { 1.0 } else { axis.spacing });
     }
     match (fields.get("axismaxs"), axis.is_node) {
         (Some(_), _) if max.is_nan() => Ok(1.0),

@@ -25,6 +25,14 @@ pub(super) struct Axis {
     pub(super) direction: Option<Vector>,
 }
 
+impl Axis {
+    /// Returns whether the axis has a single slice, and the file gives it no thickness.
+    pub(super) fn is_thin(&self) -> bool {
+        let length = self.direction.map_or(self.spacing, |direction| direction.space.length());
+        self.size == 1 && length == 0.0
+    }
+}
+
 /// Kind of an NRRD axis; the later a kind is in this order, the less likely is the axis to be spatial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum AxisKind {
