@@ -9,10 +9,12 @@ export type {
   LengthUnit,
   MeshExtra,
   MeshTexture,
+  NamedFile,
   PointArray,
   Space,
   TextureType,
   Vec3,
+  VolumeFileOptions,
   VolumeInit,
   VoxelArray,
 } from './data.js';

@@ -27,6 +27,31 @@ export type Space = 'RAS' | 'LPS';
 /** Length of one unit of world coordinates: metres, millimetres or micrometres. */
 export type LengthUnit = 'm' | 'mm' | 'um';
 
+/** A file beside another one. */
+export interface NamedFile {
+  /** Name of the file, with or without folders. */
+  name: string;
+  /** Its content. */
+  bytes: Uint8Array;
+}
+
+/** Options of reading a volume file. */
+export interface VolumeFileOptions {
+  /** Content of the file with the voxels, if the header is a file of its own; of several ones, one after the other. */
+  data?: Uint8Array;
+  /**
+   * Files beside the header, in place of `data`: those that it names are found by their names without folders, as they
+   * are written or else in upper or lower case. For a `.hdr` it is the only one with the ending `.img` or `.img.gz`.
+   * Others are ignored.
+   */
+  files?: readonly NamedFile[];
+  /**
+   * Orientation of the world axes for files that do not tell it: some NRRD, which are otherwise LPS with a warning, Analyze
+   * 7.5, and NIfTI without a transform (`qform_code` and `sform_code` are 0), otherwise RAS.
+   */
+  space?: Space;
+}
+
 /** Constructor options of a {@link Volume}. */
 export interface VolumeInit {
   /** Stored value of each voxel: x fastest, then y, z, t. Copied once. */
@@ -47,7 +72,7 @@ export interface VolumeInit {
   frameSeconds?: number;
   /** Orientation of the world axes. Default RAS; meshes are returned in the same space. */
   space?: Space;
-  /** Length of a world unit, which NIfTI files state. Default unknown. */
+  /** Length of a world unit, if it is known. */
   unit?: LengthUnit;
   /** Findings of the file's reader, for {@link Volume.warnings}; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];

@@ -228,7 +228,7 @@ export class DeformableModel implements Stepper {
     }
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     const start = options.start instanceof Mesh ? options.start.warnings : [];
-    this.#warnings = new ModelWarnings(source ? [] : (options.volume as Volume).warnings, start);
+    this.#warnings = new ModelWarnings((source ?? (options.volume as Volume)).warnings, start);
     this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of());
   }
 

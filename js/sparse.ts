@@ -3,6 +3,7 @@ import { endingTogether } from './abort.js';
 import type { DataOptions, Vec3, VoxelArray } from './data.js';
 import type { Handle } from './runtime.js';
 import type { RawSparseVolume } from './vesicle.js';
+import type { Warning } from './warning.js';
 
 /**
  * Key of the method by which a volume offers its {@link SparseSource}. Each module of the package has its own, so that a
@@ -32,6 +33,8 @@ export interface SparseSource {
   coarsest: VoxelArray;
   /** Intensity of voxels that are not stored. */
   fill: number;
+  /** Warnings about assumptions on the volume. */
+  warnings: readonly Warning[];
   /** Creates the WebAssembly object that holds the voxels of one model, with the coarsest level, which is freed with it. */
   create(): Handle<RawSparseVolume>;
   /** Reads a box. */

@@ -13,11 +13,12 @@ import {
   typedArray,
   vec3,
 } from './check.js';
-import type { LengthUnit, Space, Vec3, VolumeInit, VoxelArray } from './data.js';
+import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
+import { readerArguments } from './volume-file.js';
 import type { Warning } from './warning.js';
 import { checkedWarnings, placeOf } from './warnings.js';
 
@@ -71,20 +72,22 @@ export class Volume {
   }
 
   /**
-   * Parses a volume file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage (`.mha`,
-   * or `.mhd` and data), detected from the bytes. NIfTI files may be gzipped as a whole, the voxels of NRRD and
-   * MetaImage compressed inside the file.
+   * Parses a volume file: NIfTI-1 or 2 (`.nii`, `.nii.gz`, or `.hdr` and `.img`), Analyze 7.5 (`.hdr` and `.img`), NRRD
+   * (`.nrrd`, or `.nhdr` and data) or MetaImage (`.mha`, or `.mhd` and data), detected from the bytes. NIfTI files may be
+   * gzipped as a whole, the voxels of NRRD and MetaImage compressed inside the file. Of colours the luminance (Rec. 709)
+   * is read, with a warning; other vectors are refused.
    *
    * Entry points with one method lack it: use `parseVolume` of `vesicle/import`.
    *
-   * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
-   * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+   * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header. `files`: the files
+   *   beside the header instead, among which those that it names are found, such as the slices of a list or a numbered
+   *   series. `space`: orientation of the world axes, for files that do not tell it.
+   * @throws {@link VesicleError} `bad-file` naming the format and the field, or the files that are missing or of the
+   *   wrong size; `too-large`.
    */
-  static parse(bytes: Uint8Array, options: { data?: Uint8Array } = {}): Volume {
-    const { data } = checkProperties('options', options, ['data']);
-    typedArray('bytes', bytes, Uint8Array);
-    if (data !== undefined) typedArray('data', data, Uint8Array);
-    return wrap(() => RawVolume.parse(bytes, data));
+  static parse(bytes: Uint8Array, options?: VolumeFileOptions): Volume {
+    const given = readerArguments(bytes, options);
+    return wrap(() => RawVolume.parse(...given));
   }
 
   /**
@@ -169,6 +172,15 @@ export class Volume {
   }
 
   /**
+   * Length of a world unit; undefined if neither the file nor the maker of the volume states it. A volume made from this
+   * one has the same.
+   */
+  get unit(): LengthUnit | undefined {
+    const unit = this.#handle.use((raw) => raw.unit());
+    return unit === '' ? undefined : (unit as LengthUnit);
+  }
+
+  /**
    * Warnings: things to know about the volume before relying on it; empty if there are none. A volume made from this one has those
    * that still hold for it.
    */
@@ -221,7 +233,8 @@ export class Volume {
   /**
    * Returns all intensities of one frame, x fastest, for upload as a 3D texture. In single precision, with 24 bits:
    * integers are exact up to 16,777,216, and intensities near 4·10⁹ are multiples of 256, so that smaller differences are
-   * lost. Methods do not use these, and keep them.
+   * lost. Methods do not use these, and keep them. Voxels that are NaN are NaN here; {@link Volume.slice} and
+   * {@link Volume.sample} give {@link Volume.range}'s lower end for them, so that they can be shown and interpolated.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */

@@ -77,6 +77,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     spacing: 'value',
     affine: 'value',
     space: 'value',
+    unit: 'value',
     range: 'value',
     warnings: 'value',
     toNifti: 'method',

@@ -1,6 +1,8 @@
 //! Fuzz targets of the readers of volumes, and of the functions on a volume that was read.
 
-use vesicle::io::{Compression, VolumeFormat, parse_volume, write_volume};
+use vesicle::io::{
+    Compression, FormatError, VolumeFormat, VolumeOptions, parse_volume, parse_volume_with, write_volume,
+};
 use vesicle::math::DVec3;
 use vesicle::volume::{Enrichment, Interpolation, ResampleGrid, Volume, marching_cubes_world};
 
@@ -22,11 +24,16 @@ pub fn metaimage(data: &[u8]) {
     use_volume(data, None);
 }
 
-/// Reads a header with detached voxels; the first two bytes are the length of the header, low byte first.
+/// Reads a header with detached voxels, and with the same voxels in files of some names; the first two bytes are the length
+/// of the header, low byte first.
 pub fn pair(data: &[u8]) {
     let Some((&length, rest)) = data.split_first_chunk() else { return };
     let (header, voxels) = rest.split_at(usize::from(u16::from_le_bytes(length)).min(rest.len()));
     use_volume(header, Some(voxels));
+    let files: Vec<(&str, &[u8])> =
+        ["a.raw", "b.raw", "s1", "s2", "a.img"].map(|name| (name, voxels)).to_vec();
+    let options = VolumeOptions { files: Some(&files), ..VolumeOptions::default() };
+    checked(parse_volume_with(header, &options));
 }
 
 /// Reads compressed voxels with valid checksums; the first byte selects the file around them: plain gzip, NRRD or
@@ -69,7 +76,11 @@ fn zlib(deflated: &[u8], content: &[u8]) -> Vec<u8> {
 
 /// Reads a volume, with `detached` voxels if there are any, and checks it; an error must have a short message.
 fn use_volume(bytes: &[u8], detached: Option<&[u8]>) {
-    match parse_volume(bytes, detached) {
+    checked(parse_volume(bytes, detached));
+}
+
+fn checked(result: Result<Volume, FormatError>) {
+    match result {
         Ok(volume) => check(&volume),
         Err(error) => {
             assert!(error.to_string().len() < 2000, "a message of {} bytes", error.to_string().len())
@@ -88,7 +99,7 @@ fn check(volume: &Volume) {
     }
     for frame in [0, frames - 1] {
         let values = volume.intensities(frame).unwrap();
-        assert!(values.iter().all(|v| v.is_finite()));
+        assert!(values.iter().all(|v| !v.is_infinite()));
         let counted: u32 = volume.histogram(16, frame).unwrap().iter().sum();
         assert!(counted as usize <= values.len());
         for (axis, size) in volume.dims().into_iter().enumerate() {

@@ -14,6 +14,7 @@ import type {
   PointArray,
   PointData,
   Space,
+  VolumeFileOptions,
   VolumeInit,
   VoxelArray,
 } from '../data.js';
@@ -21,6 +22,7 @@ import { MeshFile, VolumeFile } from '../files.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
 import { checkTexture, rawTexture, textureOf } from '../texture.js';
+import { readerArguments } from '../volume-file.js';
 import type { Warning } from '../warning.js';
 
 export type {
@@ -28,10 +30,12 @@ export type {
   MeshData,
   MeshExtra,
   MeshTexture,
+  NamedFile,
   PointData,
   Space,
   TextureType,
   Vec3,
+  VolumeFileOptions,
   VolumeInit,
   VoxelArray,
 } from '../data.js';
@@ -42,14 +46,15 @@ export type { Warning, WarningCode } from '../warning.js';
 /**
  * Parses a volume file like `Volume.parse` of `vesicle`, and returns what the constructor of `Volume` takes.
  *
- * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header.
- * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+ * @param options - `data`: the bytes of the file with the voxels, if `bytes` is a detached header. `files`: the files
+ *   beside the header instead, among which those that it names are found. `space`: orientation of the world axes, for
+ *   files that do not tell it.
+ * @throws {@link VesicleError} `bad-file` naming the format and the field, or the files that are missing or of the wrong
+ *   size; `too-large`.
  */
-export function parseVolume(bytes: Uint8Array, options: { data?: Uint8Array } = {}): VolumeInit {
-  const { data } = checkProperties('options', options, ['data']);
-  typedArray('bytes', bytes, Uint8Array);
-  if (data !== undefined) typedArray('data', data, Uint8Array);
-  return inOwnInstance(() => volumeData(VolumeFile.parse(bytes, data)));
+export function parseVolume(bytes: Uint8Array, options?: VolumeFileOptions): VolumeInit {
+  const given = readerArguments(bytes, options);
+  return inOwnInstance(() => volumeData(VolumeFile.parse(...given)));
 }
 
 /**

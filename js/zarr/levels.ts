@@ -14,13 +14,15 @@ export interface Selection {
   time: number;
 }
 
-type VoxelArrays = new (length: number) => VoxelArray;
+type VoxelArrays = new (values: number | number[]) => VoxelArray;
 
 const TYPES: Record<string, [ZarrVoxelType, VoxelArrays]> = {
   ...{ uint8: ['u8', Uint8Array], int8: ['i8', Int8Array] },
   ...{ uint16: ['u16', Uint16Array], int16: ['i16', Int16Array] },
   ...{ uint32: ['u32', Uint32Array], int32: ['i32', Int32Array] },
   ...{ float32: ['f32', Float32Array], float64: ['f32', Float32Array] },
+  // Label maps, whose values mostly fit into 32 bits; others are refused where they are read.
+  ...{ uint64: ['u32', Uint32Array], int64: ['i32', Int32Array] },
 };
 
 /** Largest number of voxels along an axis. */
@@ -68,13 +70,24 @@ export class Level {
     this.#spatial = spatialAxes(axes);
     this.#selected = axes.map((axis, index) => selected(axis, array.shape[index] as number, selection));
     this.VoxelArrays = type[1];
-    this.fill = Number(array.fillValue ?? 0);
+    this.fill = this.#fillOf(array.fillValue ?? 0);
     this.info = Object.freeze({
       dims: this.#along(array.shape, 1),
       ...placement(transform, this.#spatial),
       chunks: this.#along(array.chunks, 1),
       voxelType: type[0],
     });
+  }
+
+  #fillOf(value: unknown): number {
+    const fill = Number(value);
+    const part = `${this.#part}.fill_value`;
+    // zarrita passes on bytes of floats, which are written in hexadecimal digits, as if they were a number.
+    if (typeof value === 'string' && (/^0x/i.test(value) || (Number.isNaN(fill) && value !== 'NaN'))) {
+      throw badZarr(part, `must be a number, "NaN", "Infinity" or "-Infinity", got ${shown(value)}`);
+    }
+    if (typeof value !== 'bigint' || new this.VoxelArrays([fill])[0] === fill) return fill;
+    throw badZarr(part, `${TOO_LONG}, got ${value}`);
   }
 
   #along(values: number[], missing: number): Vec3 {
@@ -100,7 +113,7 @@ export class Level {
     const { dims, chunks } = this.info;
     const min = chunk.map((index, axis) => index * (chunks[axis] as number)) as Vec3;
     const size = chunks.map((most, axis) => Math.min(most, (dims[axis] as number) - (min[axis] as number))) as Vec3;
-    return { min, dims: size, data: this.#voxels(stored, size) };
+    return { min, dims: size, data: this.#voxels(stored, size, `${this.#part}, chunk ${position.join()}`) };
   }
 
   async #chunk(position: number[], signal: AbortSignal): Promise<Stored> {
@@ -120,7 +133,7 @@ export class Level {
   }
 
   /** Returns the first voxels of the selected channel and time of a chunk, x fastest. */
-  #voxels({ data, stride }: Stored, [nx, ny, nz]: Vec3): VoxelArray {
+  #voxels({ data, stride }: Stored, [nx, ny, nz]: Vec3, part: string): VoxelArray {
     const first = this.#selected.reduce(
       (sum, index, axis) => sum + (index % (this.#array.chunks[axis] as number)) * (stride[axis] as number),
       0,
@@ -129,20 +142,33 @@ export class Level {
     if (isDense(data, this.VoxelArrays, [nx, ny, nz], [sx, sy, sz])) return data;
     const voxels = new this.VoxelArrays(nx * ny * nz);
     for (let z = 0, to = 0; z < nz; z++) {
-      for (let y = 0; y < ny; y++, to += nx) copyRow(data, first + z * sz + y * sy, sx, voxels, to, nx);
+      for (let y = 0; y < ny; y++, to += nx) {
+        const start = first + z * sz + y * sy;
+        if (isLong(data)) shortenRow(data, start, sx, voxels.subarray(to, to + nx), part);
+        else copyRow(data, start, sx, voxels, to, nx);
+      }
     }
     return voxels;
   }
 }
 
+/** Integers of 64 bits. */
+type LongArray = BigInt64Array | BigUint64Array;
+
 /** A chunk as zarrita decodes it. */
 interface Stored {
-  data: VoxelArray;
+  data: VoxelArray | LongArray;
   stride: number[];
 }
 
+function isLong(data: Stored['data']): data is LongArray {
+  return data instanceof BigInt64Array || data instanceof BigUint64Array;
+}
+
+const TOO_LONG = 'integers of 64 bits must fit into 32 bits';
+
 /** Returns whether the voxels of a chunk are stored as they are needed. */
-function isDense(data: VoxelArray, kind: VoxelArrays, [nx, ny, nz]: Vec3, [sx, sy, sz]: Vec3): boolean {
+function isDense(data: Stored['data'], kind: VoxelArrays, [nx, ny, nz]: Vec3, [sx, sy, sz]: Vec3): data is VoxelArray {
   const isWhole = data.length === nx * ny * nz && data.buffer.byteLength === data.byteLength;
   return isWhole && data instanceof kind && sx === 1 && (ny === 1 || sy === nx) && (nz === 1 || sz === nx * ny);
 }
@@ -153,6 +179,15 @@ function copyRow(from: VoxelArray, start: number, step: number, to: VoxelArray, 
     return;
   }
   for (let i = 0; i < count; i++) to[at + i] = from[start + i * step] as number;
+}
+
+/** Copies a row of integers of 64 bits into ones of 32; throws `bad-file` for those that do not fit. */
+function shortenRow(from: LongArray, start: number, step: number, to: VoxelArray, part: string): void {
+  for (let i = 0; i < to.length; i++) {
+    const value = from[start + i * step] as bigint;
+    to[i] = Number(value);
+    if (to[i] !== Number(value)) throw badZarr(part, `${TOO_LONG}, got ${value}`);
+  }
 }
 
 /** Throws `bad-file` unless all arrays have the same numbers of channels and times. */

@@ -1,4 +1,5 @@
 // Reads the metadata of an OME-Zarr image: its axes, and the transform of each level to world space.
+import type { Warning } from '../warning.js';
 import { badZarr, shown } from './error.js';
 
 /** Role of an axis of the arrays. */
@@ -12,6 +13,8 @@ export interface Multiscale {
   unit: 'mm' | undefined;
   /** Where each level is, finest first. */
   levels: LevelTransform[];
+  /** Warnings about assumptions. */
+  warnings: Warning[];
 }
 
 /** Location of a level, and the transform world = scale * index + translation along each axis. */
@@ -49,7 +52,7 @@ const MILLIMETRES: Record<string, number> = {
 export function parseMultiscale(attributes: Json): Multiscale {
   const image = imageOf(attributes);
   const { names, units } = parseAxes(image.axes);
-  const { unit, factors } = millimetres(names, units);
+  const { unit, factors, warnings } = millimetres(names, units);
   const whole = parseTransform(image.coordinateTransformations ?? [], names.length, 'coordinateTransformations');
   const datasets = list(image.datasets, 'multiscales[0].datasets');
   if (datasets.length > MOST_LEVELS) {
@@ -60,7 +63,7 @@ export function parseMultiscale(attributes: Json): Multiscale {
     const { scale, translation } = composed(own, whole);
     return { path, scale: product(scale, factors), translation: product(translation, factors) };
   });
-  return { axes: names, unit, levels };
+  return { axes: names, unit, levels, warnings };
 }
 
 function imageOf(attributes: Json): Json {
@@ -110,18 +113,38 @@ function nameOfType(type: unknown): AxisName | undefined {
   return type === 'time' ? 't' : undefined;
 }
 
-/** Returns the factor of each axis by which lengths become millimetres; 1 if no unit of length is known. */
-function millimetres(names: AxisName[], units: unknown[]): { unit: 'mm' | undefined; factors: number[] } {
+/** The unit of the world, and the factor of each axis by which lengths are converted to it. */
+type Lengths = { unit: 'mm' | undefined; factors: number[]; warnings: Warning[] };
+
+/**
+ * Returns the factor of each axis by which lengths become millimetres; 1 if no unit of length is known. An axis without a
+ * unit has that of the others, if they agree.
+ */
+function millimetres(names: AxisName[], units: unknown[]): Lengths {
   const spatial = names.map((name) => SPACE.includes(name));
   const known = units.map((unit, axis) => (spatial[axis] ? lengthOf(unit) : 1));
-  const lengths = known.filter((_, axis) => spatial[axis]);
-  if (lengths.every((length) => length === undefined)) return { unit: undefined, factors: names.map(() => 1) };
-  const missing = known.indexOf(undefined);
-  if (missing < 0) return { unit: 'mm', factors: known as number[] };
-  throw badZarr(
-    `multiscales[0].axes[${missing}].unit`,
-    `must be a unit of length if other axes have one, such as "micrometer", got ${shown(units[missing])}`,
-  );
+  const lengths = new Set(known.filter((length, axis) => spatial[axis] && length !== undefined));
+  if (lengths.size === 0) return { unit: undefined, factors: names.map(() => 1), warnings: [] };
+  const unknown = [...names.keys()].filter((axis) => known[axis] === undefined);
+  const wrong = unknown.find((axis) => lengths.size > 1 || !isMissing(units[axis]));
+  if (wrong !== undefined) {
+    throw badZarr(
+      `multiscales[0].axes[${wrong}].unit`,
+      `must be a unit of length if other axes have one, such as "micrometer", got ${shown(units[wrong])}`,
+    );
+  }
+  const [length = 1] = [...lengths];
+  const factors = known.map((own) => own ?? length);
+  return { unit: 'mm', factors, warnings: unknown.length > 0 ? [sameUnit(unknown.map((axis) => names[axis]))] : [] };
+}
+
+function isMissing(unit: unknown): boolean {
+  return unit === undefined || unit === null || unit === '';
+}
+
+function sameUnit(names: unknown[]): Warning {
+  const text = `The image states no unit of length for ${names.join(', ')}; that of its other axes was assumed.`;
+  return { code: 'reader', text };
 }
 
 function lengthOf(unit: unknown): number | undefined {

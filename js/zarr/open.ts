@@ -2,6 +2,7 @@
 import type { Group, Location, Readable, Array as ZarrArray } from 'zarrita';
 import { endingTogether } from '../abort.js';
 import { invalid } from '../check.js';
+import type { Warning } from '../warning.js';
 import { badZarr, RefusedError, translated, type Zarrita } from './error.js';
 import { checkPyramid, checkSeries, Level, type Selection } from './levels.js';
 import { parseMultiscale } from './multiscales.js';
@@ -19,6 +20,9 @@ export async function importZarrita(): Promise<Zarrita> {
   throw invalid('zarrita', 'version 0.7 or newer is needed to read OME-Zarr');
 }
 
+/** The levels of an image, its unit of length, and warnings about assumptions. */
+type Opened = { levels: Level[]; unit: 'mm' | undefined; warnings: Warning[] };
+
 /** Opens the levels of an image in a store, finest first, and checks them. */
 export async function openLevels(
   zarrita: Zarrita,
@@ -26,7 +30,7 @@ export async function openLevels(
   path: string,
   selection: Selection,
   signal: AbortSignal | undefined,
-): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
+): Promise<Opened> {
   return endingTogether(signal, (signal) => openArrays(zarrita, store, path, selection, signal));
 }
 
@@ -36,7 +40,7 @@ async function openArrays(
   path: string,
   selection: Selection,
   signal: AbortSignal,
-): Promise<{ levels: Level[]; unit: 'mm' | undefined }> {
+): Promise<Opened> {
   const opener = new Opener(zarrita, signal);
   const group = await opener.group(zarrita.root(store).resolve(path.replace(/^\/+|\/+$/g, '')));
   const image = parseMultiscale(Object(group.attrs));
@@ -51,7 +55,7 @@ async function openArrays(
     levels,
     image.levels.map((transform) => transform.path),
   );
-  return { levels, unit: image.unit };
+  return { levels, unit: image.unit, warnings: image.warnings };
 }
 
 /** Opens groups on Zarr 3, or else on Zarr 2, and then arrays of the same version. */

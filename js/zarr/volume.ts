@@ -7,6 +7,7 @@ import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
 import { RawSparseVolume } from '../vesicle.js';
 import { Volume } from '../volume.js';
+import type { Warning } from '../warning.js';
 import { type Brick, BrickCache } from './cache.js';
 import { type Level, levelAt, volumeOf } from './levels.js';
 import type { ZarrBox, ZarrLevel, ZarrLoaded } from './types.js';
@@ -25,6 +26,7 @@ const LARGEST_COARSEST = 256e6;
 export interface ZarrParts {
   levels: Level[];
   unit: 'mm' | undefined;
+  warnings: Warning[];
   /** Number of bytes of chunks to keep. */
   cache: number;
   concurrency: number;
@@ -40,6 +42,8 @@ export class ZarrVolume {
   readonly levels: readonly ZarrLevel[];
   /** Unit of world coordinates: millimetres, into which lengths were converted; undefined if the image states none. */
   readonly unit: 'mm' | undefined;
+  /** Warnings about assumptions where metadata are missing; volumes made from the image have the same. */
+  readonly warnings: readonly Warning[];
   readonly #levels: Level[];
   readonly #cache: BrickCache;
   readonly #concurrency: number;
@@ -51,9 +55,10 @@ export class ZarrVolume {
   #freed = false;
 
   /** @internal */
-  constructor({ levels, unit, cache, concurrency }: ZarrParts) {
+  constructor({ levels, unit, warnings, cache, concurrency }: ZarrParts) {
     this.levels = Object.freeze(levels.map(({ info }) => info));
     this.unit = unit;
+    this.warnings = Object.freeze(warnings.map((warning) => Object.freeze(warning)));
     this.#levels = levels;
     this.#cache = new BrickCache(cache);
     this.#concurrency = concurrency;
@@ -102,7 +107,8 @@ export class ZarrVolume {
     await this.#fill(target, level, from, signal);
     const affine = from.info.affine.slice();
     for (const axis of [0, 1, 2] as const) affine[12 + axis] = world(from.info, min, axis);
-    return { data: target.data, dims, affine, ...(this.unit && { unit: this.unit }) };
+    const warnings = this.warnings.length > 0 && { warnings: this.warnings };
+    return { data: target.data, dims, affine, ...(this.unit && { unit: this.unit }), ...warnings };
   }
 
   /**
@@ -137,6 +143,7 @@ export class ZarrVolume {
     if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
     return {
       ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
+      warnings: this.warnings,
       ...{ range, coarsest, concurrency: this.#concurrency, create: () => sparseVolume(this[SPARSE_SOURCE]()) },
       read: async ({ level, min, dims }, signal) => {
         const max = min.map((first, axis) => first + (dims[axis] as number)) as Vec3;

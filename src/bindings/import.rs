@@ -10,10 +10,17 @@ use super::volume::RawVolume;
 
 #[wasm_bindgen]
 impl RawVolume {
-    /// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of
-    /// its own.
-    pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
-        Ok(RawVolume(read_volume(file, data.as_ref())?))
+    /// Reads a volume from the bytes of a file. If the header is in a file of its own, `data` is the content of the data
+    /// file, or `names` and `contents` are those of the files beside it. `space`, `RAS` or `LPS`, is that of files that
+    /// name none.
+    pub fn parse(
+        file: &Uint8Array,
+        data: Option<Uint8Array>,
+        names: Option<Vec<String>>,
+        contents: Vec<Uint8Array>,
+        space: Option<String>,
+    ) -> Result<RawVolume, JsValue> {
+        Ok(RawVolume(read_volume(file, data.as_ref(), names, contents, space.as_deref())?))
     }
 }
 

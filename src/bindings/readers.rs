@@ -6,15 +6,53 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{bytes, in_world, packed};
 use super::error::Failure;
 use super::texture::RawTexture;
-use vesicle::io::{PointCloud, parse_mesh, parse_points, parse_textured_mesh, parse_volume};
+use std::borrow::Cow;
+use vesicle::io::{
+    FileSet, FormatError, PointCloud, VolumeOptions, parse_mesh, parse_points, parse_textured_mesh,
+    parse_volume_with,
+};
 use vesicle::mesh::TriangleMesh;
-use vesicle::volume::Volume;
+use vesicle::volume::{Space, Volume};
 
-/// Reads a volume from the bytes of a file; `data` is the content of the data file, if the header is in a file of its
-/// own.
-pub(super) fn read_volume(file: &Uint8Array, data: Option<&Uint8Array>) -> Result<Volume, Failure> {
+/// Reads a volume from the bytes of a file. If the header is in a file of its own, `data` is the content of the data
+/// file, or `names` and `contents` are those of the files beside it. `space`, `RAS` or `LPS`, is that of files that name
+/// none.
+pub(super) fn read_volume(
+    file: &Uint8Array,
+    data: Option<&Uint8Array>,
+    names: Option<Vec<String>>,
+    contents: Vec<Uint8Array>,
+    space: Option<&str>,
+) -> Result<Volume, Failure> {
     let payload = data.map(bytes).transpose()?;
-    Ok(parse_volume(&bytes(file)?, payload.as_deref())?)
+    let files = names.map(|names| FilesOfPage { names, contents });
+    let options = VolumeOptions {
+        detached: payload.as_deref(),
+        files: files.as_ref().map(|files| files as &dyn FileSet),
+        space: space.map(|name| if name == "LPS" { Space::Lps } else { Space::Ras }),
+    };
+    Ok(parse_volume_with(&bytes(file)?, &options)?)
+}
+
+/// Files in the memory of JavaScript, of which those that are read are copied, one after the other.
+struct FilesOfPage {
+    names: Vec<String>,
+    contents: Vec<Uint8Array>,
+}
+
+impl FileSet for FilesOfPage {
+    fn names(&self) -> Vec<&str> {
+        self.names.iter().map(String::as_str).collect()
+    }
+
+    fn read(&self, index: usize) -> Result<Cow<'_, [u8]>, FormatError> {
+        let Some(content) = self.contents.get(index) else { return Ok(Cow::Borrowed(&[])) };
+        bytes(content).map(Cow::Owned).map_err(|_| FormatError::TooLarge {
+            format: "volume file",
+            field: "data file".to_owned(),
+            needed: content.length().into(),
+        })
+    }
 }
 
 /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is given.

@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{columns, copy_array, point, space_name, to_js, unit_named};
+use super::convert::{columns, copy_array, point, space_name, to_js, unit_name, unit_named};
 use super::error::Failure;
 use vesicle::io::write_nifti;
 use vesicle::math::DAffine3;
@@ -104,6 +104,11 @@ impl RawVolume {
         space_name(self.0.space()).to_owned()
     }
 
+    /// Returns the length of a world unit: `m`, `mm` or `um`, or an empty string if it is not known.
+    pub fn unit(&self) -> String {
+        unit_name(self.0.unit()).to_owned()
+    }
+
     /// Returns what a user should know about the volume, as an array of `Warning`.
     pub fn warnings(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.warnings())?)
@@ -131,7 +136,7 @@ impl RawVolume {
         Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
     }
 
-    /// Returns all intensities of one frame, in the order of the voxels, x fastest.
+    /// Returns all intensities of one frame, in the order of the voxels, x fastest; NaN stays NaN.
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.intensities(frame).map_err(Failure::from)?)
     }

@@ -1,27 +1,34 @@
 //! Detection of the format of a volume file from its bytes.
 
 use super::gzip::{gunzip_start, is_gzip};
-use super::{FormatError, metaimage, nifti, nrrd};
+use super::{FormatError, VolumeOptions, metaimage, nifti, nrrd};
 use crate::volume::Volume;
 
 const ANY: &str = "volume file";
-const ACCEPTED: &str =
-    "NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
+const ACCEPTED: &str = "NIfTI (.nii, .nii.gz, .hdr with .img), Analyze 7.5 (.hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
 /// Number of bytes inflated from the start of a gzipped volume file to detect its format.
 const START: usize = 512;
 
-/// Reads a volume from a NIfTI file, which may be gzipped, or from an NRRD or MetaImage file; the format is detected
-/// from the bytes. `detached` is the content of the data file if the voxels are in a file separate from the header in
-/// `bytes` (several data files are concatenated in order).
+/// Reads a volume from a NIfTI file, which may be gzipped, or from an Analyze 7.5, NRRD or MetaImage file; the format is
+/// detected from the bytes. `detached` is the content of the data file if the voxels are in a file separate from the
+/// header in `bytes` (several data files are concatenated in order).
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field; for an unsupported format, the error names the format if it is
 /// recognised.
 pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+    parse_volume_with(bytes, &VolumeOptions { detached, ..VolumeOptions::default() })
+}
+
+/// Reads a volume like [`parse_volume`], with the files beside its header, or with a space for files that name none.
+///
+/// # Errors
+/// As [`parse_volume`], and data files that are missing or of another size, by their names.
+pub fn parse_volume_with(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume, FormatError> {
     if is_gzip(bytes) {
         let start = gunzip_start(ANY, bytes, START)?;
         if nifti::is_nifti(&start) {
-            return nifti::parse(bytes, detached);
+            return nifti::parse(bytes, options);
         }
         if nrrd::is_nrrd(&start) || metaimage::is_metaimage(&start) {
             return Err(FormatError::unsupported(
@@ -33,12 +40,14 @@ pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
         }
         return Err(unsupported_format(&start));
     }
+    // A mark that text editors set at the start of a header.
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if nifti::is_nifti(bytes) {
-        nifti::parse(bytes, detached)
+        nifti::parse(bytes, options)
     } else if nrrd::is_nrrd(bytes) {
-        nrrd::parse(bytes, detached)
+        nrrd::parse(bytes, options)
     } else if metaimage::is_metaimage(bytes) {
-        metaimage::parse(bytes, detached)
+        metaimage::parse(bytes, options)
     } else {
         Err(unsupported_format(bytes))
     }

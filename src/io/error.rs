@@ -86,6 +86,16 @@ impl FormatError {
         Self::Truncated { format, field: clipped(field), needed: needed as u64, found: found as u64 }
     }
 
+    /// Returns this error as one about a file beside the header.
+    pub(crate) fn in_file(mut self, name: &str) -> Self {
+        let (Self::Invalid { field, .. }
+        | Self::Unsupported { field, .. }
+        | Self::Truncated { field, .. }
+        | Self::TooLarge { field, .. }) = &mut self;
+        *field = clipped(format!("file '{name}'"));
+        self
+    }
+
     /// Returns a [`TooLarge`](Self::TooLarge) error about `field`, which needs `needed` bytes.
     pub(crate) fn too_large(format: &'static str, field: impl Into<String>, needed: u64) -> Self {
         Self::TooLarge { format, field: clipped(field), needed }

@@ -24,6 +24,10 @@ pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result
     let mut rest = bytes;
     loop {
         let start = out.len();
+        if start > 0 && !is_gzip(rest) {
+            let problem = format!("is followed by {} bytes that are no gzip stream", rest.len());
+            return Err(FormatError::invalid(format, "gzip", problem));
+        }
         let body = after_gzip_header(format, rest)?;
         let step = inflate(format, body, &mut out, limit, false)?;
         if step.full {

@@ -2,15 +2,22 @@
 //!
 //! World space is LPS, in the unit that `DistanceUnits` names. Each row of `TransformMatrix` is the direction of one
 //! axis, as in ITK. `CenterOfRotation` and `AnatomicalOrientation` are only descriptive and ignored. The format gives
-//! no unit for the step of a fourth axis, so frames have no time. The files of a list of data files are concatenated in
-//! order.
+//! no unit for the step of a fourth axis, so frames have no time. Fields with more numbers than the image has axes are
+//! read up to those of its axes. The voxels may be in several files, each with the same number of them: a list
+//! (`ElementDataFile = LIST`), or a numbered series. Of colours (three or four channels of bytes) the luminance is read.
 
-use super::FormatError;
+use super::beside::{DataFiles, Series, pattern_and_numbers};
+use super::colour::Colours;
 use super::gzip::{gunzip, is_gzip, unzlib};
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
+use super::source::Source;
 use super::text::{Field, Lines};
+use super::units::{metres, thickness_warning, unit_of};
+use super::{FormatError, VolumeOptions};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+use crate::warning::{Warning, WarningCode};
+use std::borrow::Cow;
 
 pub(super) const FORMAT: &str = "MetaImage";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
@@ -23,34 +30,81 @@ pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
         .any(|key| start.strip_prefix(*key).is_some_and(|rest| rest.trim_ascii_start().starts_with(b"=")))
 }
 
-/// Reads a MetaImage volume; `detached` is the content of the data file, if the header refers to one.
+/// Reads a MetaImage volume, with the files beside it if its header refers to any.
 ///
 /// # Errors
 /// [`FormatError`] that names the header field at fault.
-pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+pub(super) fn parse(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume, FormatError> {
     let mut lines = Lines::new(bytes);
     let fields = Fields::read(&mut lines)?;
     let header = Header::check(&fields)?;
     let file = fields.need("ElementDataFile")?;
-    let source = match (file.text.eq_ignore_ascii_case("LOCAL"), detached) {
-        (true, _) => lines.rest(),
-        (false, Some(payload)) => payload,
-        (false, None) => {
-            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
-        }
-    };
-    header.volume(source)
+    if file.text.eq_ignore_ascii_case("LOCAL") {
+        return header.volume(&Source::Bytes(lines.rest()));
+    }
+    header.volume(&options.source(&file, || data_files(&file, lines, &header.sizes))?)
 }
 
-/// The `key = value` lines of a MetaImage header, up to and including the one that names the data file.
+/// Returns the data files that the field `ElementDataFile` names, with the lines after it and the sizes of the axes.
+fn data_files(file: &Field<'_>, mut lines: Lines<'_>, sizes: &[usize]) -> Result<DataFiles, FormatError> {
+    // The number of axes of each file may follow, such as 2D; it is known from the number of files.
+    if file.text.split_whitespace().next() == Some("LIST") {
+        return lines.names(file);
+    }
+    match pattern_and_numbers(file.text) {
+        Some((pattern, numbers)) => {
+            series(pattern, &numbers, sizes).ok_or_else(|| file.invalid("must be like 's%03d.raw 1 20 1'"))
+        }
+        None => Ok(DataFiles::Names(vec![file.text.to_owned()])),
+    }
+}
+
+/// Returns a numbered series: first and last number and step, which by default give a file for each slice, from 1 on.
+fn series(pattern: &str, numbers: &[i64], sizes: &[usize]) -> Option<DataFiles> {
+    let first = numbers.first().copied().unwrap_or(1);
+    let slices = i64::try_from(*sizes.last()?).ok()?;
+    let last = numbers.get(1).copied().or_else(|| first.checked_add(slices - 1))?;
+    let step = numbers.get(2).copied().unwrap_or(1);
+    (numbers.len() <= 3).then(|| Series::parse(pattern, first, last, step)).flatten().map(DataFiles::Series)
+}
+
+/// The keys that the reader uses.
+const KEYS: [&str; 22] = [
+    "ObjectType",
+    "NDims",
+    "DimSize",
+    "ElementType",
+    "ElementNumberOfChannels",
+    "ElementDataFile",
+    "ElementSpacing",
+    "ElementSize",
+    "ElementByteOrderMSB",
+    "ElementToIntensityFunctionSlope",
+    "ElementToIntensityFunctionOffset",
+    "BinaryData",
+    "BinaryDataByteOrderMSB",
+    "CompressedData",
+    "HeaderSize",
+    "Offset",
+    "Position",
+    "Origin",
+    "TransformMatrix",
+    "Rotation",
+    "Orientation",
+    "DistanceUnits",
+];
+
+/// The `key = value` lines of a MetaImage header that the reader uses, up to and including the one that names the data file.
 struct Fields {
-    pairs: Vec<(String, String)>,
+    pairs: Vec<(&'static str, String)>,
+    /// Whether the file is a sequence of images: whether it says something about each of them.
+    is_sequence: bool,
 }
 
 impl Fields {
     /// Reads the `key = value` lines of the header, up to and including the one that names the data file.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
-        let mut pairs: Vec<(String, String)> = Vec::new();
+        let mut fields = Self { pairs: Vec::new(), is_sequence: false };
         while let Some(line) = lines.next_line() {
             if line.trim().is_empty() {
                 continue;
@@ -63,17 +117,30 @@ impl Fields {
                     format!("'{shown}' is not a 'key = value' line"),
                 ));
             };
-            pairs.push((key.trim().to_owned(), value.trim().to_owned()));
-            if key.trim() == "ElementDataFile" {
+            if fields.add(key.trim(), value.trim())? == Some("ElementDataFile") {
                 break;
             }
         }
-        Ok(Self { pairs })
+        Ok(fields)
+    }
+
+    /// Adds a field, if the reader uses it, and returns its key.
+    fn add(&mut self, key: &str, value: &str) -> Result<Option<&'static str>, FormatError> {
+        self.is_sequence |= key.starts_with("Seq_Frame");
+        let Some(&key) = KEYS.iter().find(|&&known| known == key) else { return Ok(None) };
+        match self.get(key) {
+            Some(before) if before.text != value => {
+                return Err(FormatError::invalid(FORMAT, key, "is given twice, with different values"));
+            }
+            Some(_) => {}
+            None => self.pairs.push((key, value.to_owned())),
+        }
+        Ok(Some(key))
     }
 
     /// Returns a field by its key, if the header has it.
     fn get(&self, key: &'static str) -> Option<Field<'_>> {
-        let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
+        let (_, text) = self.pairs.iter().find(|&&(name, _)| name == key)?;
         Some(Field { format: FORMAT, name: key, text })
     }
 
@@ -107,6 +174,9 @@ impl Fields {
 /// The content of a MetaImage header, checked for consistency.
 struct Header {
     scalar: Scalar,
+    colours: Option<Colours>,
+    /// Number of voxels along each axis that the file has.
+    sizes: Vec<usize>,
     dims: [usize; 4],
     big: bool,
     text: bool,
@@ -117,6 +187,7 @@ struct Header {
     intercept: f64,
     affine: DAffine3,
     unit: LengthUnit,
+    warnings: Vec<Warning>,
 }
 
 impl Header {
@@ -127,8 +198,15 @@ impl Header {
         let mut dims = [1; 4];
         let sizes = fields.need("DimSize")?.sizes(rank)?;
         dims[..rank].copy_from_slice(&sizes);
+        let scalar = scalar(&fields.need("ElementType")?)?;
+        let colours = colours(fields, scalar)?;
+        let mut warnings: Vec<Warning> =
+            colours.map(Colours::warning).into_iter().chain(sequence_warning(fields, rank)).collect();
+        let affine = affine(fields, &sizes, &mut warnings)?;
         Ok(Self {
-            scalar: scalar(&fields.need("ElementType")?)?,
+            scalar,
+            colours,
+            sizes,
             dims,
             big: fields.flag(&["BinaryDataByteOrderMSB", "ElementByteOrderMSB"])?,
             text: fields.get("BinaryData").is_some() && !fields.flag(&["BinaryData"])?,
@@ -136,16 +214,20 @@ impl Header {
             skip: skip(fields)?,
             slope: fields.number("ElementToIntensityFunctionSlope", 1.0)?,
             intercept: fields.number("ElementToIntensityFunctionOffset", 0.0)?,
-            affine: affine(fields, rank)?,
+            affine,
             unit: unit(fields),
+            warnings,
         })
     }
 
-    /// Returns the volume that the header describes, with its voxels read from `source`: the bytes after the header, or
-    /// the data file.
-    fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
+    /// Returns the volume that the header describes, with its voxels read from `source`.
+    fn volume(&self, source: &Source<'_>) -> Result<Volume, FormatError> {
+        let numbers = self.numbers(source)?;
         let volume = Volume::new(VolumeInit {
-            voxels: self.voxels(source)?,
+            voxels: match self.colours {
+                Some(colours) => colours.luminance(numbers),
+                None => numbers,
+            },
             dims: self.dims,
             affine: self.affine,
             slope: self.slope,
@@ -153,26 +235,35 @@ impl Header {
             frame_seconds: 0.0,
             space: Space::Lps,
         });
-        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
+        let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
+        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
     }
 
-    /// Reads the voxels from `source` (the bytes after the header, or the data file): inflates them if compressed, and
-    /// parses them if written as text.
-    fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
+    /// Reads the numbers of the voxels from `source`.
+    fn numbers(&self, source: &Source<'_>) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
-        if self.compressed {
-            let limit = size.saturating_add(MAX_PADDING);
-            let source = self.after_skip(source, source.len())?;
-            // The format says zlib; some writers put a gzip stream there.
-            let inflate = if is_gzip(source) { gunzip } else { unzlib };
-            let bytes = inflate(FORMAT, source, limit)?;
-            return decode(DATA, payload(DATA, &bytes, size)?, self.scalar, self.big);
-        }
-        let source = self.after_skip(source, size)?;
+        let size = self.colours.map_or(Ok(size), |colours| colours.size(FORMAT, size))?;
+        let decoded = |bytes: &[u8]| decode(DATA, bytes, self.scalar, self.big);
+        let all = |bytes: &[u8]| match self.text {
+            true => decode_text(DATA, self.after_skip(bytes, size)?, self.scalar, size / self.scalar.size()),
+            false => decoded(payload(DATA, &self.binary(bytes, size)?, size)?),
+        };
+        source.voxels(FORMAT, size, all, |bytes, size| self.binary(bytes, size), decoded)
+    }
+
+    /// Returns the binary numbers in a file, `size` bytes if it has as many as the header says: those after the bytes to
+    /// skip, inflated if they are compressed.
+    fn binary<'a>(&self, bytes: &'a [u8], size: usize) -> Result<Cow<'a, [u8]>, FormatError> {
         if self.text {
-            return decode_text(DATA, source, self.scalar, size / self.scalar.size());
+            return Err(FormatError::unsupported(FORMAT, "BinaryData", "text in several files", "one file"));
         }
-        decode(DATA, payload(DATA, source, size)?, self.scalar, self.big)
+        if !self.compressed {
+            return Ok(Cow::Borrowed(self.after_skip(bytes, size)?));
+        }
+        let source = self.after_skip(bytes, bytes.len())?;
+        // The format says zlib; some writers put a gzip stream there.
+        let inflate = if is_gzip(source) { gunzip } else { unzlib };
+        Ok(Cow::Owned(inflate(FORMAT, source, size.saturating_add(MAX_PADDING))?))
     }
 
     /// Returns the bytes of `source` after the number of bytes that the header says to skip (`HeaderSize`); if that is
@@ -183,15 +274,36 @@ impl Header {
     }
 }
 
-/// Returns an error if the file declares an object other than an image, or more than one channel.
+/// Returns an error if the file declares an object other than an image.
 fn check_object(fields: &Fields) -> Result<(), FormatError> {
-    if let Some(field) = fields.get("ObjectType").filter(|field| field.text != "Image") {
-        return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "Image"));
+    match fields.get("ObjectType").filter(|field| field.text != "Image") {
+        Some(field) => {
+            Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "Image"))
+        }
+        None => Ok(()),
     }
-    if let Some(field) = fields.get("ElementNumberOfChannels").filter(|field| field.text != "1") {
-        return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "1"));
+}
+
+/// Returns the colours of voxels with several channels, `None` if there is one; an error unless these are red, green,
+/// blue and perhaps opacity, as bytes.
+fn colours(fields: &Fields, scalar: Scalar) -> Result<Option<Colours>, FormatError> {
+    let Some(field) = fields.get("ElementNumberOfChannels") else { return Ok(None) };
+    match field.text {
+        "1" => Ok(None),
+        "3" if scalar == Scalar::U8 => Ok(Some(Colours::interleaved(3))),
+        "4" if scalar == Scalar::U8 => Ok(Some(Colours::interleaved(4))),
+        other => {
+            let accepted = "1, or 3 or 4 of MET_UCHAR, which are colours";
+            Err(FormatError::unsupported(FORMAT, field.name, format!("'{other}'"), accepted))
+        }
     }
-    Ok(())
+}
+
+/// Returns a warning about a sequence of slices, such as the frames of an ultrasound probe, whose third axis counts them.
+fn sequence_warning(fields: &Fields, rank: usize) -> Option<Warning> {
+    let text = "The file is a sequence of images (Seq_Frame…). They are read as the slices of a volume along the third axis, \
+                whatever their positions and times.";
+    (rank == 3 && fields.is_sequence).then(|| Warning::new(WarningCode::Reader, text))
 }
 
 /// Returns the number of axes of the image; an error unless it is 1 to 4.
@@ -231,17 +343,23 @@ fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }
 }
 
-/// Returns the transform from voxel indices to world space (LPS).
-fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
+/// Returns the transform from voxel indices to world space (LPS) of an image with these numbers of voxels. A single slice
+/// without a thickness has one of 1, with a warning.
+fn affine(fields: &Fields, sizes: &[usize], warnings: &mut Vec<Warning>) -> Result<DAffine3, FormatError> {
+    let rank = sizes.len();
     let mut columns = axes(fields, rank)?;
     if let Some(field) = fields.any(&["ElementSpacing", "ElementSize"]) {
-        for (column, spacing) in columns.iter_mut().zip(field.finite(rank)?) {
-            *column *= spacing;
+        for (axis, (column, spacing)) in columns.iter_mut().zip(field.finite_first(rank)?).enumerate() {
+            if spacing == 0.0 && sizes[axis] == 1 {
+                warnings.push(thickness_warning(axis));
+            } else {
+                *column *= spacing;
+            }
         }
     }
     let mut origin = [0.0; 3];
     if let Some(field) = fields.any(&["Offset", "Position", "Origin"]) {
-        origin.iter_mut().zip(field.finite(rank)?).for_each(|(o, v)| *o = v);
+        origin.iter_mut().zip(field.finite_first(rank)?).for_each(|(o, v)| *o = v);
     }
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
 }
@@ -251,21 +369,27 @@ fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
 fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
     let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };
-    let matrix = field.finite(rank * rank)?;
-    for (column, row) in columns.iter_mut().zip(matrix.chunks(rank)) {
+    let (matrix, width) = square(&field, rank)?;
+    for (column, row) in columns.iter_mut().zip(matrix.chunks(width)).take(rank) {
         let mut direction = [0.0; 3];
-        direction.iter_mut().zip(row).for_each(|(d, &v)| *d = v);
+        direction.iter_mut().zip(row).take(rank).for_each(|(d, &v)| *d = v);
         *column = direction.into();
     }
     Ok(columns)
 }
 
-/// Returns the unit of length that `DistanceUnits` names; unknown if it is not mm, um or m, or if the field is missing.
+/// Returns the numbers of a matrix with at least `rank` rows, and the length of its rows.
+fn square(field: &Field<'_>, rank: usize) -> Result<(Vec<f64>, usize), FormatError> {
+    let count = field.text.split_whitespace().count();
+    let width = (rank..=MOST_ROWS).find(|width| width * width == count).unwrap_or(rank);
+    Ok((field.finite(width * width)?, width))
+}
+
+/// Largest number of rows of a matrix, whatever the number of axes.
+const MOST_ROWS: usize = 4;
+
+/// Returns the unit of length that `DistanceUnits` names; unknown if volumes do not have it, or if the field is missing.
 fn unit(fields: &Fields) -> LengthUnit {
-    match fields.get("DistanceUnits").map(|field| field.text) {
-        Some("mm") => LengthUnit::Millimetre,
-        Some("um") => LengthUnit::Micrometre,
-        Some("m") => LengthUnit::Metre,
-        _ => LengthUnit::Unknown,
-    }
+    let named = fields.get("DistanceUnits").and_then(|field| metres(field.text));
+    named.map_or(LengthUnit::Unknown, unit_of)
 }

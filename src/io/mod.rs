@@ -2,6 +2,8 @@
 
 mod animation;
 mod base64;
+mod beside;
+mod colour;
 mod deflate;
 mod detect;
 mod error;
@@ -23,15 +25,19 @@ mod ply;
 mod point_text;
 mod points;
 mod raw;
+mod source;
 mod stl;
 mod text;
+mod units;
 mod volume_file;
 mod vtp;
 
 pub use animation::{AnimationWriter, write_animation};
-pub use detect::parse_volume;
+pub use beside::FileSet;
+pub use detect::{parse_volume, parse_volume_with};
 pub use error::FormatError;
 pub use mesh_file::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh, write_noted_mesh};
 pub use nifti_writer::write_nifti;
 pub use points::{PointCloud, parse_points};
+pub use source::VolumeOptions;
 pub use volume_file::{Compression, VolumeFormat, write_volume};

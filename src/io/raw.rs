@@ -68,12 +68,14 @@ pub(super) fn payload_size(name: FieldName, dims: [usize; 4], scalar: Scalar) ->
 /// Returns the first `needed` of the bytes of voxel data, those that hold the voxels.
 ///
 /// # Errors
-/// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it: header and payload then do not match.
+/// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it, or as many again that are not padding: header and
+/// payload then do not match.
 pub(super) fn payload(name: FieldName, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
     let Some(payload) = bytes.get(..needed) else {
         return Err(FormatError::truncated(name.format, name.field, needed, bytes.len()));
     };
-    if bytes.len() - needed > MAX_PADDING {
+    let rest = &bytes[needed..];
+    if rest.len() > MAX_PADDING || rest.len() >= needed && rest.iter().any(|&byte| byte != 0) {
         let problem = format!("{} bytes of voxels, the header accounts for {needed}", bytes.len());
         return Err(FormatError::invalid(name.format, name.field, problem));
     }

@@ -1,6 +1,7 @@
 //! Lines of text files, and headers that consist of lines of text.
 
 use super::FormatError;
+use super::beside::DataFiles;
 use std::iter;
 
 /// Returns the lines of a file with their numbers from 1, without line endings (\n, \r\n or \r).
@@ -43,6 +44,26 @@ impl<'a> Lines<'a> {
         Some(String::from_utf8_lossy(&rest[..length]).trim_end_matches('\r').to_owned())
     }
 
+    /// Returns the names of data files on the lines that follow, one on each; `field` starts the list.
+    ///
+    /// # Errors
+    /// No names, or a list beyond the maximum length of a header.
+    pub(super) fn names(&mut self, field: &Field<'_>) -> Result<DataFiles, FormatError> {
+        let mut names = Vec::new();
+        while let Some(line) = self.next_line() {
+            let name = line.trim();
+            if !name.is_empty() {
+                names.push(name.to_owned());
+            }
+        }
+        let problem = match names.is_empty() {
+            true => "must be followed by the names of files",
+            false if self.at < self.bytes.len() => "has too many files",
+            false => return Ok(DataFiles::Names(names)),
+        };
+        Err(field.invalid(problem))
+    }
+
     /// Returns the bytes after the header lines read so far, where the voxels start.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or(&[])
@@ -83,6 +104,17 @@ impl Field<'_> {
     pub(super) fn finite(&self, count: usize) -> Result<Vec<f64>, FormatError> {
         let values = self.numbers(count)?;
         if values.iter().all(|v| v.is_finite()) { Ok(values) } else { Err(self.invalid("must be finite")) }
+    }
+
+    /// Parses the first `count` of the field's numbers, which must all be finite.
+    ///
+    /// # Errors
+    /// Fewer numbers; a word that is not a finite number.
+    pub(super) fn finite_first(&self, count: usize) -> Result<Vec<f64>, FormatError> {
+        let found = self.text.split_whitespace().count();
+        let mut values = self.finite(count.max(found))?;
+        values.truncate(count);
+        Ok(values)
     }
 
     /// Parses the field as `count` positive integers separated by whitespace.

@@ -74,6 +74,7 @@ pub use sparse::{BrickBox, SparseInit, SparseLevel, SparseVolume};
 pub(crate) use subdivided::Subdivided;
 pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
+pub(crate) use voxels::{VoxelNumber, map_each};
 
 use crate::math::{DAffine3, DVec3, box_corners};
 use crate::warning::Warning;
@@ -137,8 +138,8 @@ impl VolumeInit {
 /// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
 ///
 /// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from ranges and histograms.
-/// When intensities are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end,
-/// so every sampled intensity is finite.
+/// When intensities are sampled, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end,
+/// so every sampled intensity is finite; only [`intensities`](Self::intensities) keeps NaN.
 #[derive(Clone, Debug)]
 pub struct Volume {
     voxels: Arc<Voxels>,
@@ -289,27 +290,31 @@ impl Volume {
         span(self.range)
     }
 
-    /// Returns all intensities of one frame, x fastest, then y, z.
+    /// Returns all intensities of one frame, x fastest, then y, z. NaN stays NaN.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, VolumeError> {
-        self.intensities_above(0.0, frame)
+        let start = self.frame_start(frame)?;
+        let end = start + self.frame_len();
+        let kept = |v: f64| if v.is_nan() { v } else { self.finite(v) };
+        converted(&self.voxels, start..end, |v| kept(v * self.slope + self.intercept))
     }
 
-    /// Returns all intensities of one frame less `base`, which is subtracted in `f64`.
+    /// Returns all intensities of one frame less `base`, which is subtracted in `f64`, with those that are not finite
+    /// replaced by [`Self::finite`].
     fn intensities_above(&self, base: f64, frame: usize) -> Result<Vec<f32>, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
         converted(&self.voxels, start..end, |v| self.finite(v * self.slope + self.intercept) - base)
     }
 
-    /// Returns one frame as a grid of `f32` intensities in index coordinates.
+    /// Returns one frame as a grid of `f32` intensities in index coordinates; NaN becomes the lower end of the range.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
     pub fn grid(&self, frame: usize) -> Result<Grid, VolumeError> {
-        Ok(Grid { dims: self.dims(), values: self.intensities(frame)? })
+        Ok(Grid { dims: self.dims(), values: self.intensities_above(0.0, frame)? })
     }
 
     /// Returns one frame as a grid with intensities scaled from [`Self::range`] to [0, 1]; NaN and −∞ become 0, +∞
@@ -483,6 +488,11 @@ fn check_frame_seconds(seconds: f64) -> Result<(), VolumeError> {
     ))
 }
 
+/// Returns whether a map from voxel index to world can be that of a volume: it is finite and can be inverted accurately.
+pub(crate) fn is_placement(affine: DAffine3) -> bool {
+    invert(affine).is_ok()
+}
+
 /// Returns the inverse of a volume's affine map from voxel index to world; an error if the map is singular or too
 /// ill-conditioned to be inverted accurately.
 fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
@@ -613,14 +623,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_finite_number_reads_as_an_end_of_the_range() {
+    fn what_is_not_a_finite_number_is_sampled_as_an_end_of_the_range() {
         let voxels = vec![f32::NAN, 1.0, f32::INFINITY, 3.0, f32::NEG_INFINITY, 2.0];
         let plain = VolumeInit { slope: 1.0, intercept: 0.0, ..init(Voxels::F32(voxels), [6, 1, 1, 1]) };
         let v = Volume::new(plain).unwrap();
         assert_eq!(v.range(), [1.0, 3.0]);
-        assert_eq!(v.intensities(0).unwrap(), [1.0, 1.0, 3.0, 3.0, 1.0, 2.0]);
+        let finite = [1.0, 1.0, 3.0, 3.0, 1.0, 2.0];
+        assert_eq!(v.grid(0).unwrap().values, finite);
         assert_eq!(v.histogram(2, 0).unwrap(), [1, 2]);
-        assert_eq!(v.slice(2, 0, 0).unwrap(), v.intensities(0).unwrap());
+        assert_eq!(v.slice(2, 0, 0).unwrap(), finite);
+        let kept = v.intensities(0).unwrap();
+        assert!(kept[0].is_nan());
+        assert_eq!(kept[1..], finite[1..]);
     }
 
     #[test]

@@ -46,4 +46,5 @@ mod tracking;
 mod tracking_fuzz;
 mod tracking_input;
 mod volume_files;
+mod volumes_as_found;
 mod voxel_meaning;

@@ -58,10 +58,18 @@ export type VolumeFormat = 'nifti' | 'nrrd' | 'mha';
 export class Volume {
   constructor(init: VolumeInit);
   /**
-   * NIfTI-1/2 (.nii, .nii.gz), NRRD (.nrrd; .nhdr + data), MetaImage (.mha; .mhd + data), detected from the bytes.
-   * gzip is handled. A detached header takes its payload as `data`.
+   * NIfTI-1/2 (.nii, .nii.gz), Analyze 7.5, NRRD (.nrrd; .nhdr + data), MetaImage (.mha; .mhd + data), detected from the
+   * bytes. gzip is handled. A detached header takes its payload as `data`, or the files beside it; `space` is for files
+   * that name none.
    */
-  static parse(bytes: Uint8Array, options?: { data?: Uint8Array }): Volume;
+  static parse(
+    bytes: Uint8Array,
+    options?: {
+      data?: Uint8Array;
+      files?: readonly { name: string; bytes: Uint8Array }[];
+      space?: 'RAS' | 'LPS';
+    },
+  ): Volume;
   /** Volumes of one grid, in order, as the frames of a 4D one; of those that are 4D, all frames. */
   static fromFrames(frames: Volume[], options?: { frameSeconds?: number }): Volume;
   /** NIfTI-1 bytes, for saving what was computed. */
@@ -75,6 +83,8 @@ export class Volume {
   readonly spacing: Vec3;
   readonly affine: Float64Array;
   readonly space: 'RAS' | 'LPS';
+  /** Undefined if it is not known. */
+  readonly unit: 'm' | 'mm' | 'um' | undefined;
   /** Smallest and largest intensity, after slope and intercept. */
   readonly range: [number, number];
   histogram(bins: number, frame?: number): Uint32Array;
@@ -82,7 +92,7 @@ export class Volume {
   sample(world: Vec3, frame?: number): number;
   /** One slice, row-major, as intensities. axis 0 = sagittal (x), 1 = y, 2 = z. */
   slice(axis: 0 | 1 | 2, index: number, frame?: number): Float32Array;
-  /** All intensities of one frame, for upload as a 3D texture. */
+  /** All intensities of one frame, for upload as a 3D texture; NaN stays NaN. */
   intensities(frame?: number): Float32Array;
   /** One volume per level, [0] = this one; smoothed before it is thinned. */
   pyramid(levels: number, options?: { factor?: number }): Volume[];

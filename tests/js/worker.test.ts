@@ -49,9 +49,9 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const made = new Volume({ data, dims: DIMS, spacing: [1, 1, 2], slope: 2, space: 'LPS' });
     const volume = await Volume.parse(await made.toNifti());
     const several = await Volume.fromFrames([made, made], { frameSeconds: 0.5 });
-    const { dims, frames, frameSeconds, spacing, affine, space, range } = several;
+    const { dims, frames, frameSeconds, spacing, affine, space, unit, range } = several;
     return [
-      await Promise.all([dims, frames, frameSeconds, spacing, affine, space, range]),
+      await Promise.all([dims, frames, frameSeconds, spacing, affine, space, unit, range]),
       await Promise.all([several.histogram(4, 1), several.sample([1, 2, 3]), several.slice(2, 12)]),
       await several.intensities(1),
       await made.toNifti(),

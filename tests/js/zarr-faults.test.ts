@@ -202,7 +202,7 @@ describe('metadata that lies', () => {
     ['no x', 'axes.2', { name: 't', type: 'time' }, /must include x and y/],
     ['unknown axis', 'axes.0.name', 'depth', /axes\[0\]: must be x, y or z .*got "depth"/],
     ['type', 'axes.0.type', 'time', /axes\[0\]: .*got "z" of type "time"/],
-    ['one unit missing', 'axes.0.unit', undefined, /axes\[0\].unit: must be a unit of length/],
+    ['one unit unknown', 'axes.0.unit', 'voxel', /axes\[0\].unit: must be a unit of length/],
     ['unit', 'axes.1.unit', 'pixel', /axes\[1\].unit: .*got "pixel"/],
     ['too many axes', 'axes.3', { name: 'c', type: 'channel' }, /scale: must be 4 finite numbers/],
     [
@@ -249,7 +249,7 @@ describe('metadata that lies', () => {
     ['no chunks', 'chunk_grid', undefined, /array "s0": cannot be read/],
     ['no codecs', 'codecs', undefined, /array "s0": cannot be read/],
     ['text', 'data_type', 'string', /array "s0".data_type: must be one of uint8, .*got "string"/],
-    ['64 bits', 'data_type', 'int64', /must be one of uint8, .*got "int64"/],
+    ['half precision', 'data_type', 'float16', /array "s0": .*float16/],
     ['unknown type', 'data_type', 'quaternion', /array "s0": .*quaternion/],
     ['another type', 'data_type', 'uint16', /array "s1": must have the voxel type of level 0, u16/],
     ['no array', 'node_type', 'group', /array "s0"/],

@@ -43,6 +43,10 @@ const KNOWN: [&str; 31] = [
 /// The fields of an NRRD header, with names in lower case without spaces.
 pub(super) struct Fields {
     pairs: Vec<(String, String)>,
+    /// First comment, which tells the program that wrote the file.
+    comment: String,
+    /// Whether there is a key that only ITK writes.
+    has_itk_key: bool,
 }
 
 impl Fields {
@@ -58,12 +62,16 @@ impl Fields {
                 "NRRD0001 to NRRD0005",
             ));
         }
-        let mut fields = Self { pairs: Vec::new() };
+        let mut fields = Self { pairs: Vec::new(), comment: String::new(), has_itk_key: false };
         while let Some(line) = lines.next_line() {
             if line.is_empty() {
                 break;
             }
-            if !line.starts_with('#') && fields.add(&line)? {
+            if let Some(comment) = line.strip_prefix('#') {
+                if fields.comment.is_empty() {
+                    fields.comment = comment.trim().to_owned();
+                }
+            } else if fields.add(&line)? {
                 break;
             }
         }
@@ -74,7 +82,10 @@ impl Fields {
     /// files, which takes up the rest of the header.
     fn add(&mut self, line: &str) -> Result<bool, FormatError> {
         let (name, value) = match (line.find(":="), line.find(": ")) {
-            (Some(at), colon) if colon.is_none_or(|colon| at < colon) => return Ok(false),
+            (Some(at), colon) if colon.is_none_or(|colon| at < colon) => {
+                self.has_itk_key |= line.starts_with("ITK_");
+                return Ok(false);
+            }
             (_, Some(at)) => (&line[..at], &line[at + 2..]),
             _ if line.ends_with(':') => (&line[..line.len() - 1], ""),
             _ => {
@@ -86,13 +97,29 @@ impl Fields {
                 ));
             }
         };
-        let key: String = name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect();
+        let key: String =
+            name.chars().filter(|c| !c.is_whitespace()).map(|c| c.to_ascii_lowercase()).collect();
         if !KNOWN.contains(&key.as_str()) {
             return Err(FormatError::invalid(FORMAT, name, "not a field of the format"));
         }
-        let files = key == "datafile" && value.trim_start().starts_with("LIST");
+        if self.pairs.iter().any(|(known, _)| *known == key) {
+            return Err(FormatError::invalid(FORMAT, name, "is given twice"));
+        }
+        let files = key == "datafile" && value.split_whitespace().next() == Some("LIST");
         self.pairs.push((key, value.trim().to_owned()));
         Ok(files)
+    }
+
+    /// Returns whether the file looks like one that a program of ITK wrote: by its keys, or by the comment of the library
+    /// that ITK writes with, of an image of two or four dimensions, all of them in space and none of them named.
+    pub(super) fn is_of_itk(&self) -> bool {
+        let has = |key, text: &str| self.get(key).is_some_and(|field| field.text == text);
+        let kinds = |rank| ["domain"; 4][..rank].join(" ");
+        let is_plain = [(2, "2"), (4, "4")].into_iter().any(|(rank, text)| {
+            has("dimension", text) && has("spacedimension", text) && has("kinds", &kinds(rank))
+        });
+        let of_teem = self.comment.starts_with("Complete NRRD file format specification");
+        self.has_itk_key || is_plain && of_teem && self.get("spaceorigin").is_some()
     }
 
     /// Returns the header field with the name `key`; `None` if it is missing.

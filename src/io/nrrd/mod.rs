@@ -1,11 +1,15 @@
 //! Reader and writer of NRRD.
 //!
-//! Versions 1 to 5 are read, with header and voxels in one file, or the voxels in a data file of their own. Up to three
-//! axes are spatial; one more, at any position among them, may count frames. Vectors and colours per voxel are rejected.
-//! Encodings: raw, text, hex, gzip. The space left-posterior-superior stays LPS; right-anterior-superior is RAS;
-//! left-anterior-superior becomes RAS by the sign of x; in other spaces, or if none is named, coordinates are kept and
-//! treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions, axes have the lengths
-//! in `spacings`, or 1 if `spacings` are unknown, too. The files of a list of data files are concatenated in order.
+//! Versions 1 to 5 are read, with header and voxels in one file, or the voxels in one or several files of their own, each
+//! with the same number of them. Up to three axes are spatial; one more, at any position among them, may count frames, or
+//! hold colours, of which the luminance is read. Other vectors per voxel are rejected. Encodings: raw, text, hex, gzip.
+//!
+//! The space left-posterior-superior stays LPS; right-anterior-superior is RAS; left-anterior-superior becomes RAS by the
+//! sign of x. In other spaces, or if none is named, coordinates are kept, and treated as those of the caller's choice, or
+//! as LPS, as in ITK; with a warning, unless the file is one of ITK, which does not name the space of images of two and
+//! four dimensions. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions, axes have the lengths
+//! in `spacings`, or 1 if `spacings` are unknown, too, and the space is RAS, without a warning: it is no more than a name
+//! then.
 
 mod axes;
 mod axis;
@@ -16,15 +20,20 @@ mod tests;
 mod world;
 mod writer;
 
-use super::FormatError;
+use super::beside::{DataFiles, Series, pattern_and_numbers};
+use super::colour::Colours;
 use super::gzip::gunzip;
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
+use super::source::Source;
 use super::text::{Field, Lines};
+use super::{FormatError, VolumeOptions};
 use crate::math::DAffine3;
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+use crate::warning::Warning;
 use axes::Axes;
 use fields::Fields;
 use frames::deinterleave_frames;
+use std::borrow::Cow;
 pub(super) use writer::write;
 
 const FORMAT: &str = "NRRD";
@@ -35,22 +44,60 @@ pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD")
 }
 
-/// Reads an NRRD volume; `detached` is the content of the data file, if the header refers to one.
+/// Reads an NRRD volume, with the files beside it if its header refers to any.
 ///
 /// # Errors
 /// [`FormatError`] that names the header field at fault.
-pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+pub(super) fn parse(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume, FormatError> {
     let mut lines = Lines::new(bytes);
     let fields = Fields::read(&mut lines)?;
-    let header = Header::check(&fields)?;
-    let source = match (fields.get("datafile"), detached) {
-        (None, _) => lines.rest(),
-        (Some(_), Some(payload)) => payload,
-        (Some(file), None) => {
-            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
+    let header = Header::check(&fields, options.space)?;
+    match fields.get("datafile") {
+        None => header.volume(&Source::Bytes(lines.rest())),
+        Some(file) => header.volume(&options.source(&file, || data_files(&file, lines, &header.sizes))?),
+    }
+}
+
+/// Returns the data files that the field `data file` names, with the lines after it and the sizes of the axes.
+fn data_files(file: &Field<'_>, mut lines: Lines<'_>, sizes: &[usize]) -> Result<DataFiles, FormatError> {
+    if let Some(rank) = list_rank(file.text) {
+        return check_count(file, lines.names(file)?, rank, sizes);
+    }
+    match pattern_and_numbers(file.text) {
+        Some((pattern, numbers)) if numbers.len() >= 3 => {
+            let series = Series::parse(pattern, numbers[0], numbers[1], numbers[2]);
+            let series = series.filter(|_| numbers.len() <= 4).map(DataFiles::Series);
+            let series = series.ok_or_else(|| file.invalid("must be like 's%03d.raw 1 20 1'"))?;
+            check_count(file, series, numbers.get(3).copied(), sizes)
         }
-    };
-    header.volume(source)
+        _ => Ok(DataFiles::Names(vec![file.text.to_owned()])),
+    }
+}
+
+/// Returns the number of axes that the files of a list have, if the list says it; `None` if it does not name a list.
+fn list_rank(text: &str) -> Option<Option<i64>> {
+    let rank = text.strip_prefix("LIST").filter(|rank| !rank.starts_with(|c: char| !c.is_whitespace()))?;
+    if rank.is_empty() { Some(None) } else { rank.trim().parse().ok().map(Some) }
+}
+
+/// Returns the data files; an error if each has a number of axes by which there must be another number of files.
+fn check_count(
+    file: &Field<'_>,
+    files: DataFiles,
+    rank: Option<i64>,
+    sizes: &[usize],
+) -> Result<DataFiles, FormatError> {
+    let Some(rank) = rank else { return Ok(files) };
+    let rank = usize::try_from(rank).ok().filter(|rank| (1..=sizes.len()).contains(rank));
+    let rank =
+        rank.ok_or_else(|| file.invalid("the files must have as many axes as the volume, or fewer"))?;
+    // Files of as many axes as the volume are slabs of it.
+    let expected = sizes[rank..].iter().fold(1, |product: u64, &n| product.saturating_mul(n as u64));
+    if rank == sizes.len() || expected == files.count() {
+        return Ok(files);
+    }
+    let problem = format!("{} files of {rank} axes; the sizes call for {expected}", files.count());
+    Err(file.invalid(&problem))
 }
 
 /// Encoding of the voxels in an NRRD.
@@ -65,8 +112,11 @@ enum Encoding {
 /// The content of an NRRD header, checked for consistency.
 struct Header {
     scalar: Scalar,
+    /// Sizes of all axes, in the order of the file.
+    sizes: Vec<usize>,
     /// Number of voxels along x, y and z, and of frames.
     dims: [usize; 4],
+    colours: Option<Colours>,
     /// Number of consecutive numbers in the file that belong to the same frame; the voxels are reordered by it.
     run: usize,
     encoding: Encoding,
@@ -78,17 +128,20 @@ struct Header {
     space: Space,
     unit: LengthUnit,
     frame_seconds: f64,
+    warnings: Vec<Warning>,
 }
 
 impl Header {
-    /// Converts all fields of the header and checks them for consistency.
-    fn check(fields: &Fields) -> Result<Self, FormatError> {
+    /// Converts all fields of the header and checks them for consistency; `space` is that of files that name none.
+    fn check(fields: &Fields, space: Option<Space>) -> Result<Self, FormatError> {
         let scalar = scalar(&fields.need("type")?)?;
         let encoding = encoding(&fields.need("encoding")?)?;
-        let axes = Axes::read(fields)?;
+        let axes = Axes::read(fields, space)?;
         Ok(Self {
             scalar,
+            sizes: axes.sizes().to_vec(),
             dims: axes.dims(),
+            colours: axes.colours(),
             run: axes.run(),
             encoding,
             big: big_endian(fields, scalar, encoding)?,
@@ -98,20 +151,25 @@ impl Header {
             space: axes.space(),
             unit: axes.unit(),
             frame_seconds: axes.frame_seconds(),
+            warnings: axes.warnings(),
         })
     }
 
-    /// Returns the volume that the header describes, with its voxels read from `source`: the bytes after the header, or
-    /// the data file.
-    fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
-        let voxels = self.voxels(self.after_lines(source)?)?;
+    /// Returns the volume that the header describes, with its voxels read from `source`.
+    fn volume(&self, source: &Source<'_>) -> Result<Volume, FormatError> {
+        let numbers = self.numbers(source)?;
+        let voxels = match self.colours {
+            Some(colours) => colours.luminance(numbers),
+            None => numbers,
+        };
         let volume = Volume::new(VolumeInit {
             affine: self.affine,
             frame_seconds: self.frame_seconds,
             space: self.space,
             ..VolumeInit::new(deinterleave_frames(voxels, self.run, self.dims[3])?, self.dims)
         });
-        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
+        let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
+        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
     }
 
     /// Returns the bytes of `source` after the number of lines that the header says to skip (`line skip`).
@@ -126,26 +184,40 @@ impl Header {
         Ok(rest)
     }
 
-    /// Decodes the voxels from `source`, the bytes after the lines that the header says to skip.
-    fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
+    /// Reads the numbers of the voxels from `source`.
+    fn numbers(&self, source: &Source<'_>) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
-        let count = size / self.scalar.size();
-        match self.encoding {
-            Encoding::Raw => self.binary(source, size),
-            Encoding::Gzip => {
-                let limit = size.saturating_add(self.byte_skip.unwrap_or(0)).saturating_add(MAX_PADDING);
-                self.binary(&gunzip(FORMAT, source, limit)?, size)
+        let size = self.colours.map_or(Ok(size), |colours| colours.size(FORMAT, size))?;
+        let decoded = |bytes: &[u8]| decode(DATA, bytes, self.scalar, self.big);
+        let all = |bytes: &[u8]| match self.encoding {
+            Encoding::Text => {
+                let text = self.after_bytes(self.after_lines(bytes)?, size)?;
+                decode_text(DATA, text, self.scalar, size / self.scalar.size())
             }
-            Encoding::Hex => self.binary(&unhex(self.after_bytes(source, size)?, size)?, size),
-            Encoding::Text => decode_text(DATA, self.after_bytes(source, size)?, self.scalar, count),
-        }
+            _ => decoded(payload(DATA, &self.binary(bytes, size)?, size)?),
+        };
+        source.voxels(FORMAT, size, all, |bytes, size| self.binary(bytes, size), decoded)
     }
 
-    /// Decodes the voxels from binary data, after skipping the bytes that the header says to skip (in hex, they were
-    /// skipped before conversion to binary); `size` is the number of bytes of the voxels.
-    fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
-        let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
-        decode(DATA, payload(DATA, skipped, size)?, self.scalar, self.big)
+    /// Returns the binary numbers in a file, `size` bytes if it has as many as the header says: those after the lines and
+    /// bytes to skip, decoded from hex or inflated.
+    fn binary<'a>(&self, bytes: &'a [u8], size: usize) -> Result<Cow<'a, [u8]>, FormatError> {
+        let bytes = self.after_lines(bytes)?;
+        match self.encoding {
+            Encoding::Raw => Ok(Cow::Borrowed(self.after_bytes(bytes, size)?)),
+            Encoding::Hex => Ok(Cow::Owned(unhex(self.after_bytes(bytes, size)?, size)?)),
+            Encoding::Gzip => {
+                let skip = self.byte_skip.unwrap_or(0);
+                let limit = size.saturating_add(skip).saturating_add(MAX_PADDING);
+                let mut whole = gunzip(FORMAT, bytes, limit)?;
+                self.after_bytes(&whole, size)?;
+                whole.drain(..skip);
+                Ok(Cow::Owned(whole))
+            }
+            Encoding::Text => {
+                Err(FormatError::unsupported(FORMAT, "encoding", "text in several files", "one file"))
+            }
+        }
     }
 
     /// Returns the bytes after the number of bytes that the header says to skip (`byte skip`); if that is -1, the last

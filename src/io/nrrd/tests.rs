@@ -1,8 +1,8 @@
 //! Tests of NRRD files with frames along any axis, described in every way that the format allows, and of axes that must
 //! not be read as frames.
 
-use super::parse;
 use crate::io::FormatError;
+use crate::io::parse_volume as parse;
 use crate::math::DVec3;
 use crate::volume::{LengthUnit, Space, Volume};
 #[cfg(target_arch = "wasm32")]
