@@ -5,10 +5,15 @@ mod base64;
 mod deflate;
 mod detect;
 mod error;
+mod faces;
 mod glb;
 mod glb_writer;
 mod gltf;
+mod gltf_accessor;
+mod gltf_buffer;
 mod gltf_material;
+mod gltf_scene;
+mod gltf_skin;
 mod gzip;
 mod mesh_file;
 mod metaimage;
@@ -31,7 +36,10 @@ mod vtp;
 pub use animation::{AnimationWriter, write_animation};
 pub use detect::parse_volume;
 pub use error::FormatError;
-pub use mesh_file::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh, write_noted_mesh};
+pub use mesh_file::{
+    MeshFile, MeshFormat, MeshOptions, parse_mesh, parse_textured_mesh, read_mesh, write_mesh,
+    write_noted_mesh,
+};
 pub use nifti_writer::write_nifti;
 pub use points::{PointCloud, parse_points};
 pub use volume_file::{Compression, VolumeFormat, write_volume};

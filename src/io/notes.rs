@@ -2,6 +2,17 @@
 //!
 //! All is done character by character, as searching in strings would be most of what this adds to a module.
 
+use crate::volume::Space;
+
+/// Returns the space that a header or comment of a mesh file states in the way of 3D Slicer, if it does.
+pub(super) fn stated_space(text: &[u8]) -> Option<Space> {
+    let says = |mark: &[u8]| text.windows(mark.len()).any(|part| part == mark);
+    if says(b"SPACE=RAS") {
+        return Some(Space::Ras);
+    }
+    says(b"SPACE=LPS").then_some(Space::Lps)
+}
+
 /// Returns a comment for each note, between `start` and `end`: in ASCII, which is all that some readers accept there,
 /// without control characters, and without two hyphens in a row, which would end one of XML.
 pub(super) fn comments(notes: &str, start: &str, end: &str) -> String {

@@ -1,7 +1,7 @@
 //! Reader of point clouds in text with a line per point: numbers in columns (XYZ, PTS, CSV and similar), or after a
 //! keyword (`p x y z`).
 
-use super::text::{Field, numbered_lines};
+use super::text::{Field, number, numbered_lines};
 use super::{FormatError, PointCloud, points::full_channel};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::WorldPositions;
@@ -35,16 +35,16 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f64>().is_ok())
+        cells(&self.text, separator(&self.text)).iter().all(|cell| number(cell.as_bytes()).is_some())
     }
 
     /// Parses a cell of the line as a finite number.
     fn number(&self, format: &'static str, cell: &str) -> Result<f64, FormatError> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
-        match cell.parse::<f64>() {
-            Ok(number) if (number as f32).is_finite() => Ok(number),
-            Ok(_) => invalid("must be finite and within ±3.4e38"),
-            Err(_) => invalid("must be a number with a decimal point, not a comma"),
+        match number(cell.as_bytes()) {
+            Some(number) if (number as f32).is_finite() => Ok(number),
+            Some(_) => invalid("must be finite and within ±3.4e38"),
+            None => invalid("must be a number with a decimal point, not a comma"),
         }
     }
 }
@@ -195,7 +195,9 @@ impl Columns {
             let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
             return Err(FormatError::unsupported(FORMAT, first.field(), columns(count), accepted));
         }
-        Ok(Self { count, read: (0..count).collect(), extras: None })
+        // An intensity is not read.
+        let read = (0..count).filter(|&column| column != 3 || ![4, 7].contains(&count)).collect();
+        Ok(Self { count, read, extras: None })
     }
 }
 
@@ -265,7 +267,7 @@ impl Table {
         let world = self.rows().map(DVec3::from_slice).collect::<WorldPositions>();
         let (points, origin) = world.relative();
         let (normals, colors) = (extras.normals.map(all), extras.colors.map(all));
-        Ok(PointCloud { points, origin, normals, colors })
+        Ok(PointCloud { points, origin, normals, colors, ..PointCloud::default() })
     }
 
     /// Returns which columns of a file without column names hold normals and colours. Normals are recognised by their
@@ -274,7 +276,7 @@ impl Table {
         let (normals, colors) = match self.columns.count {
             6 if self.are_normals(3) => (Some(3), None),
             6 => (None, Some(3)),
-            7 => (None, Some(4)),
+            7 => (None, Some(3)),
             9 if self.are_normals(6) && self.are_colors(3) => (Some(6), Some(3)),
             9 => (Some(3), Some(6)),
             _ => (None, None),
@@ -304,7 +306,7 @@ impl Table {
 pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
-        words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f64>().is_ok())
+        words.next() == Some("p") && words.next().is_some_and(|word| number(word.as_bytes()).is_some())
     })
 }
 
