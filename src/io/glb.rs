@@ -48,7 +48,10 @@ fn document(json: &[u8], field: &str) -> Result<Value, FormatError> {
     if json.len() > JSON_LIMIT && json.len() - data_size(json) > JSON_LIMIT {
         return Err(FormatError::too_large(FORMAT, field, json.len() as u64));
     }
-    serde_json::from_slice(json).map_err(|error| FormatError::invalid(FORMAT, field, error.to_string()))
+    // Some programs pad the chunk with zeros.
+    let end = json.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    serde_json::from_slice(&json[..end])
+        .map_err(|error| FormatError::invalid(FORMAT, field, error.to_string()))
 }
 
 /// Returns the number of bytes in data URIs in JSON text.

@@ -1,5 +1,6 @@
 //! Reading and writing of mesh files: detection of the format, and checks common to all formats.
 
+use super::points::full_channel;
 use super::text::without_byte_order_mark;
 use super::{FormatError, glb, glb_writer, mz3, obj, ply, stl, vtp};
 use crate::mesh::{MeshError, Texture, TriangleMesh};
@@ -151,6 +152,11 @@ fn parse_welded(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<(&'static str, 
         return Err(FormatError::invalid(format, "faces", problem));
     }
     drop_broken_attributes(&mut file);
+    if let Some(colors) = &mut file.mesh.colors
+        && let Some(full) = full_channel(colors.iter().copied())
+    {
+        colors.iter_mut().for_each(|color| *color /= full);
+    }
     Ok((format, file))
 }
 

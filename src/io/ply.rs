@@ -33,7 +33,7 @@ fn read(
     faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
 ) -> Result<MeshFile, FormatError> {
     let (header, body) = Header::parse(bytes)?;
-    let mut body = Body { encoding: header.encoding, bytes: body };
+    let mut body = Body { encoding: header.encoding, bytes: body, splits_lines: false };
     let mut reader = Reader::default();
     for element in &header.elements {
         element.check_size(&body)?;
@@ -44,6 +44,7 @@ fn read(
         }
     }
     let mut file = reader.finish()?;
+    body.check_end(&mut file)?;
     file.space = header.space;
     if let Some(line) = header.unknown_line {
         file.warn(format!(
@@ -283,9 +284,34 @@ fn clipped(text: &str) -> String {
 struct Body<'a> {
     encoding: Encoding,
     bytes: &'a [u8],
+    /// Whether a record of text ended before its line did.
+    splits_lines: bool,
 }
 
 impl Body<'_> {
+    /// Notes whether the line of a record of text goes on after it.
+    fn end_record(&mut self) {
+        if self.encoding == Encoding::Text {
+            let next = self.bytes.iter().find(|&&b| !b.is_ascii_whitespace() || b == b'\n' || b == b'\r');
+            self.splits_lines |= next.is_some_and(|&b| b != b'\n' && b != b'\r');
+        }
+    }
+
+    /// Adds a warning if there are numbers after the last record of text; an error if lines have more numbers than records:
+    /// numbers were then read as those of other properties.
+    fn check_end(&self, file: &mut MeshFile) -> Result<(), FormatError> {
+        let rest = self.bytes.trim_ascii();
+        if self.encoding != Encoding::Text || rest.is_empty() || rest == b"\x1a" {
+            return Ok(());
+        }
+        if self.splits_lines {
+            let problem = "has more numbers in a line than the header declares properties";
+            return Err(FormatError::invalid(FORMAT, "body", problem));
+        }
+        file.warn("What follows the elements that the header declares was left out.");
+        Ok(())
+    }
+
     /// Reads the next number, of type `kind` in a binary file; `field` is its name in error messages.
     fn number(&mut self, kind: NumberType, field: &str) -> Result<f64, FormatError> {
         if self.encoding == Encoding::Text {
@@ -345,6 +371,7 @@ fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     let count = if element.properties.is_empty() { 0 } else { element.count };
     for _ in 0..count {
         element.properties.iter().try_for_each(|property| body.property(property, &mut values))?;
+        body.end_record();
     }
     Ok(())
 }
@@ -373,6 +400,7 @@ impl Reader {
                 body.property(property, &mut values)?;
                 *slot = values.first().copied().unwrap_or(0.0);
             }
+            body.end_record();
             let vector = |at: [usize; 3]| Vec3::from_array(at.map(|i| record[i] as f32));
             self.positions.push(DVec3::from_array(position.map(|i| record[i])));
             if let Some(at) = normal {
@@ -408,6 +436,7 @@ impl Reader {
                 };
                 body.property(property, target)?;
             }
+            body.end_record();
             if element.name == "face" {
                 self.face(&indices, &uvs, face)?;
             } else {

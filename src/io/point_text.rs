@@ -35,7 +35,7 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, separator(&self.text)).iter().all(|cell| number(cell.as_bytes()).is_some())
+        row(&self.text, separator(&self.text)).iter().all(|cell| number(cell.as_bytes()).is_some())
     }
 
     /// Parses a cell of the line as a finite number.
@@ -84,6 +84,15 @@ fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
     cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
 }
 
+/// Returns the cells of a line of numbers, which may end with a separator.
+fn row(line: &str, separator: Option<char>) -> Vec<&str> {
+    let mut cells = cells(line, separator);
+    if cells.last().is_some_and(|last| last.is_empty()) {
+        cells.pop();
+    }
+    cells
+}
+
 fn unquoted(cell: &str) -> &str {
     let cell = cell.trim();
     cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
@@ -96,7 +105,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let named = take_column_names(&mut lines, count_line.is_some())?;
     let Some(first) = lines.peek() else { return Ok(PointCloud::default()) };
     let separator = separator(&first.text);
-    let count = cells(&first.text, separator).len();
+    let count = row(&first.text, separator).len();
     let columns = match named.or_else(|| named_in_comment(bytes, count)) {
         Some(columns) => columns,
         None => Columns::unnamed(count, first)?,
@@ -179,7 +188,8 @@ impl Columns {
         }
         let points = set(["x", "y", "z"]).or_else(|| napari_axes(&names))?;
         let normals = set(["nx", "ny", "nz"]);
-        let colors = set(["red", "green", "blue"]).or_else(|| set(["r", "g", "b"]));
+        let colors =
+            [["red", "green", "blue"], ["r", "g", "b"], ["rf", "gf", "bf"]].into_iter().find_map(set);
         let extras = Extras {
             normals: normals.as_ref().map(|_| 3),
             colors: colors.as_ref().map(|_| if normals.is_some() { 6 } else { 3 }),
@@ -236,7 +246,10 @@ impl Table {
     /// Appends the numbers of a line in the columns that are read; an error if the line has too few or too many
     /// columns.
     fn push(&mut self, line: &Line, separator: Option<char>) -> Result<(), FormatError> {
-        let cells = cells(&line.text, separator);
+        let mut cells = cells(&line.text, separator);
+        if cells.len() == self.columns.count + 1 && cells.last().is_some_and(|last| last.is_empty()) {
+            cells.pop();
+        }
         if cells.len() != self.columns.count {
             let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
             let problem =
@@ -456,7 +469,7 @@ mod tests {
     fn errors_name_their_line() {
         for (text, said) in [
             ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': must have 3 columns"),
-            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': must have 3 columns"),
+            ("1,2,3\n4,5,6,7\n", "point text: line 2: '4,5,6,7': must have 3 columns"),
             ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': must have 3 columns"),
             ("1 2 3\n4 five 6\n", "point text: line 2: 'five': must be a number"),
             ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': must be a number"),

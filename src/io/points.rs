@@ -41,7 +41,7 @@ impl PointCloud {
 /// number of points, and the line after it may be a comment without a mark.
 ///
 /// Columns may be named in the first line or in a comment before it: `x`, `y`, `z`, and, in complete sets, `nx`, `ny`,
-/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; case and quotes do not matter. Instead of `x`, `y` and `z`,
+/// `nz`, and `red`, `green`, `blue`, `r`, `g`, `b` or `rf`, `gf`, `bf`; case and quotes do not matter. Instead of `x`, `y` and `z`,
 /// `axis-0` to `axis-2` are z, y, x, and `axis-0` to `axis-3` are time, z, y, x. All other columns are ignored: a file
 /// with a column of times gives the points of all times.
 ///

@@ -19,7 +19,7 @@ const RECORD: usize = 50;
 const SAMPLE: usize = 64;
 
 /// How many times as long as it is a file can be said to have been: with more, it is no STL.
-const LARGEST_CUT: u64 = 100;
+const LARGEST_CUT: u64 = 1000;
 
 /// Returns whether the bytes are a binary STL file: whether their length matches the number of triangles in the header,
 /// since binary STL has no signature.
@@ -133,7 +133,11 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
     let mut next = || numbers.next().flatten();
     match (next(), next(), next()) {
         (Some(x), Some(y), Some(z)) => Ok(DVec3::new(x, y, z)),
-        _ => Err(FormatError::invalid(FORMAT, format!("line {line}"), "a vertex has three numbers")),
+        _ => Err(FormatError::invalid(
+            FORMAT,
+            format!("line {line}"),
+            "a vertex has three numbers, with decimal points",
+        )),
     }
 }
 
