@@ -111,8 +111,35 @@ export interface MeshExtra {
   colors?: Float32Array;
   /** The image that texture coordinates refer to. */
   texture?: MeshTexture;
+  /** The directions of the axes, if the file that it is from states them, for `Mesh.space`. */
+  space?: Space;
+  /** The length of a unit, if the file that it is from states it, for `Mesh.unit`. */
+  unit?: LengthUnit;
   /** Findings of the file's reader, for `Mesh.warnings`; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
+}
+
+/** A file beside another one that refers to it. */
+export interface NamedFile {
+  /** Its name, with or without its folder. */
+  name: string;
+  bytes: Uint8Array;
+}
+
+/**
+ * What is stated about positions in a file. A mesh does not know it: give `space` and `unit` of the volume that it is
+ * from, or those of {@link Mesh} if it is from a file.
+ */
+export interface SpaceOptions {
+  /** Directions of the axes of the mesh. */
+  space?: Space;
+  /**
+   * Directions of the axes in the file, if they are to be others: x and y are then negated, a rotation by 180° about z.
+   * Not without `space`.
+   */
+  as?: Space;
+  /** Length of a unit of positions. */
+  unit?: LengthUnit;
 }
 
 /** The content of a mesh file: the arguments of `Mesh.fromArrays`. */

@@ -10,17 +10,17 @@ import { checkProperties, typedArray } from '../check.js';
 import type {
   LengthUnit,
   MeshData,
-  MeshTexture,
   PointArray,
   PointData,
   Space,
   VolumeInit,
   VoxelArray,
 } from '../data.js';
-import { MeshFile, VolumeFile } from '../files.js';
+import { MeshFile, NamedFile, VolumeFile } from '../files.js';
+import { checkedFileOptions, type MeshFileOptions, stated } from '../mesh-file.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
-import { checkTexture, rawTexture, textureOf } from '../texture.js';
+import { rawTexture, textureOf } from '../texture.js';
 import type { Warning } from '../warning.js';
 
 export type {
@@ -28,6 +28,7 @@ export type {
   MeshData,
   MeshExtra,
   MeshTexture,
+  NamedFile,
   PointData,
   Space,
   TextureType,
@@ -56,14 +57,18 @@ export function parseVolume(bytes: Uint8Array, options: { data?: Uint8Array } = 
  * Parses a mesh file like `Mesh.parse` of `vesicle`, and returns what `Mesh.fromArrays` takes:
  * `const { positions, indices, ...extra } = parseMesh(bytes)`.
  *
- * @param options - `texture`: the image of a file that has it in a separate file (obj, ply).
- * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`; `invalid-argument`.
+ * @param options - `texture`: the image of a file that has it in a separate file (obj, ply). `files`: buffers and images
+ *   beside a gltf, found by their names.
+ * @throws {@link VesicleError} `bad-file` naming the format and the field, or the file that is missing; `too-large`;
+ *   `invalid-argument`.
  */
-export function parseMesh(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): MeshData {
+export function parseMesh(bytes: Uint8Array, options?: MeshFileOptions): MeshData {
   typedArray('bytes', bytes, Uint8Array);
-  const { texture } = checkProperties('options', options, ['texture']);
-  checkTexture(texture);
-  return inOwnInstance(() => meshData(MeshFile.parse(bytes, rawTexture(texture))));
+  const { texture, files } = checkedFileOptions(options);
+  return inOwnInstance(() => {
+    const beside = files.map(({ name, bytes }) => new NamedFile(name, bytes));
+    return meshData(MeshFile.parse(bytes, rawTexture(texture), beside));
+  });
 }
 
 /**
@@ -116,5 +121,6 @@ function meshData(file: MeshFile): MeshData {
     ...(cornerUvs && { cornerUvs }),
     ...(colors && { colors }),
     ...(texture && { texture: textureOf(texture) }),
+    ...stated(file),
   };
 }

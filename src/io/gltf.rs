@@ -35,7 +35,7 @@ const SUPPORTED: [&str; 11] = [
 ];
 
 /// Returns all triangles of the default scene of a glTF document as one mesh, transformed to world space by their
-/// nodes, morphed by their default weights, and posed by their skins. Normals, texture coordinates and colours are read
+/// nodes, morphed by their default weights, and posed by their skins; in the space that the root states, if it does. Normals, texture coordinates and colours are read
 /// if every triangle primitive has them. If texture coordinates are, the first base colour texture is read, too, provided
 /// that its image is in the document or a file beside it.
 pub(super) fn triangles(root: &Value, buffers: &Buffers) -> Result<MeshFile, FormatError> {
@@ -55,7 +55,8 @@ pub(super) fn triangles(root: &Value, buffers: &Buffers) -> Result<MeshFile, For
         mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
     let relative = positions.relative_in(&mesh.triangles);
     (mesh.positions, mesh.origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
-    let mut file = MeshFile::from(mesh);
+    let frame = document.frame()?.unwrap_or_default();
+    let mut file = MeshFile { space: frame.space, unit: frame.unit, ..MeshFile::from(mesh) };
     let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
     if let Some(base_color) = base_color.filter(|_| file.mesh.has_uvs()) {
         match base_color.texture(&document)? {

@@ -1,6 +1,7 @@
 //! The scene of a glTF document: its nodes, with their meshes, instances, morph weights and skins.
 
 use super::FormatError;
+use super::frame::Frame;
 use super::glb::FORMAT;
 use super::gltf::{Document, Primitive, numbers, unsigned, unsigned_list};
 use super::gltf_accessor::Accessor;
@@ -86,11 +87,21 @@ impl<'a> Document<'a> {
         Ok(parts)
     }
 
+    /// Returns the frame that the only root of the scene states, if it maps positions from that to glTF's space.
+    pub(super) fn frame(&self) -> Result<Option<Frame>, FormatError> {
+        let [root] = self.roots()?[..] else { return Ok(None) };
+        let node = self.entry("nodes", root)?;
+        if node["extras"].is_null() {
+            return Ok(None);
+        }
+        Ok(Frame::of_root(node, &transform(node, root)?))
+    }
+
     /// Returns the visible nodes of the default scene, parents before children. An error if they are not a tree.
     fn nodes(&self) -> Result<Vec<Node<'a>>, FormatError> {
         let mut seen = vec![false; self.root["nodes"].as_array().map_or(0, Vec::len)];
-        let mut stack: Vec<(u64, DAffine3)> =
-            self.roots()?.into_iter().map(|n| (n, DAffine3::IDENTITY)).collect();
+        let (roots, is_framed) = (self.roots()?, self.frame()?.is_some());
+        let mut stack: Vec<(u64, DAffine3)> = roots.into_iter().map(|n| (n, DAffine3::IDENTITY)).collect();
         stack.reverse();
         let mut nodes = Vec::new();
         while let Some((index, parent)) = stack.pop() {
@@ -102,7 +113,9 @@ impl<'a> Document<'a> {
             if value["extensions"]["KHR_node_visibility"]["visible"] == false {
                 continue;
             }
-            let to_world = parent * transform(value, index)?;
+            // What is beneath a root that maps positions to glTF's space is read as it was before.
+            let is_frame = is_framed && nodes.is_empty();
+            let to_world = if is_frame { DAffine3::IDENTITY } else { parent * transform(value, index)? };
             nodes.push(Node { index, value, to_world });
             let children = unsigned_list(&value["children"], "children")?;
             stack.extend(children.into_iter().rev().map(|child| (child, to_world)));

@@ -1,8 +1,9 @@
 //! Reading and writing of mesh files: detection of the format, and checks common to all formats.
 
+use super::frame::half_turn;
 use super::points::full_channel;
 use super::text::without_byte_order_mark;
-use super::{FormatError, glb, glb_writer, mz3, obj, ply, stl, vtp};
+use super::{FormatError, WriteOptions, glb, glb_writer, mz3, obj, ply, stl, vtp};
 use crate::mesh::{MeshError, Texture, TriangleMesh};
 use crate::volume::{LengthUnit, Space};
 use crate::warning::{Warning, WarningCode};
@@ -60,9 +61,9 @@ pub struct MeshFile {
     /// The mesh, with positions in the file's units and space.
     pub mesh: TriangleMesh,
     /// The directions of the axes, if the file states them: `SPACE=RAS` or `SPACE=LPS` in a comment, as 3D Slicer writes
-    /// it.
+    /// it, or the root node of a GLB that [`write_mesh_with`] wrote.
     pub space: Option<Space>,
-    /// The length of a unit of positions, if the file states it.
+    /// The length of a unit of positions, if the file states it, as such a GLB does.
     pub unit: LengthUnit,
     /// What a user should know about the mesh: what was left out or assumed.
     pub warnings: Vec<Warning>,
@@ -265,30 +266,41 @@ pub(super) fn known_format(bytes: &[u8]) -> Option<&'static str> {
 /// single precision only, where that is too coarse for the mesh; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
 /// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
-    write_noted_mesh(mesh, format, "")
+    write_mesh_with(mesh, format, &WriteOptions::default())
 }
 
-/// Returns the bytes of a file as [`write_mesh`] does, with notes for the reader of the file, which programs ignore: comment
-/// lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of STL; MZ3 has no
-/// room for any. Each line of `notes` is one, `code: text`, of which STL has only the code.
+/// Returns the bytes of a file as [`write_mesh`] does, with what else is to be stated in it.
+///
+/// The space is stated as 3D Slicer reads it, which takes files without for LPS: `SPACE=RAS` or `SPACE=LPS` in the header
+/// of STL, in a comment of PLY and OBJ, in field data of VTP. In GLB, a root node maps positions to metres and y upwards,
+/// and its `extras` are `space` and `unit`; [`read_mesh`] gives back positions as they were. MZ3 states nothing.
+///
+/// Notes are comment lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of
+/// STL, which has only their codes; MZ3 has no room for any.
 ///
 /// # Errors
 /// As [`write_mesh`].
-pub fn write_noted_mesh(mesh: &TriangleMesh, format: MeshFormat, notes: &str) -> Result<Vec<u8>, MeshError> {
+pub fn write_mesh_with(
+    mesh: &TriangleMesh,
+    format: MeshFormat,
+    options: &WriteOptions,
+) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
-    let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
+    let turned = options.turns().then(|| half_turn(mesh.clone()));
+    let mesh = turned.as_ref().unwrap_or(mesh);
+    let flipped = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
         let mut mesh = mesh.clone();
         mesh.flip_v();
         mesh
     });
-    let mesh = turned.as_ref().unwrap_or(mesh);
+    let mesh = flipped.as_ref().unwrap_or(mesh);
     Ok(match format {
-        MeshFormat::Glb => glb_writer::write(mesh, notes)?,
-        MeshFormat::Ply => ply::write(mesh, notes),
-        MeshFormat::Stl => stl::write(mesh, notes)?,
-        MeshFormat::Obj => obj::write(mesh, notes),
-        MeshFormat::Vtp => vtp::write(mesh, notes),
+        MeshFormat::Glb => glb_writer::write(mesh, options)?,
+        MeshFormat::Ply => ply::write(mesh, options),
+        MeshFormat::Stl => stl::write(mesh, options)?,
+        MeshFormat::Obj => obj::write(mesh, options),
+        MeshFormat::Vtp => vtp::write(mesh, options),
         MeshFormat::Mz3 => mz3::write(mesh)?,
     })
 }

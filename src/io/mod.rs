@@ -6,6 +6,7 @@ mod deflate;
 mod detect;
 mod error;
 mod faces;
+mod frame;
 mod glb;
 mod glb_writer;
 mod gltf;
@@ -36,9 +37,10 @@ mod vtp;
 pub use animation::{AnimationWriter, write_animation};
 pub use detect::parse_volume;
 pub use error::FormatError;
+pub use frame::WriteOptions;
 pub use mesh_file::{
     MeshFile, MeshFormat, MeshOptions, parse_mesh, parse_textured_mesh, read_mesh, write_mesh,
-    write_noted_mesh,
+    write_mesh_with,
 };
 pub use nifti_writer::write_nifti;
 pub use points::{PointCloud, parse_points};

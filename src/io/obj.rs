@@ -4,7 +4,7 @@ use super::faces::Faces;
 use super::mesh_file::is_text;
 use super::notes::{comments, stated_space};
 use super::text::{number, numbered_lines};
-use super::{FormatError, MeshFile, PointCloud};
+use super::{FormatError, MeshFile, PointCloud, WriteOptions};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::mesh::{TriangleMesh, WorldPositions};
 use crate::volume::Space;
@@ -273,8 +273,13 @@ fn numbers<'a>(
 }
 
 /// Returns the text of an OBJ file of the mesh, with numbers in the shortest form that reads back exactly.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
-    let mut text = comments(notes, "# warning ", "\n");
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Vec<u8> {
+    // Comments at the start of the file are all that some readers look at.
+    let mut text = options.frame().comment("# ");
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text.push_str(&comments(options.notes, "# warning ", "\n"));
     text.push_str("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
         if mesh.origin == DVec3::ZERO {

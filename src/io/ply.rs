@@ -5,7 +5,7 @@ use super::faces::Faces;
 use super::mesh_file::{color_bytes, push_floats};
 use super::notes::{comments, stated_space};
 use super::text::number;
-use super::{FormatError, MeshFile};
+use super::{FormatError, MeshFile, WriteOptions};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::mesh::{TriangleMesh, WorldPositions};
 use crate::volume::Space;
@@ -496,8 +496,8 @@ impl Reader {
 
 /// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits, and positions in double
 /// precision if the mesh has an origin.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
-    let mut out = header(mesh, notes).into_bytes();
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Vec<u8> {
+    let mut out = header(mesh, options).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {
         if is_double(mesh) {
             mesh.world_position(i).to_array().iter().for_each(|x| out.extend(x.to_le_bytes()));
@@ -530,9 +530,10 @@ fn is_double(mesh: &TriangleMesh) -> bool {
     mesh.origin != DVec3::ZERO
 }
 
-fn header(mesh: &TriangleMesh, notes: &str) -> String {
-    let comments = comments(notes, "\ncomment warning ", "");
-    let mut lines = vec!["ply".into(), format!("format binary_little_endian 1.0{comments}")];
+fn header(mesh: &TriangleMesh, options: &WriteOptions) -> String {
+    let space = options.frame().comment("\ncomment ");
+    let comments = comments(options.notes, "\ncomment warning ", "");
+    let mut lines = vec!["ply".into(), format!("format binary_little_endian 1.0{space}{comments}")];
     let properties = |lines: &mut Vec<String>, kind: &str, names: &[&str]| {
         lines.extend(names.iter().map(|name| format!("property {kind} {name}")));
     };

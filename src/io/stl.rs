@@ -3,7 +3,7 @@
 use super::mesh_file::{is_text, push_floats};
 use super::notes::{short, stated_space};
 use super::text::number;
-use super::{FormatError, MeshFile};
+use super::{FormatError, MeshFile, WriteOptions};
 use crate::math::{DVec3, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh, WorldPositions};
 
@@ -146,12 +146,13 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
 ///
 /// # Errors
 /// [`MeshError::Precision`] if single precision is too coarse for the mesh where it is in world space.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Result<Vec<u8>, MeshError> {
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Result<Vec<u8>, MeshError> {
     let positions = mesh.world_positions()?;
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
     // Not "solid", which would be detected as text.
     out.extend(b"binary STL");
-    out.extend(short(notes, 80 - out.len()).into_bytes());
+    out.extend(options.frame().comment(", ").into_bytes());
+    out.extend(short(options.notes, 80 - out.len()).into_bytes());
     out.resize(80, b' ');
     out.extend((mesh.triangles.len() as u32).to_le_bytes());
     for (corners, indices) in mesh.corners().zip(&mesh.triangles) {

@@ -34,6 +34,7 @@ mod merge_and_split;
 mod mesh_edits;
 mod mesh_files;
 mod mesh_oddities;
+mod mesh_spaces;
 mod multires;
 mod multires_fuzz;
 mod plane_cut;

@@ -1,0 +1,62 @@
+// What mesh files are read with, and what is stated in those that are written.
+import { checkProperties, choice, denseCopy, invalid, typedArray } from './check.js';
+import type { LengthUnit, MeshExtra, MeshTexture, NamedFile, Space, SpaceOptions } from './data.js';
+import { checkTexture } from './texture.js';
+import type { Warning } from './warning.js';
+
+const SPACES: readonly Space[] = ['RAS', 'LPS'];
+const UNITS: readonly LengthUnit[] = ['m', 'mm', 'um'];
+
+/** Names of the {@link SpaceOptions}. */
+export const SPACE_OPTIONS = ['space', 'as', 'unit'] as const;
+
+/** Returns space, space in the file, and unit for the WebAssembly module, empty where they are not given. */
+export function checkedSpaceOptions({ space, as, unit }: SpaceOptions): [space: string, as: string, unit: string] {
+  checkStated({ space, unit });
+  if (as === undefined) return [space ?? '', '', unit ?? ''];
+  choice('as', as, SPACES);
+  if (space === undefined) throw invalid('as', 'needs space as well, that of the mesh');
+  return [space, as, unit ?? ''];
+}
+
+/** Throws `invalid-argument` for a space or unit that there is not. */
+export function checkStated({ space, unit }: Pick<MeshExtra, 'space' | 'unit'>): void {
+  if (space !== undefined) choice('space', space, SPACES);
+  if (unit !== undefined) choice('unit', unit, UNITS);
+}
+
+/** Options of reading a mesh file. */
+export interface MeshFileOptions {
+  texture?: MeshTexture;
+  files?: readonly NamedFile[];
+}
+
+/** Returns the options of reading a mesh file; throws `invalid-argument` naming the one that is wrong. */
+export function checkedFileOptions(options: MeshFileOptions | undefined): {
+  texture: MeshTexture | undefined;
+  files: NamedFile[];
+} {
+  const { texture, files = [] } = checkProperties('options', options, ['texture', 'files']);
+  checkTexture(texture);
+  return { texture, files: denseCopy('files', files).map((file, at) => checkedFile(`files[${at}]`, file)) };
+}
+
+function checkedFile(parameter: string, file: NamedFile): NamedFile {
+  const { name, bytes } = checkProperties(parameter, file, ['name', 'bytes']);
+  if (typeof name !== 'string') throw invalid(`${parameter}.name`, 'must be a text');
+  return { name, bytes: typedArray(`${parameter}.bytes`, bytes, Uint8Array) };
+}
+
+/** Returns what a file states besides its mesh, with only those properties that it has. */
+export function stated(file: {
+  space(): string;
+  unit(): string;
+  warnings(): unknown;
+}): Pick<MeshExtra, 'space' | 'unit' | 'warnings'> {
+  const [space, unit, warnings] = [file.space(), file.unit(), file.warnings() as Warning[]];
+  return {
+    ...(space !== '' && { space: space as Space }),
+    ...(unit !== '' && { unit: unit as LengthUnit }),
+    ...(warnings.length > 0 && { warnings }),
+  };
+}
